@@ -1,0 +1,195 @@
+"""The command line: `python -m sweep VERB`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sweep.config.faults import ConfigError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from sweep.run import Plan
+
+DONE, WRONG_INPUT, TOO_MANY_FAILED, INTERRUPTED = 0, 2, 3, 130
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="rattleback-sweep", prog_name="sweep")
+def main() -> None:
+    """Parameter sweeps for the reversals of a rattleback.
+
+    Exit codes: 0 done; 2 a configuration or file is wrong; 3 more cells failed than the
+    configuration allows; 130 interrupted, the same command goes on.
+    """
+
+
+@main.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@click.option("--output", type=click.Path(path_type=Path), help="Folder for the results [default: runs/NAME].")
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE",
+              help="Replace a value of the configuration, e.g. friction.mu=60 (repeatable).")  # fmt: skip
+@click.option("--dry-run", is_flag=True, help="Print cells, steps, memory and an estimate of the time; compute nothing.")
+@click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of going on from it.")
+@click.option("--quiet", is_flag=True, help="Print errors alone.")
+def run(config: Path, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool, quiet: bool) -> None:
+    """Run the sweep that CONFIG describes.
+
+    Writes NAME.nc (the dataset) and NAME.png (its maps).  Interrupted, it keeps what is finished,
+    and the same command goes on from there.
+    """
+    with _explained():
+        from sweep.config import load_config
+
+        checked = load_config(config, _parse_settings(settings))
+        folder = output or Path("runs") / checked.name
+        if dry_run:
+            from sweep.run import plan
+
+            click.echo(_estimate(plan(checked)))
+            return
+        from sweep.progress import Terminal
+        from sweep.run import run as run_sweep
+
+        with Terminal(quiet) as terminal:
+            try:
+                result = run_sweep(checked, folder, fresh=fresh, reporter=terminal)
+            except KeyboardInterrupt:
+                done = f"{terminal.last.done} of {terminal.last.cells} cells" if terminal.last else "no cell"
+                terminal.note(f"interrupted: {done} finished and kept; the same command goes on")
+                sys.exit(INTERRUPTED)
+        if not quiet:
+            click.echo(_summary(result))
+            click.echo(f"wrote {folder / checked.name}.nc and .png")
+        failed = _failed_fraction(result)
+        if failed > checked.max_failed_fraction:
+            click.echo(f"{failed:.2%} of the cells failed; allowed: max_failed_fraction {checked.max_failed_fraction:.2%}", err=True)
+            sys.exit(TOO_MANY_FAILED)
+
+
+@main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--var", "variable", help="Variable to draw [default: reversals, simulated beside predicted].")
+@click.option("--output", type=click.Path(path_type=Path), help="PNG file [default: beside FILE].")
+def plot(file: Path, variable: str | None, output: Path | None) -> None:
+    """Draw the maps of a dataset again."""
+    with _explained():
+        from sweep import plots
+        from sweep.store import StoreError, open_dataset, replacing
+
+        dataset = open_dataset(file)
+        target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
+        try:
+            figure = plots.draw(dataset, variable)
+        except (ValueError, KeyError) as error:
+            raise StoreError(f"{file}: {error}") from None
+        with replacing(target) as temporary:
+            figure.savefig(temporary, format="png")
+        click.echo(f"wrote {target}")
+
+
+@main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+def info(file: Path) -> None:
+    """Tell what is in a dataset: axes, counts by status, agreement with the prediction, provenance."""
+    with _explained():
+        from sweep.store import StoreError, open_dataset
+
+        dataset = open_dataset(file)
+        if "status" not in dataset:
+            raise StoreError(f"{file}: not a dataset of sweep: no variable status")
+        click.echo(dataset.attrs.get("title", file.name))
+        click.echo(_summary(dataset))
+        for key in sorted(set(dataset.attrs) - {"title", "config"}):
+            click.echo(f"{key}: {dataset.attrs[key]}")
+        click.echo(f"config:\n{dataset.attrs.get('config', '')}")
+
+
+class _explained:
+    """Turns errors that are the user's to mend into lines on stderr and exit code 2."""
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if error is None:
+            return
+        from sweep.store import StoreError
+
+        if isinstance(error, ConfigError | StoreError):
+            click.echo(str(error), err=True)
+            sys.exit(WRONG_INPUT)
+        if isinstance(error, OSError) and error.filename:
+            click.echo(f"{error.filename}: {error.strerror}", err=True)
+            sys.exit(WRONG_INPUT)
+
+
+def _parse_settings(settings: tuple[str, ...]) -> dict[str, Any]:
+    from sweep.config.document import parse_value
+    from sweep.config.faults import Fault
+
+    parsed = {}
+    for setting in settings:
+        path, equals, value = setting.partition("=")
+        if not (equals and path):
+            raise ConfigError([Fault(f"--set {setting}", None, None, (), "not a setting; allowed: PATH=VALUE")])
+        parsed[path] = parse_value(value, f"--set {path}")
+    return parsed
+
+
+def _estimate(job: Plan) -> str:
+    from sweep.executor import nominal_seconds
+
+    kernel, images = job.kernel, job.images
+    steps = images[:, kernel.row("goal")].sum()
+    seconds = nominal_seconds(images, kernel)
+    axes = " × ".join(f"{d} {n}" for d, n in zip(job.grid.dims, job.grid.shape, strict=True)) or "one cell"
+    return "\n".join(
+        [
+            f"cells:  {job.grid.size} ({axes})",
+            f"steps:  at most {steps:.3g}, {steps / job.grid.size:.3g} a cell",
+            f"memory: {images.nbytes / 2**20:.1f} MiB of trajectories beside {150 + 60 * 1} MiB of program",
+            f"time:   at most about {seconds:.3g} s, had every cell to go to t_end; cells that settle stop earlier",
+        ]
+    )
+
+
+def _failed_fraction(dataset: xr.Dataset) -> float:
+    from sweep.executor import FAILURES
+
+    return float(dataset["status"].isin(FAILURES).mean())
+
+
+def _summary(dataset: xr.Dataset) -> str:
+    import numpy as np
+
+    from sweep.dataset import STATUSES, STEP_RULES
+
+    status = np.ravel(dataset["status"].values)
+    dims = " × ".join(f"{d} {n}" for d, n in dataset["status"].sizes.items()) or "one cell"
+    ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if (status == code).any())
+    lines = [f"{status.size} cells ({dims}): {ends}"]
+    if "reversals" in dataset:
+        valid = np.isin(status, (1, 2))
+        ours, theirs = (np.ravel(dataset[n].values)[valid] for n in ("reversals", "reversals_predicted"))
+        if len(ours):
+            lines.append(
+                f"reversals: {ours.min()} to {ours.max()}; as predicted in {(ours == theirs).mean():.1%} of the cells, "
+                f"within one in {(abs(ours.astype(int) - theirs) <= 1).mean():.1%}"
+            )
+    if "energy_error" in dataset:
+        error = np.ravel(dataset["energy_error"].values)
+        lines.append(f"energy error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}")
+    if "step_rule" in dataset:
+        rule, step = np.ravel(dataset["step_rule"].values), np.ravel(dataset["step"].values)
+        who = ", ".join(f"{name} in {(rule == code).sum()}" for code, name in STEP_RULES.items() if (rule == code).any())
+        lines.append(f"step: {step.min():.3g} to {step.max():.3g}, set by {who} cells")
+    if "wall_time" in dataset.attrs:
+        lines.append(
+            f"cost: {dataset.attrs['wall_time']:.3g} s, {dataset.attrs['trajectories_per_second']:.3g} trajectories/s"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,120 @@
+"""From a YAML file to a checked `Config`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from sweep.config import cases, document, schema
+from sweep.config.faults import ConfigError, Fault
+from sweep.config.schema import Config, Integrator, Values
+from sweep.grid import off_the_body
+from sweep.models import MODELS
+from sweep.parameters import PARAMETERS
+
+__all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "load_config"]
+
+# Maps are drawn with μ downwards and b across, a panel for each n0; other axes follow as written.
+_FIRST_AXES = ("mu", "b", "n0")
+
+
+def load_config(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Config:
+    """Read and check a configuration.
+
+    Parameters
+    ----------
+    path : YAML file
+    overrides : values that replace the file's, by path ("friction.mu") or, for a parameter or a
+        setting of the integrator, by its bare name ("mu")
+
+    Raises
+    ------
+    ConfigError
+        with a `Fault` for each thing that is wrong.
+    """
+    source = document.read(Path(path))
+    for key, value in (overrides or {}).items():
+        source.set(_full_path(key), value, f"--set {key}")
+    source.values.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "_", Path(path).stem))
+    try:
+        checked = schema.Schema.model_validate(source.values)
+    except ValidationError as error:
+        faults = [schema.describe(e) for e in error.errors()]
+        raise ConfigError([source.fault(path, text, at_key=key) for path, text, key in faults]) from None
+    return _resolve(checked, source)
+
+
+def _full_path(key: str) -> tuple[str, ...]:
+    if key in PARAMETERS:
+        return PARAMETERS[key].section, key
+    return ("integrator", key) if key in Integrator.model_fields else tuple(key.split("."))
+
+
+def _resolve(checked: Any, source: document.Document) -> Config:
+    """Fill in defaults, order the axes, and check what one value says of another."""
+    model = MODELS[checked.model]
+    given = {
+        key: getattr(getattr(checked, section), key)
+        for section, keys in source.values.items()
+        if section in {p.section for p in PARAMETERS.values()}
+        for key in keys
+    }
+    columns = cases.read(source, checked.cases) if checked.cases is not None else None
+    faults = list(_misfits(checked, given, columns, source))
+    order = sorted(model.parameters, key=lambda n: (_rank(n, _FIRST_AXES), _rank(n, tuple(given))))
+    parameters = {}
+    for name in order:
+        default = PARAMETERS[name].default
+        if name in given:
+            parameters[name] = given[name]
+        elif name in (columns or {}):
+            continue
+        elif default is None:
+            faults.append(source.fault((PARAMETERS[name].section, name), f"missing; allowed: {PARAMETERS[name].allowed}"))
+        else:
+            parameters[name] = Values((default,), False, default)
+    if faults:
+        raise ConfigError(faults)
+    config = Config(
+        name=checked.name,
+        model=checked.model,
+        parameters=parameters,
+        integrator=checked.integrator,
+        measure=tuple(checked.measure),
+        max_failed_fraction=checked.max_failed_fraction,
+        cases=columns,
+        cases_file=checked.cases,
+    )
+    if beyond := off_the_body(config):
+        raise ConfigError([source.fault(("start", "x0"), beyond)])
+    return config
+
+
+def _rank(name: str, names: tuple[str, ...]) -> int:
+    return names.index(name) if name in names else len(names)
+
+
+def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document.Document) -> Any:
+    model = MODELS[checked.model]
+    for name in given:
+        path = (PARAMETERS[name].section, name)
+        if name not in model.parameters:
+            yield source.fault(
+                path, f"the {model.name} model has no {name}; allowed: {', '.join(model.parameters)}", at_key=True
+            )
+        elif columns is not None and name in columns:
+            yield source.fault(path, f"also a column of {checked.cases}; allowed: one of the two", at_key=True)
+        elif columns is not None and given[name].is_axis:
+            yield source.fault(path, "an axis beside cases; allowed: a number, or a column of the table")
+    for name in columns or {}:
+        if name not in model.parameters:
+            yield source.fault(("cases",), f"column {name}: the {model.name} model has no {name}")
+    for i, name in enumerate(checked.measure):
+        if name not in model.measures:
+            yield source.fault(
+                ("measure", i), f"not measured on the {model.name} model; allowed: {', '.join(model.measures)}"
+            )

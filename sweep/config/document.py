@@ -1,0 +1,144 @@
+"""YAML documents as plain values, with the line and column of every part.
+
+YAML 1.2: 1e-3 is a number and `no` a word.  Only plain data passes: tags, anchors and duplicate
+keys are refused, so nothing in a file can run code, repeat itself without end or hide a line.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.tokens import AliasToken, AnchorToken, TagToken
+
+from sweep.config.faults import ConfigError, Fault, Path
+
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_SPECIAL = {".inf": float("inf"), "-.inf": float("-inf"), ".nan": float("nan")}
+_WORDS: dict[str, bool | None] = {
+    "true": True, "True": True, "false": False, "False": False, "null": None, "~": None, "": None,
+}  # fmt: skip
+
+
+@dataclass
+class Document:
+    """Values of a configuration and where each stands."""
+
+    file: str
+    values: Any = None
+    keys: dict[Path, tuple[str, int | None, int | None]] = field(default_factory=dict)
+    """Place of a mapping's key, by the path it leads to."""
+    places: dict[Path, tuple[str, int | None, int | None]] = field(default_factory=dict)
+    """Place of a value."""
+
+    def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
+        """A fault at `path`, or at the closest thing above it that the document has."""
+        table, known = (self.keys if at_key else self.places), path
+        while known and known not in table:
+            known = known[:-1]
+        file, line, column = table.get(known, (self.file, None, None))
+        return Fault(file, line, column, path, message)
+
+    def set(self, path: Path, value: Any, source: str) -> None:
+        """Put `value` at `path`, making the sections above it; faults in it name `source`."""
+        section = self.values
+        for part in path[:-1]:
+            section = section.setdefault(part, {})
+            if not isinstance(section, dict):
+                raise ConfigError([Fault(source, None, None, path, f"{part} is not a section")])
+        section[path[-1]] = value
+        for table in (self.keys, self.places):
+            for old in [p for p in table if p[: len(path)] == path]:
+                del table[old]
+            table[path] = (source, None, None)
+
+
+def read(path: FilePath) -> Document:
+    """Read a YAML file; `ConfigError` says what is wrong with it and where."""
+    document = Document(str(path))
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise ConfigError([Fault(str(path), None, None, (), "no such file")]) from None
+    except OSError as error:
+        raise ConfigError([Fault(str(path), None, None, (), f"cannot be read: {error.strerror}")]) from None
+    except UnicodeDecodeError as error:
+        raise ConfigError([Fault(str(path), None, None, (), f"not UTF-8 text: byte {error.start}")]) from None
+    node = _compose(text, str(path))
+    if not isinstance(node, MappingNode):
+        raise ConfigError([Fault(str(path), 1, 1, (), "a configuration is a mapping of keys to values")])
+    faults: list[Fault] = []
+    document.values = _convert(node, (), document, faults)
+    if faults:
+        raise ConfigError(faults)
+    return document
+
+
+def parse_value(text: str, source: str) -> Any:
+    """The value that a command line gives as text, read as YAML."""
+    node = _compose(text, source)
+    scratch, faults = Document(source), list[Fault]()
+    value = None if node is None else _convert(node, (), scratch, faults)
+    if faults:
+        raise ConfigError(faults)
+    return value
+
+
+def _compose(text: str, file: str) -> Node | None:
+    try:
+        for token in YAML(pure=True).scan(text):
+            if isinstance(token, AliasToken | AnchorToken | TagToken):
+                mark, what = token.start_mark, type(token).__name__.removesuffix("Token").lower()
+                raise ConfigError([Fault(file, mark.line + 1, mark.column + 1, (),
+                                         f"YAML {what} not allowed: plain values only")])  # fmt: skip
+        return YAML(pure=True).compose(text)  # type: ignore[no-any-return]
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
+        problem = (error.problem or error.context or "not YAML").split("\n")[0]
+        raise ConfigError([Fault(file, line, column, (), f"not YAML: {problem}")]) from None
+    except (YAMLError, RecursionError, ValueError) as error:
+        problem = "nested too deeply" if isinstance(error, RecursionError) else str(error).split("\n")[0]
+        raise ConfigError([Fault(file, None, None, (), f"not YAML: {problem}")]) from None
+
+
+def _convert(node: Node, path: Path, document: Document, faults: list[Fault]) -> Any:
+    def place(of: Node) -> tuple[str, int, int]:
+        return document.file, of.start_mark.line + 1, of.start_mark.column + 1
+
+    document.places[path] = place(node)
+    if isinstance(node, ScalarNode):
+        return _scalar(node)
+    if isinstance(node, SequenceNode):
+        return [_convert(item, (*path, i), document, faults) for i, item in enumerate(node.value)]
+    result: dict[str, Any] = {}
+    for key_node, value_node in node.value:
+        if not isinstance(key_node, ScalarNode):
+            faults.append(Fault(*place(key_node), path, "a key is a word"))
+            continue
+        key = key_node.value
+        if key in result:
+            line = document.keys[(*path, key)][1]
+            faults.append(Fault(*place(key_node), (*path, key), f"duplicate key, first on line {line}"))
+            continue
+        document.keys[(*path, key)] = place(key_node)
+        result[key] = _convert(value_node, (*path, key), document, faults)
+    return result
+
+
+def _scalar(node: ScalarNode) -> str | float | int | bool | None:
+    text: str = node.value
+    if node.style is not None:  # quoted
+        return text
+    if text in _WORDS:
+        return _WORDS[text]
+    if text.lower() in _SPECIAL:
+        return _SPECIAL[text.lower()]
+    if _FLOAT.fullmatch(text):
+        return int(text) if text.lstrip("+-").isdigit() and len(text) < 19 else float(text)
+    return text

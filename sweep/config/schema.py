@@ -1,0 +1,217 @@
+"""What a configuration may say.  Input is checked and normalised here, and trusted after."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic_core import PydanticCustomError
+from ruamel.yaml import YAML
+from ruamel.yaml.compat import StringIO
+
+from sweep.kernels.lanes import MEASURES
+from sweep.models import MODELS
+from sweep.parameters import PARAMETERS, SECTIONS, Parameter
+
+MAX_AXIS = 10_000_000
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Range(_Strict):
+    start: float
+    stop: float
+    num: int = Field(ge=1, le=MAX_AXIS)
+    spacing: Literal["linear", "log"] = "linear"
+
+    def values(self) -> list[float]:
+        if self.spacing == "linear":
+            return np.linspace(self.start, self.stop, self.num).tolist()
+        if self.start * self.stop <= 0:
+            raise _wrong("a log range needs start and stop of one sign, both not zero", "spacing")
+        return np.geomspace(self.start, self.stop, self.num).tolist()
+
+
+def _wrong(reason: str, *at: str | int) -> PydanticCustomError:
+    """A fault `at` a place inside the value being checked."""
+    return PydanticCustomError("value", "{reason}", {"reason": reason, "at": at})
+
+
+@dataclass(frozen=True)
+class Values:
+    """A parameter's checked value: one number, or an axis of distinct numbers."""
+
+    numbers: tuple[float, ...]
+    is_axis: bool
+    spec: float | list[float] | dict[str, Any]
+    """As the configuration says it."""
+
+
+def _parse_values(parameter: Parameter, raw: Any) -> Values:
+    spec: Any = raw
+    if isinstance(raw, dict):
+        try:
+            span = Range.model_validate(raw)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise _wrong(_message(first, Range), *first["loc"]) from None
+        numbers, spec = span.values(), span.model_dump()
+    elif isinstance(raw, list):
+        if not raw:
+            raise _wrong("an empty axis; allowed: one number or more")
+        for i, item in enumerate(raw):
+            _check_number(item, parameter, i)
+        numbers = spec = [float(item) for item in raw]
+    else:
+        _check_number(raw, parameter)
+        return Values((float(raw),), False, float(raw))
+    for number in numbers:
+        if not parameter.allows(number):
+            raise _wrong(f"{number:g} is out of bounds; allowed: {parameter.allowed}")
+    if len(set(numbers)) < len(numbers):
+        raise _wrong("an axis with equal values; allowed: distinct numbers")
+    return Values(tuple(numbers), True, spec)
+
+
+def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
+    if isinstance(raw, bool) or not isinstance(raw, int | float):
+        what = "nothing" if raw is None else repr(raw)
+        raise _wrong(
+            f"{what} is not a number; allowed: {parameter.allowed}"
+            + ("" if at else ", a list of such, or {start, stop, num, spacing: linear|log}"),
+            *at,
+        )
+    if not math.isfinite(raw) or not parameter.allows(raw):
+        raise _wrong(f"{raw:g} is out of bounds; allowed: {parameter.allowed}", *at)
+
+
+def _step(raw: Any) -> Any:
+    if raw == "auto" or (isinstance(raw, int | float) and not isinstance(raw, bool) and 0 < raw < math.inf):
+        return raw
+    raise _wrong(f"{raw!r}; allowed: auto, or a finite number > 0 in sqrt(c/g)")
+
+
+def _distinct(names: list[str]) -> list[str]:
+    if len(set(names)) < len(names):
+        raise _wrong("a name twice; allowed: each once")
+    return names
+
+
+class Integrator(_Strict):
+    method: Literal["dopri5"] = "dopri5"
+    step: Annotated[float | Literal["auto"], BeforeValidator(_step)] = "auto"
+    t_end: float = Field(default=30_000.0, gt=0)
+    stop_when_settled: bool = True
+
+
+def _section(name: str) -> Any:
+    """The schema of one section of physical parameters, from the table of parameters."""
+    fields: dict[str, Any] = {
+        p.name: (
+            Annotated[Any, BeforeValidator(lambda raw, p=p: _parse_values(p, raw)), Field(description=p.long_name)],
+            None,
+        )
+        for p in PARAMETERS.values()
+        if p.section == name
+    }
+    return create_model(name.capitalize(), __base__=_Strict, **fields)
+
+
+class _Top(_Strict):
+    name: str = Field(default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")
+    model: Literal[tuple(MODELS)] = "slip"  # type: ignore[valid-type]
+    cases: str | None = None
+    integrator: Integrator = Integrator()
+    measure: Annotated[
+        list[Literal[MEASURES]],  # type: ignore[valid-type]
+        BeforeValidator(lambda names: _distinct(names) if isinstance(names, list) else names),
+    ] = Field(default_factory=lambda: list(MEASURES))
+    max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
+
+
+Schema: Any = create_model(
+    "Configuration", __base__=_Top, **{name: (_section(name), Field(default_factory=dict)) for name in SECTIONS}
+)
+
+
+@dataclass(frozen=True)
+class Config:
+    """A checked configuration.  `parameters` are those of the model, in the order of the axes."""
+
+    name: str
+    model: str
+    parameters: dict[str, Values]
+    integrator: Integrator
+    measure: tuple[str, ...]
+    max_failed_fraction: float
+    cases: dict[str, tuple[float, ...]] | None = None
+    """Columns of the table of cases, where there is one."""
+    cases_file: str | None = None
+
+    @property
+    def axes(self) -> dict[str, tuple[float, ...]]:
+        return {name: v.numbers for name, v in self.parameters.items() if v.is_axis}
+
+    def document(self) -> dict[str, Any]:
+        """Everything said and defaulted, as plain data."""
+        sections: dict[str, dict[str, Any]] = {}
+        for name, value in self.parameters.items():
+            sections.setdefault(PARAMETERS[name].section, {})[name] = value.spec
+        return {
+            "name": self.name,
+            "model": self.model,
+            **({"cases": self.cases_file} if self.cases_file else {}),
+            **{section: sections[section] for section in SECTIONS if section in sections},
+            "integrator": self.integrator.model_dump(),
+            "measure": list(self.measure),
+            "max_failed_fraction": self.max_failed_fraction,
+        }
+
+    def to_yaml(self) -> str:
+        stream = StringIO()
+        yaml = YAML(typ="safe", pure=True)
+        yaml.sort_base_mapping_type_on_output = False  # type: ignore[attr-defined]
+        yaml.dump(self.document(), stream)
+        return stream.getvalue()
+
+    def fingerprint(self) -> str:
+        """Hash of all that decides the numbers: neither the name nor what to do about failures."""
+        decisive = self.document()
+        for key in ("name", "max_failed_fraction", "cases"):
+            decisive.pop(key, None)
+        text = json.dumps([decisive, list(self.axes), self.cases], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def describe(error: Any) -> tuple[tuple[str | int, ...], str, bool]:
+    """Path, message and whether the key itself is at fault, of one of pydantic's errors."""
+    path = tuple(part for part in error["loc"] if not str(part).startswith("literal["))
+    at = error.get("ctx", {}).get("at", ())
+    return (*path, *at), _message(error, _model_at(path[:-1])), error["type"] == "extra_forbidden"
+
+
+def _model_at(path: tuple[str | int, ...]) -> Any:
+    model: Any = Schema
+    for part in path:
+        annotation = getattr(model, "model_fields", {}).get(part)
+        model = annotation.annotation if annotation else model
+    return model
+
+
+def _message(error: Any, model: Any) -> str:
+    if error["type"] == "extra_forbidden":
+        return f"unknown key; allowed: {', '.join(model.model_fields)}"
+    if error["type"] == "missing":
+        return "missing; required here"
+    text = str(error["msg"])
+    given = error["input"]
+    if error["type"] == "value":
+        return text
+    return f"{given!r}: {text[0].lower()}{text[1:]}" if not isinstance(given, dict) else text

@@ -1,0 +1,193 @@
+"""Labelled results: from images and predictions to an xarray dataset with CF-1.11 attributes."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import xarray as xr
+
+from sweep.config import Config
+from sweep.grid import Array, Grid
+from sweep.kernels import lanes, stepsize
+from sweep.kernels.lanes import Kernel
+from sweep.parameters import PARAMETERS
+from sweep.prediction import Prediction
+
+STATUSES = {
+    0: "not_run",
+    lanes.SETTLED: "settled",
+    lanes.TIME_LIMIT: "time_limit",
+    lanes.LIFT_OFF: "lift_off",
+    lanes.DIVERGED: "diverged",
+    lanes.PARADOX: "paradox",
+}
+
+STEP_RULES = {stepsize.FIXED: "fixed", stepsize.ACCURACY: "accuracy", stepsize.STABILITY: "stability"}
+
+
+@dataclass(frozen=True)
+class Variable:
+    dtype: str
+    units: str
+    long_name: str
+    flags: Mapping[int, str] | None = None
+    per_body: bool = False
+    """Without the parameters of the start."""
+
+
+_TIME = "1"
+
+VARIABLES: dict[str, Variable] = {
+    "reversals": Variable("int16", "1", "spin reversals of the simulated trajectory"),
+    "t_last_reversal": Variable("float64", _TIME, "time of the last spin reversal, in sqrt(c/g)"),
+    "spin_mean": Variable("float64", "1", "spin averaged over the last full window before t_stop, in sqrt(g/c)"),
+    "status": Variable("int8", "1", "how the simulation of the trajectory ended", STATUSES),
+    "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)"),
+    "t_stop": Variable("float64", _TIME, "time at which the simulation ended, in sqrt(c/g)"),
+    "energy_error": Variable(
+        "float64", "1",
+        f"largest violation of the energy balance, seen every {lanes.BLOCK} steps, relative to the start energy above rest",
+    ),
+    "step": Variable("float64", _TIME, "integration step, in sqrt(c/g)"),
+    "step_rule": Variable("int8", "1", "what set the integration step", STEP_RULES),
+    "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),
+    "n_c1_plus": Variable("float64", "1", "positive spin above which rattle grows, Takano's formula, in sqrt(g/c)", per_body=True),
+    "n_c1_minus": Variable("float64", "1", "negative spin below which rattle grows, Takano's formula, in sqrt(g/c)", per_body=True),
+    "n_c2_plus": Variable("float64", "1", "positive spin above which spin reverses, Takano's formula, in sqrt(g/c)", per_body=True),
+    "n_c2_minus": Variable("float64", "1", "negative spin below which spin reverses, Takano's formula, in sqrt(g/c)", per_body=True),
+    "n_c1_plus_linear": Variable("float64", "1", "positive spin above which rattle grows, eigenvalues of the model, in sqrt(g/c)", per_body=True),
+    "n_c1_minus_linear": Variable("float64", "1", "negative spin below which rattle grows, eigenvalues of the model, in sqrt(g/c)", per_body=True),
+    "form_factor": Variable("float64", "1", "form factor L(f) of Takano (2011)", per_body=True),
+}  # fmt: skip
+
+
+def measured(kernel: Kernel, images: Array) -> dict[str, Array]:
+    """The simulated variables, each of shape (cells,), from images at their ends."""
+    model = kernel.model
+    states, constants = images[:, : len(model.states)].T, images[:, len(model.states) : kernel.row("step")].T
+
+    def row(name: str) -> Array:
+        return np.asarray(images[:, kernel.row(name)])
+
+    spin, _, _ = model.energy.py_func(states, constants)  # type: ignore[attr-defined]
+    result = {
+        "status": row("status"),
+        "spin_final": spin,
+        "t_stop": row("done") * row("step"),
+        "step": row("step"),
+    }
+    if "reversals" in kernel.measure:
+        closed = row("done") * row("step") >= row("period")
+        result["reversals"] = row("reversals")
+        result["t_last_reversal"] = row("last_reversal")
+        result["spin_mean"] = np.where(closed, row("closed_window") / row("period"), np.nan)
+    if "energy_error" in kernel.measure:
+        start, violation = row("energy_start"), row("violation")
+        result["energy_error"] = np.divide(violation, start, out=violation.copy(), where=start > 0)
+    return result
+
+
+def predicted(prediction: Prediction) -> dict[str, Array]:
+    """The predicted variables, over cells or bodies."""
+    plus, minus = prediction.n_c1
+    plus_linear, minus_linear = (np.where(np.isfinite(n), n, np.nan) for n in prediction.n_c1_linear)
+    return {
+        "reversals_predicted": prediction.reversals,
+        "n_c1_plus": plus,
+        "n_c1_minus": minus,
+        "n_c2_plus": 2 * plus,
+        "n_c2_minus": 2 * minus,
+        "n_c1_plus_linear": plus_linear,
+        "n_c1_minus_linear": minus_linear,
+        "form_factor": prediction.form_factor,
+    }
+
+
+def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: Mapping[str, Any]) -> xr.Dataset:
+    """A dataset of flat arrays over the cells of `grid` (or over its bodies, where they are per body)."""
+    bodies, _ = grid.bodies()
+    variables = {}
+    for name, spec in VARIABLES.items():
+        if name in arrays:
+            over = bodies if spec.per_body else grid
+            values = np.asarray(arrays[name]).astype(spec.dtype).reshape(over.shape)
+            variables[name] = xr.Variable(over.dims, values, _attributes(spec))
+    coordinates = {
+        name: xr.Variable((name,), values, _parameter_attributes(name)) for name, values in grid.axes.items()
+    }
+    for name, column in (grid.cases or {}).items():
+        coordinates[name] = xr.Variable(("case",), column, _parameter_attributes(name))
+    if grid.cases is not None:
+        index = np.arange(grid.size, dtype="int64")
+        coordinates["case"] = xr.Variable(("case",), index, {"long_name": "row of the table of cases", "units": "1"})
+    for name, value in grid.constants.items():
+        coordinates[name] = xr.Variable((), value, _parameter_attributes(name))
+    head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals of a rattleback ({config.model} model)"}
+    return xr.Dataset(variables, coordinates, {**head, **attributes})
+
+
+def _attributes(spec: Variable) -> dict[str, Any]:
+    attributes: dict[str, Any] = {"long_name": spec.long_name, "units": spec.units}
+    if spec.flags:
+        attributes["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
+        attributes["flag_meanings"] = " ".join(spec.flags.values())
+    return attributes
+
+
+def _parameter_attributes(name: str) -> dict[str, str]:
+    return {"long_name": PARAMETERS[name].long_name, "units": PARAMETERS[name].units}
+
+
+def provenance(config: Config, seconds: float, cells: int) -> dict[str, Any]:
+    """Where the numbers come from: configuration, versions, machine, cost."""
+    return {
+        "config": config.to_yaml(),
+        "config_hash": config.fingerprint(),
+        "integrator": f"{config.integrator.method}, fixed step, {_step_words(config)}",
+        "sweep_version": metadata.version("rattleback-sweep"),
+        "git_commit": _git_commit(),
+        **{f"{name}_version": metadata.version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
+        "python_version": platform.python_version(),
+        "cpu": numba.core.config.CPU_NAME or _cpu_name(),
+        "threads": numba.get_num_threads(),
+        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "wall_time": seconds,
+        "trajectories_per_second": cells / seconds if seconds else 0.0,
+    }
+
+
+def _step_words(config: Config) -> str:
+    if config.integrator.step != "auto":
+        return f"{config.integrator.step:g} sqrt(c/g)"
+    return (
+        f"per trajectory the smaller of {stepsize.STABILITY_SHARE:g} of the stability limit "
+        f"and {stepsize.RADIANS_A_STEP:g} rad of the fastest rattle"
+    )
+
+
+def _cpu_name() -> str:
+    import llvmlite.binding
+
+    return str(llvmlite.binding.get_host_cpu_name())
+
+
+def _git_commit() -> str:
+    """The commit of the checkout that the package runs from; "unknown" for an installed one."""
+    try:
+        return subprocess.run(
+            ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=40"],
+            capture_output=True, text=True, check=True, timeout=5,
+        ).stdout.strip()  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+
+

@@ -1,0 +1,318 @@
+"""The kernel: many trajectories side by side, each to its own end.
+
+A trajectory's whole state is one row of a table, its *image*: states, constants, step, progress,
+measurements.  `advance` takes a table and a list of unfinished cells and moves each on by a
+number of blocks of steps.  Nothing else remembers anything: writing the table to disk is a
+checkpoint, and since every image evolves by itself, block after block, the numbers cannot depend
+on which thread, group, lane or call a cell met.
+
+Inside, a thread keeps `LANES` trajectories in one group, transposed so that a quantity's lanes lie
+next to each other, and runs whole steps in the loop over lanes, which LLVM turns into vector
+instructions.  A lane that ends is written back and takes the next cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numba
+import numpy as np
+
+from sweep.jit import inline, is_cached, parallel, source_file
+from sweep.kernels.stepper import make_load, make_step, make_store
+from sweep.kernels.tableau import Tableau
+from sweep.models.model import Array, Model, stack
+
+# 16: 22.4 ns a step and lane, 8: 24.2, 32: 24.4 on one thread of a Zen 5 (slip model, AVX-512).
+LANES = 16
+
+# Steps between two looks at a lane: at 128, looking costs 1 % of a step on the slip model, and a
+# trajectory that settles runs on for 64 steps on average, of 10^5.
+BLOCK = 128
+
+# Ends of a trajectory; `dataset` gives them their meanings for the user.
+RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX = range(6)
+
+MEASURES = ("reversals", "energy_error")
+
+_BASE = ("step", "goal", "done", "status", "energy_start", "stable_from", "stable_to")
+_MEASURED = {
+    "reversals": (
+        "step_rate", "period", "phase", "window", "closed_window", "reversals", "last_reversal"
+    ),  # fmt: skip
+    "energy_error": ("work", "violation"),
+}
+
+# A rattle settles when it could not carry the spin across a limit even with this many times its energy.
+SETTLE_MARGIN = 4.0
+
+# Friction only takes energy away, so a body that has gained this share is an integration gone wrong.
+ENERGY_GAIN = 1e-3
+
+# Rattle energies (amplitude squared) below this end as exact zeros, where they can only decay: the
+# products of such numbers are denormal, and cost up to a hundred times a normal operation.
+NEGLIGIBLE = 1e-120
+
+
+class Kernel:
+    """`advance` for one model, method and choice of measurements, and the layout of its images."""
+
+    def __init__(self, model: Model, tableau: Tableau, measure: Iterable[str]) -> None:
+        self.model = model
+        self.measure = tuple(name for name in MEASURES if name in measure)
+        measured = [row for name in self.measure for row in _MEASURED[name]]
+        constants = [f"constant{i}" for i in range(_count_constants(model))]
+        self.rows = (*model.states, *constants, *_BASE, *measured)
+        self._advance = _make_advance(model, tableau, self.rows, self.measure)
+
+    def row(self, name: str) -> int:
+        return self.rows.index(name)
+
+    def images(self, columns: Any, step: Array, t_end: float, stable: tuple[Array, Array], period: Array) -> Array:
+        """Images of trajectories at t = 0, shape (cells, rows).
+
+        Parameters
+        ----------
+        columns : physical parameters by name, each of shape (cells,)
+        step : the longest step wanted, shape (cells,), in sqrt(c/g); the step taken divides `t_end`
+        t_end : time limit in sqrt(c/g)
+        stable : lower and upper end of the spins at which a rattle decays, shape (cells,);
+            NaN where it does at none
+        period : length of the window over which the spin is averaged, shape (cells,)
+        """
+        states, constants = stack(self.model.start(columns)), stack(self.model.constants(columns))
+        images = np.zeros((len(step), len(self.rows)))
+        images[:, : len(states)] = states.T
+        images[:, len(states) : len(states) + len(constants)] = constants.T
+        goal = np.ceil(t_end / step)
+        spin, rattle, inertia = self.model.energy.py_func(states, constants)  # type: ignore[attr-defined]
+        for name, value in {
+            "goal": goal,
+            "step": t_end / goal,
+            "energy_start": rattle + 0.5 * inertia * spin**2,
+            "stable_from": stable[0],
+            "stable_to": stable[1],
+        }.items():
+            images[:, self.row(name)] = value
+        if "reversals" in self.measure:
+            images[:, self.row("period")] = period
+            images[:, self.row("step_rate")] = goal / t_end
+            images[:, self.row("last_reversal")] = np.nan
+        return images
+
+    def advance(self, images: Array, cells: Array, blocks: int, stop_when_settled: bool) -> None:
+        """Move the trajectories `cells` (indices into `images`) on, in place.
+
+        Returns after `blocks` blocks of `BLOCK` steps in every lane, or when all cells have ended.
+        """
+        self._advance(images, cells, blocks, stop_when_settled, numba.get_num_threads())
+
+    def is_compiled(self) -> bool:
+        """Whether the first call of `advance` finds machine code, in memory or on disk."""
+        return bool(self._advance.signatures) or is_cached(self._advance, _SIGNATURE)
+
+
+_SIGNATURE = (
+    numba.float64[:, ::1],
+    numba.int64[::1],
+    numba.int64,
+    numba.boolean,
+    numba.int64,
+)
+
+
+def _count_constants(model: Model) -> int:
+    return len(model.constants({name: np.ones(1) for name in model.parameters}))
+
+
+def _make_advance(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
+    run_block = _make_run_block(model, tableau, rows, measure)
+    inspect = _make_inspect(model, rows, measure)
+    n_rows, lanes, status = len(rows), LANES, rows.index("status") * LANES
+
+    @numba.njit
+    def take(images: Any, cells: Any, position: int, group: Any, lane: int, held: Any) -> int:
+        """Fill a lane with the next cell of this group's share, or with none."""
+        if position < len(cells):
+            held[lane] = cells[position]
+            for row in range(n_rows):
+                group[row * lanes + lane] = images[held[lane], row]
+        else:
+            held[lane] = -1
+            group[status + lane] = SETTLED
+        return position + 1
+
+    @numba.njit
+    def release(images: Any, group: Any, lane: int, held: Any) -> None:
+        for row in range(n_rows):
+            images[held[lane], row] = group[row * lanes + lane]
+
+    @numba.njit
+    def run_group(images: Any, cells: Any, blocks: int, stop_when_settled: bool) -> None:
+        # Zeroed, an idle lane computes garbage harmlessly: its status keeps it from being stored.
+        group = np.zeros(n_rows * lanes)
+        held = np.full(lanes, -1)
+        position = 0
+        for lane in range(lanes):
+            position = take(images, cells, position, group, lane, held)
+        for _ in range(blocks):
+            run_block(group)
+            inspect(group, stop_when_settled)
+            idle = 0
+            for lane in range(lanes):
+                if group[status + lane] != RUNNING:
+                    if held[lane] >= 0:
+                        release(images, group, lane, held)
+                        position = take(images, cells, position, group, lane, held)
+                    idle += held[lane] < 0
+            if idle == lanes:
+                break
+        for lane in range(lanes):
+            if held[lane] >= 0:
+                release(images, group, lane, held)
+
+    def advance(images: Any, cells: Any, blocks: int, stop_when_settled: bool, groups: int) -> None:
+        for g in numba.prange(groups):
+            run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
+
+    name = f"{model.name}-{tableau.name}-{'+'.join(measure)}"
+    return parallel(advance, name, source_file(model.rhs))
+
+
+def _make_run_block(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
+    """Compiled group -> None: `BLOCK` steps of all lanes, with what is measured in every step."""
+    n, n_constants = len(model.states), _count_constants(model)
+    load_states, load_constants = make_load(0, n, LANES), make_load(n, n_constants, LANES)
+    store_states = make_store(0, n, LANES)
+    step = make_step(tableau, model.rhs, n)
+    count_reversals, add_work = "reversals" in measure, "energy_error" in measure
+    watch_spin = _make_watch_spin(rows) if count_reversals else None
+    STEP, GOAL, DONE, STATUS = (rows.index(name) * LANES for name in ("step", "goal", "done", "status"))
+    WORK = rows.index("work") * LANES if add_work else 0
+    lanes, block = LANES, BLOCK
+
+    @numba.njit(error_model="numpy")
+    def run_block(group: Any) -> None:
+        for _ in range(block):
+            for lane in range(lanes):
+                y = load_states(group, lane)
+                p = load_constants(group, lane)
+                h, done, status = group[STEP + lane], group[DONE + lane], group[STATUS + lane]
+                new, spin, spin_integral, work, sound, airborne, jammed = step(y, p, h)
+                active = (status == RUNNING) & (done < group[GOAL + lane])
+                accepted = active & sound
+                store_states(group, lane, accepted, new, y)
+                group[DONE + lane] = done + (1.0 if accepted else 0.0)
+                failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
+                group[STATUS + lane] = failure if active & (not sound) else status
+                if add_work:
+                    group[WORK + lane] += work if accepted else 0.0
+                if count_reversals:
+                    watch_spin(group, lane, accepted, spin, spin_integral, h, (done + 1.0) * h)
+
+    return run_block
+
+
+def _make_watch_spin(rows: tuple[str, ...]) -> Any:
+    """Compiled: add a step to the running window of the spin, count where its sign changes.
+
+    A reversal is a change of sign between the spin averaged over one window of the rattle's
+    period and over the next (raw signs of n over-count, for the rattle ripples n).  Its time is
+    where the line between the two averages, each put at its window's centre, crosses zero.
+    """
+    STEP_RATE, PERIOD, PHASE, WINDOW, CLOSED, COUNT, LAST = (
+        rows.index(name) * LANES
+        for name in ("step_rate", "period", "phase", "window", "closed_window", "reversals", "last_reversal")
+    )
+
+    @inline
+    def watch_spin(
+        group: Any, lane: int, accepted: Any, spin: Any, spin_integral: Any, h: Any, now: Any
+    ) -> None:
+        period, previous = group[PERIOD + lane], group[CLOSED + lane]
+        phase, window = group[PHASE + lane] + h, group[WINDOW + lane] + spin_integral
+        closes = accepted & (phase >= period)
+        # The part of the step behind the window's end, with the spin linear in the step.
+        over = phase - period
+        rate = group[STEP_RATE + lane]
+        after = over * (spin + (spin_integral * rate - spin) * (2.0 - over * rate))
+        closed = window - after
+        reverses = closes & (closed * previous < 0.0)
+        crossing = now - over - period * (0.5 + closed / (closed - previous))
+        group[COUNT + lane] += 1.0 if reverses else 0.0
+        group[LAST + lane] = crossing if reverses else group[LAST + lane]
+        group[CLOSED + lane] = closed if closes else previous
+        group[PHASE + lane] = (over if closes else phase) if accepted else group[PHASE + lane]
+        group[WINDOW + lane] = (after if closes else window) if accepted else group[WINDOW + lane]
+
+    return watch_spin
+
+
+def _make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
+    """Compiled (group, stop_when_settled): look at all lanes between two blocks, decide who ends."""
+    n = len(model.states)
+    load_states, load_constants = make_load(0, n, LANES), make_load(n, _count_constants(model), LANES)
+    store_states = make_store(0, n, LANES)
+    energy, upright = model.energy, model.upright
+    will_settle = _make_will_settle(rows, "reversals" in measure)
+    watch_energy = "energy_error" in measure
+    WORK = rows.index("work") * LANES if watch_energy else 0
+    VIOLATION = rows.index("violation") * LANES if watch_energy else 0
+    GOAL, DONE, STATUS, START = (rows.index(name) * LANES for name in ("goal", "done", "status", "energy_start"))
+    lanes, allowed = LANES, 1.0 + ENERGY_GAIN
+
+    @numba.njit(error_model="numpy")
+    def inspect(group: Any, stop_when_settled: bool) -> None:
+        for lane in range(lanes):
+            y = load_states(group, lane)
+            spin, rattle, inertia = energy(y, load_constants(group, lane))
+            total, at_start = rattle + 0.5 * inertia * spin * spin, group[START + lane]
+            status = group[STATUS + lane]
+            running = status == RUNNING
+            if watch_energy:
+                violation = abs(total + group[WORK + lane] - at_start)
+                worst = group[VIOLATION + lane]
+                group[VIOLATION + lane] = violation if violation > worst else worst
+
+            bounded, settled = will_settle(group, lane, spin, 2.0 * rattle / inertia)
+            ends = SETTLED if settled & stop_when_settled else RUNNING
+            ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends == RUNNING) else ends
+            status = ends if running else status
+            # A step beyond the stability limit shows as energy from nowhere, long before overflow.
+            sane = total <= at_start * allowed
+            checked = running | (status == LIFT_OFF) | (status == PARADOX)
+            group[STATUS + lane] = DIVERGED if checked & (not sane) else status
+            store_states(group, lane, bounded & (rattle < NEGLIGIBLE), upright(spin), y)
+
+    return inspect
+
+
+def _make_will_settle(rows: tuple[str, ...], count_reversals: bool) -> Any:
+    """Compiled: is upright spin stable here (`bounded`), and will spin and count stay as they are?
+
+    With a rattle energy of J e / 2 (J the inertia of the spin), the averaged equations (ndotab,
+    abdot) integrate to how far either mode alone can carry the spin while it decays,
+    Δn = sqrt(d² + e) - d, d being the distance from the mode's critical spin: the mode that grows
+    beyond the upper limit pushes down, the other up.  Settled is what this cannot carry out of
+    the stable range, nor through zero, where another reversal would have to be counted.
+    """
+    FROM, TO = rows.index("stable_from") * LANES, rows.index("stable_to") * LANES
+    CLOSED = rows.index("closed_window") * LANES if count_reversals else 0
+
+    @inline
+    def will_settle(group: Any, lane: int, spin: Any, energy_ratio: Any) -> Any:
+        e = SETTLE_MARGIN * energy_ratio
+        above, below = group[TO + lane] - spin, spin - group[FROM + lane]
+        # Written so that an infinite distance gives zero.
+        lowest = spin - e / (above + np.sqrt(above * above + e))
+        highest = spin + e / (below + np.sqrt(below * below + e))
+        bounded = (above > 0.0) & (below > 0.0)
+        inside = (lowest > group[FROM + lane]) & (highest < group[TO + lane])
+        at_rest = (spin == 0.0) & (e == 0.0)
+        signed = (lowest > 0.0) | (highest < 0.0) | at_rest
+        if count_reversals:
+            signed = signed & ((spin * group[CLOSED + lane] > 0.0) | at_rest)
+        return bounded, bounded & inside & signed
+
+    return will_settle

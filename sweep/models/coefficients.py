@@ -1,0 +1,85 @@
+"""Shape, frequency and friction coefficients of the effective equations (Takano 2011, p … f).
+
+The paper sets c = 1.  Here lengths are divided by c and rates multiplied by sqrt(c) first (g = 1),
+so every coefficient is the paper's own for the body of the same shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sweep.models.model import Array, Columns
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """The paper's symbols, each an array of shape (cells,), for bodies scaled to c = 1.
+
+    p, q, s (p, q, s); J1, J2 (j1j2); I3; theta (tanth, exact); nu1, nu2: frequencies of the X and Y
+    modes (nu1, nu2 without the paper's expansion in δ); f (f); k1 … k4 (k1 … k4, exact);
+    m1 … m4 (m12, m34).
+    """
+
+    p: Array
+    q: Array
+    s: Array
+    I3: Array
+    J1: Array
+    J2: Array
+    theta: Array
+    nu1: Array
+    nu2: Array
+    f: Array
+    k1: Array
+    k2: Array
+    k3: Array
+    k4: Array
+    m1: Array
+    m2: Array
+    m3: Array
+    m4: Array
+
+
+def coefficients(columns: Columns) -> Coefficients:
+    """Coefficients of the bodies and frictions in `columns` (a, b, c, delta, mu)."""
+    c = columns["c"]
+    a2, b2 = (columns["a"] / c) ** 2, (columns["b"] / c) ** 2
+    mu = columns["mu"] * np.sqrt(c)
+    cos_d, sin_d = np.cos(columns["delta"]), np.sin(columns["delta"])
+
+    p = cos_d**2 / a2 + sin_d**2 / b2
+    q = cos_d * sin_d * (1 / b2 - 1 / a2)
+    s = sin_d**2 / a2 + cos_d**2 / b2
+    J1, J2 = (b2 + 6) / 5, (a2 + 6) / 5
+
+    # Q = J⁻¹ P⁻¹ J⁻¹, turned by θ into diag(ν1², ν2²); a round body (0/0) needs no turning.
+    bottom = J1 * s - J2 * p
+    theta = 0.5 * np.arctan(-2 * q * np.sqrt(J1 * J2) / np.where(bottom == 0, np.inf, bottom))
+    cos, sin = np.cos(theta), np.sin(theta)
+    det = p * s - q**2
+    q11, q12, q22 = s / (J2 * det), -q / (np.sqrt(J1 * J2) * det), p / (J1 * det)
+    nu1_sq = cos**2 * q11 + 2 * sin * cos * q12 + sin**2 * q22
+    nu2_sq = sin**2 * q11 - 2 * sin * cos * q12 + cos**2 * q22
+
+    f = np.sqrt(J2 / J1)
+    k1 = -nu1_sq * sin * cos * (f - 1 / f)
+    k2 = nu2_sq * (f * sin**2 + cos**2 / f)
+    k3 = nu1_sq * (f * cos**2 + sin**2 / f)
+    k4 = -nu2_sq * sin * cos * (f - 1 / f)
+    with np.errstate(divide="ignore"):
+        slip = f / (J2 * mu)
+    m1, m4 = slip * nu1_sq / nu2_sq * k2, slip * nu2_sq / nu1_sq * k3
+    with np.errstate(invalid="ignore"):
+        m2, m3 = slip * k4, slip * k1
+    return Coefficients(
+        p, q, s, (a2 + b2) / 5, J1, J2, theta, np.sqrt(nu1_sq), np.sqrt(nu2_sq), f,
+        k1, k2, k3, k4, m1, m2, m3, m4,
+    )  # fmt: skip
+
+
+def rattle_period(columns: Columns) -> Array:
+    """τ = 2π / min(ν1, ν2) in sqrt(c/g): the window over which a spin is averaged."""
+    k = coefficients({**columns, "mu": np.ones_like(columns["c"])})
+    return 2 * np.pi / np.minimum(k.nu1, k.nu2) * np.sqrt(columns["c"])

@@ -1,0 +1,100 @@
+"""Small rattle about steady upright spin, from a model's own right-hand side.
+
+With n constant the rattle obeys a linear system; its eigenvalues say at which spins it grows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.models.model import Array, Columns, Model, stack
+
+# Beyond this spin, in sqrt(g/c), upright spin is taken as stable for good: fifty times a hand's.
+_SPIN_LIMIT = 10.0
+
+
+def jacobian(model: Model, constants: Array, spin: Array) -> Array:
+    """Jacobian of the rattle at upright spin, shape (cells, m, m), m = number of states less spin.
+
+    By complex steps of 1e-30: to the last digit, without a difference or a second derivation.
+    """
+    states = stack(model.upright.py_func(spin)).astype(complex)  # type: ignore[attr-defined]
+    rattle = [i for i in range(len(model.states)) if i != model.spin_state]
+    columns = []
+    for i in rattle:
+        shifted = states.copy()
+        shifted[i] += 1e-30j
+        slopes, _ = model.rhs.py_func(shifted, constants)  # type: ignore[attr-defined]
+        columns.append(np.stack(np.broadcast_arrays(*slopes))[rattle].imag / 1e-30)
+    return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
+
+
+def growth_rate(model: Model, constants: Array, spin: Array) -> Array:
+    """Largest real part of the rattle's eigenvalues: above zero, it grows.  Shape (cells,)."""
+    return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)).real.max(axis=-1))
+
+
+def fastest_oscillation(model: Model, columns: Columns) -> Array:
+    """Largest frequency of the rattle at the start spin, in sqrt(g/c), shape (cells,)."""
+    values = np.linalg.eigvals(jacobian(model, stack(model.constants(columns)), columns["n0"]))
+    return np.asarray(np.abs(values.imag).max(axis=-1))
+
+
+def critical_spins(model: Model, columns: Columns, guess: tuple[Array, Array]) -> tuple[Array, Array]:
+    """n_c1+ and n_c1- of the model itself: the ends of the spins about zero at which rattle decays.
+
+    Parameters
+    ----------
+    columns : physical parameters, each of shape (cells,)
+    guess : where to look first, positive and negative, such as the paper's n_c1±; NaN is no guess
+
+    Returns
+    -------
+    Two arrays of shape (cells,): ±inf where the rattle decays at all spins up to the limit of the
+    search, NaN where it does not decay at rest (no friction, or no dissipation in the model).
+    """
+    constants = stack(model.constants(columns))
+    at_rest = growth_rate(model, constants, np.zeros(constants.shape[1])) < 0
+    upper, lower = (_boundary(model, constants, at_rest, side) for side in guess)
+    return upper, np.where(np.isinf(lower), -np.inf, lower)
+
+
+def _boundary(model: Model, constants: Array, at_rest: Array, guess: Array) -> Array:
+    result = np.where(at_rest, np.inf, np.nan)
+    cells = np.flatnonzero(at_rest & np.isfinite(guess))
+    if not len(cells):
+        return result
+
+    def growth(spin: Array, which: Array) -> Array:
+        return growth_rate(model, constants[:, which], spin)
+
+    # Walk outwards from half the guess until the rattle grows.
+    low, high = np.zeros(len(cells)), 0.5 * guess[cells]
+    g_low, g_high = growth(low, cells), growth(high, cells)
+    while (walking := (g_high < 0) & (np.abs(high) < _SPIN_LIMIT)).any():
+        low, g_low = np.where(walking, high, low), np.where(walking, g_high, g_low)
+        high = np.where(walking, 1.7 * high, high)
+        g_high[walking] = growth(high[walking], cells[walking])
+    found = g_high >= 0
+    low, high, g_low, g_high = low[found], high[found], g_low[found], g_high[found]
+    result[cells[found]] = _root(lambda spin, at: growth(spin, cells[found][at]), low, high, g_low, g_high)
+    return result
+
+
+def _root(f, low: Array, high: Array, f_low: Array, f_high: Array) -> Array:  # type: ignore[no-untyped-def]
+    """Roots of many functions at once by the Anderson-Björck regula falsi, to the last digits."""
+    for _ in range(60):
+        active = np.flatnonzero(np.abs(high - low) > 4e-15 * np.abs(high))
+        active = active[f_high[active] != 0]
+        if not len(active):
+            break
+        x1, x2, f1, f2 = low[active], high[active], f_low[active], f_high[active]
+        x = np.clip(x2 - f2 * (x2 - x1) / (f2 - f1), np.minimum(x1, x2), np.maximum(x1, x2))
+        fx = f(x, active)
+        same = np.sign(fx) == np.sign(f2)
+        shrink = 1 - fx / f2
+        # The newest point becomes `high`; the far end keeps its value, scaled down if it stays again.
+        low[active] = np.where(same, x1, x2)
+        f_low[active] = np.where(same, f1 * np.where(shrink > 0, shrink, 0.5), f2)
+        high[active], f_high[active] = x, fx
+    return high

@@ -1,0 +1,59 @@
+"""What a model is: implement this and kernel, executor, store and plots work.
+
+A model is a system of ordinary differential equations y' = f(y) with constant coefficients for
+the motion of a rattleback near upright spin.  It lives in one file, which defines one `MODEL`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+Columns = Mapping[str, Array]
+"""Physical parameters by name: arrays of one common shape (cells,)."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """One rung of the ladder of models.
+
+    The functions compiled with `sweep.jit.inline` work on the scalars of one trajectory, written
+    so that their `py_func` also takes arrays, real or complex: starts, energies and Jacobians
+    are computed with the very same code.
+    """
+
+    name: str
+    summary: str
+    states: tuple[str, ...]
+    spin_state: int
+    """Index of the state that carries the spin; all others vanish in upright spin."""
+    parameters: tuple[str, ...]
+    """Names of the physical parameters it depends on, `sweep.parameters` has their meaning."""
+    measures: tuple[str, ...]
+    """What can be measured on it, of `sweep.kernels.lanes.MEASURES`."""
+    constants: Callable[[Columns], tuple[Array, ...]]
+    """Coefficients of the right-hand side, each of shape (cells,)."""
+    start: Callable[[Columns], tuple[Array, ...]]
+    """States at t = 0, each of shape (cells,)."""
+    fastest_decay: Callable[[Columns], Array]
+    """Bound on |λ| of the fastest damped mode anywhere on the trajectory, shape (cells,); it
+    limits the step of an explicit method.  Zeros where nothing is stiff."""
+    upright: Callable[..., tuple[Any, ...]]
+    """Compiled, spin -> states: steady upright spin without rattle."""
+    rhs: Callable[..., tuple[Any, ...]]
+    """Compiled, (states, constants) -> (derivatives, (spin, dissipated power, normal force,
+    Painlevé denominator)); what a model lacks of the last three is a literal 0.0, 1.0, 1.0."""
+    energy: Callable[..., tuple[Any, ...]]
+    """Compiled, (states, constants) -> (spin, energy of the rattle, inertia J of the spin):
+    rattle + J n²/2 is the energy above rest, which friction alone changes.  Each term must keep
+    its relative precision however small the rattle is."""
+
+
+def stack(columns: tuple[Array, ...]) -> Array:
+    """Arrays (or numbers) as the rows of one array, broadcast against each other."""
+    return np.stack(np.broadcast_arrays(*columns))

@@ -1,0 +1,63 @@
+"""The physical parameters: names, meanings, units, defaults and bounds, said here alone.
+
+The configuration schema, the dataset's attributes and the documentation are made from this table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, pi
+
+
+@dataclass(frozen=True)
+class Parameter:
+    name: str
+    section: str
+    """Where the configuration has it."""
+    units: str
+    long_name: str
+    default: float | None
+    """The paper's standard case; None where a configuration has to say."""
+    above: float = -inf
+    below: float = inf
+    at_least: float = -inf
+
+    @property
+    def path(self) -> str:
+        return f"{self.section}.{self.name}"
+
+    def allows(self, value: float) -> bool:
+        return self.above < value < self.below and value >= self.at_least
+
+    @property
+    def allowed(self) -> str:
+        """The bounds in words."""
+        bounds = [
+            f"{sign} {bound:.6g}"
+            for sign, bound in ((">", self.above), (">=", self.at_least), ("<", self.below))
+            if abs(bound) != inf
+        ]
+        return "a finite number" + (f" {' and '.join(bounds)}" if bounds else "")
+
+
+PARAMETERS: dict[str, Parameter] = {
+    p.name: p
+    for p in (
+        Parameter("a", "body", "1", "semi-axis of the ellipsoid along x (long axis), in c", 10.0, above=0),
+        Parameter("b", "body", "1", "semi-axis of the ellipsoid along y (short axis), in c", 3.0, above=0),
+        Parameter("c", "body", "1", "semi-axis of the ellipsoid along z, the unit of length", 1.0, above=0),
+        Parameter(
+            "delta", "body", "radian", "angle from the ellipsoid's axes to the axes of inertia",
+            0.03, above=-pi / 2, below=pi / 2,
+        ),
+        Parameter("mu", "friction", "1", "viscous friction coefficient, in sqrt(g/c)", None, at_least=0),
+        Parameter("n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05),
+        Parameter("x0", "start", "1", "start contact point along x, in c", 0.01),
+        Parameter("y0", "start", "1", "start contact point along y, in c", 0.01),
+    )
+}  # fmt: skip
+
+SECTIONS: tuple[str, ...] = tuple(dict.fromkeys(p.section for p in PARAMETERS.values()))
+
+START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")
+"""Parameters of the start alone: critical spins and form factor do not depend on them."""

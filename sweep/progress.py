@@ -1,0 +1,45 @@
+"""Progress of a run on the terminal."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from sweep import executor, run
+
+
+class Terminal(run.Reporter):
+    """A bar with cells done, failures so far, trajectories a second and time left."""
+
+    def __init__(self, quiet: bool = False) -> None:
+        self.console = Console(stderr=True, quiet=quiet, highlight=False)
+        self.last: executor.Progress | None = None
+        self._bar = Progress(
+            TextColumn("{task.completed:.0f}/{task.total:.0f} cells"),
+            BarColumn(),
+            TextColumn("{task.fields[failed]} failed · {task.fields[rate]:.3g} trajectories/s ·"),
+            TimeRemainingColumn(compact=True),
+            TextColumn("left"),
+            console=self.console,
+        )
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> Terminal:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._bar.stop()
+
+    def compiling(self) -> None:
+        self.note("compiling the kernel for this model and machine; the next run finds it in the cache")
+
+    def note(self, message: str) -> None:
+        self.console.print(message, soft_wrap=True)
+
+    def chunk(self, progress: executor.Progress) -> None:
+        self.last = progress
+        rate = (progress.done - progress.done_before) / progress.seconds
+        if self._task is None:
+            self._task = self._bar.add_task("cells", total=progress.cells, failed=0, rate=0.0)
+        self._bar.update(self._task, completed=progress.done, failed=progress.failed, rate=rate)

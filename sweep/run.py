@@ -1,0 +1,176 @@
+"""config → grid → model → kernel → executor → store → plots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep import dataset, executor, plots
+from sweep.config import Config, load_config
+from sweep.executor import Progress
+from sweep.grid import Array, Grid
+from sweep.jit import fingerprint
+from sweep.kernels import stepsize
+from sweep.kernels.lanes import Kernel
+from sweep.kernels.tableau import DOPRI5
+from sweep.models import MODELS
+from sweep.prediction import Prediction
+from sweep.prediction import predict as predict_grid
+from sweep.store import Identity, RunFiles
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything a run needs, before the first step is taken."""
+
+    config: Config
+    grid: Grid
+    kernel: Kernel
+    prediction: Prediction
+    step_rule: Array
+    images: Array
+
+
+class Reporter:
+    """What a run tells while it goes on; this one keeps silent."""
+
+    def compiling(self) -> None:
+        """The kernel has to be compiled first."""
+
+    def chunk(self, progress: Progress) -> None:
+        """Another chunk is done."""
+
+    def note(self, message: str) -> None:
+        """Something worth a line."""
+
+
+def run(
+    config: Config | str | Path,
+    output: str | Path | None = None,
+    *,
+    fresh: bool = False,
+    reporter: Reporter | None = None,
+    **overrides: Any,
+) -> xr.Dataset:
+    """Run a sweep.
+
+    Parameters
+    ----------
+    config : a configuration or the path of one
+    output : folder for the dataset, its maps and, until they are finished, a checkpoint from which
+        the same call goes on; by default nothing is written
+    fresh : discard what an earlier run left in `output`
+    overrides : values that replace the file's, such as ``mu=60`` or ``t_end=1000``
+
+    Returns
+    -------
+    The dataset described in docs/dataset.md.
+
+    Raises
+    ------
+    ConfigError, StoreError
+        where the configuration, or what `output` holds, cannot be used.
+    """
+    config = as_config(config, overrides)
+    reporter = reporter or Reporter()
+    files = RunFiles(Path(output), config.name) if output is not None else None
+    if files:
+        files.folder.mkdir(parents=True, exist_ok=True)
+        if fresh:
+            files.discard()
+        if finished := files.load_dataset(identify(config)):
+            reporter.note(f"{files.dataset}: already complete, nothing to compute")
+            return finished
+
+    job = plan(config)
+    seconds = simulate(job, files, reporter)
+    result = collect(job, seconds)
+    if files:
+        files.save_dataset(result)
+        plots.draw(result).savefig(files.folder / f"{config.name}.png")
+    return result
+
+
+def predict(config: Config | str | Path, **overrides: Any) -> xr.Dataset:
+    """The predictions alone, of the paper and of the linear theory, on the grid of `config`."""
+    config = as_config(config, overrides)
+    grid = Grid.of(config)
+    return dataset.label(config, grid, dataset.predicted(predict_grid(MODELS[config.model], grid)), {})
+
+
+def as_config(config: Config | str | Path, overrides: dict[str, Any]) -> Config:
+    if isinstance(config, Config):
+        if overrides:
+            raise TypeError("overrides go with a path: a Config is final")
+        return config
+    return load_config(config, overrides)
+
+
+def identify(config: Config) -> Identity:
+    return Identity(config.to_yaml(), config.fingerprint(), fingerprint())
+
+
+def plan(config: Config) -> Plan:
+    """Lay out the cells of `config` with their steps, limits and starts."""
+    grid, model = Grid.of(config), MODELS[config.model]
+    columns = grid.columns()
+    kernel = Kernel(model, DOPRI5, config.measure)
+    prediction = predict_grid(model, grid)
+    if config.integrator.step == "auto":
+        step, rule = stepsize.automatic_step(model, DOPRI5, columns)
+    else:
+        step, rule = np.full(grid.size, config.integrator.step), np.full(grid.size, stepsize.FIXED)
+    body = grid.bodies()[1]
+    upper, lower = prediction.n_c1_linear
+    images = kernel.images(
+        columns, step, config.integrator.t_end, (lower[body], upper[body]), prediction.period[body]
+    )
+    return Plan(config, grid, kernel, prediction, rule, images)
+
+
+def simulate(job: Plan, files: RunFiles | None, reporter: Reporter) -> float:
+    """Carry the images of `job` to their ends; returns the seconds it took, earlier runs included."""
+    identity, before, spent = identify(job.config), 0.0, 0.0
+    if files and (left := files.load_checkpoint(identity, job.images.shape)):
+        job.images[:], before = left
+        reporter.note(f"{files.checkpoint}: going on from there")
+    if not job.kernel.is_compiled():
+        reporter.compiling()
+
+    def save() -> None:
+        if files:
+            files.save_checkpoint(job.images, identity, before + spent)
+
+    def after_chunk(progress: Progress) -> None:
+        nonlocal spent
+        spent = progress.seconds
+        reporter.chunk(progress)
+        save()
+
+    try:
+        executor.execute(
+            job.kernel,
+            job.images,
+            stop_when_settled=job.config.integrator.stop_when_settled,
+            after_chunk=after_chunk,
+        )
+    except KeyboardInterrupt:
+        save()
+        raise
+    return before + spent
+
+
+def collect(job: Plan, seconds: float) -> xr.Dataset:
+    """The labelled dataset of a finished job."""
+    arrays = {
+        **dataset.measured(job.kernel, job.images),
+        "step_rule": job.step_rule,
+        **dataset.predicted(job.prediction),
+    }
+    attributes = {"source_hash": fingerprint(), **dataset.provenance(job.config, seconds, job.grid.size)}
+    return dataset.label(job.config, job.grid, arrays, attributes)

@@ -1,0 +1,155 @@
+"""Files of a run: the checkpoint it resumes from and the dataset it ends with.
+
+One writer, one way to write: a temporary file in the same folder, flushed to the disk, then renamed
+over the old one.  A file with its final name is complete.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from sweep.grid import Array
+
+
+class StoreError(Exception):
+    """A file of the run that cannot be used; the message says which, why, and what to do."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What the numbers of a run depend on.  Runs of one identity can go on from each other."""
+
+    config: str
+    """The resolved configuration, as YAML."""
+    config_hash: str
+    source_hash: str
+    """Of the numeric sources and of the libraries that compile them."""
+
+    def difference(self, other: Identity) -> str:
+        """Why a run of `other` cannot go on from this one; "" if it can."""
+        if self.config_hash != other.config_hash:
+            old, new = (c.config.splitlines() for c in (self, other))
+            changed = [f"- {line.strip()}" for line in old if line not in new]
+            changed += [f"+ {line.strip()}" for line in new if line not in old]
+            return "another configuration:\n  " + "\n  ".join(changed)
+        if self.source_hash != other.source_hash:
+            return "other sources of the model or kernel, or other versions of numpy or numba"
+        return ""
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """The files of the run `name` in `folder`."""
+
+    folder: Path
+    name: str
+
+    @property
+    def dataset(self) -> Path:
+        return self.folder / f"{self.name}.nc"
+
+    @property
+    def checkpoint(self) -> Path:
+        return self.folder / f"{self.name}.checkpoint"
+
+    def save_checkpoint(self, images: Array, identity: Identity, seconds: float) -> None:
+        """Write the whole state of an unfinished run."""
+        note = json.dumps(identity.__dict__ | {"seconds": seconds})
+        with replacing(self.checkpoint) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, images=images, note=np.array(note))
+
+    def load_checkpoint(self, identity: Identity, shape: tuple[int, ...]) -> tuple[Array, float] | None:
+        """Images and seconds spent of an unfinished run of `identity`; None where there is none.
+
+        Raises
+        ------
+        StoreError
+            where the checkpoint is of another run, or damaged.
+        """
+        try:
+            with np.load(self.checkpoint, allow_pickle=False) as archive:
+                images, note = archive["images"], json.loads(str(archive["note"]))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise StoreError(f"{self.checkpoint}: damaged checkpoint ({error}); start again with --fresh") from None
+        seconds = note.pop("seconds")
+        self._refuse_other(self.checkpoint, Identity(**note), identity)
+        if images.shape != shape:
+            raise StoreError(f"{self.checkpoint}: damaged checkpoint (shape {images.shape}); start again with --fresh")
+        return images, seconds
+
+    def load_dataset(self, identity: Identity) -> xr.Dataset | None:
+        """The finished dataset of `identity`; None where there is none.
+
+        Raises
+        ------
+        StoreError
+            where the file is of another run, or not a dataset of this program.
+        """
+        if not self.dataset.exists():
+            return None
+        dataset = open_dataset(self.dataset)
+        found = Identity(*(str(dataset.attrs.get(key, "")) for key in ("config", "config_hash", "source_hash")))
+        self._refuse_other(self.dataset, found, identity)
+        return dataset
+
+    def save_dataset(self, dataset: xr.Dataset) -> None:
+        """Write the finished dataset; the checkpoint has then served."""
+        encoding = {
+            name: {"_FillValue": None} for name in dataset.variables if dataset[name].dtype.kind != "f" or name in dataset.coords
+        }
+        with replacing(self.dataset) as temporary:
+            dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
+        self.checkpoint.unlink(missing_ok=True)
+
+    def discard(self) -> None:
+        for path in (self.dataset, self.checkpoint):
+            path.unlink(missing_ok=True)
+
+    def _refuse_other(self, path: Path, found: Identity, wanted: Identity) -> None:
+        if reason := found.difference(wanted):
+            raise StoreError(
+                f"{path}: not resumed, it comes from {reason}\n"
+                "  allowed: the same configuration, another --output, or --fresh to discard that run"
+            )
+
+
+def open_dataset(path: Path) -> xr.Dataset:
+    """Read a dataset into memory; `StoreError` if it is none."""
+    try:
+        with xr.open_dataset(path, engine="netcdf4") as dataset:
+            return dataset.load()
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = "no such file" if not path.exists() else f"not a netCDF dataset: {error}"
+        raise StoreError(f"{path}: {reason}") from None
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary path that becomes `path`, all at once, if the block succeeds."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield temporary
+        _flush(temporary)
+        os.replace(temporary, path)
+        _flush(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _flush(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
