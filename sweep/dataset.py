@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
 import numba
 import numpy as np
 import xarray as xr
@@ -44,33 +45,40 @@ class Variable:
     """Without the parameters of the start."""
 
 
-_TIME = "1"
+def _critical(sign: str, event: str, source: str) -> Variable:
+    where = "positive spin above" if sign == "+" else "negative spin below"
+    return Variable("float64", "1", f"{where} which {event}, by {source}, in sqrt(g/c)", per_body=True)
+
+
+_FORMULA, _EIGENVALUES = "the formula of Takano (2011)", "the eigenvalues of the model"
 
 VARIABLES: dict[str, Variable] = {
     "reversals": Variable("int16", "1", "spin reversals of the simulated trajectory"),
-    "t_last_reversal": Variable("float64", _TIME, "time of the last spin reversal, in sqrt(c/g)"),
+    "t_last_reversal": Variable("float64", "1", "time of the last spin reversal, in sqrt(c/g)"),
     "spin_mean": Variable("float64", "1", "spin averaged over the last full window before t_stop, in sqrt(g/c)"),
     "status": Variable("int8", "1", "how the simulation of the trajectory ended", STATUSES),
     "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)"),
-    "t_stop": Variable("float64", _TIME, "time at which the simulation ended, in sqrt(c/g)"),
+    "t_stop": Variable("float64", "1", "time at which the simulation ended, in sqrt(c/g)"),
     "energy_error": Variable(
-        "float64", "1",
-        f"largest violation of the energy balance, seen every {lanes.BLOCK} steps, relative to the start energy above rest",
+        "float64",
+        "1",
+        f"largest violation of the energy balance, looked at every {lanes.BLOCK} steps, "
+        "relative to the start energy above rest",
     ),
-    "step": Variable("float64", _TIME, "integration step, in sqrt(c/g)"),
+    "step": Variable("float64", "1", "integration step, in sqrt(c/g)"),
     "step_rule": Variable("int8", "1", "what set the integration step", STEP_RULES),
     "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),
-    "n_c1_plus": Variable("float64", "1", "positive spin above which rattle grows, Takano's formula, in sqrt(g/c)", per_body=True),
-    "n_c1_minus": Variable("float64", "1", "negative spin below which rattle grows, Takano's formula, in sqrt(g/c)", per_body=True),
-    "n_c2_plus": Variable("float64", "1", "positive spin above which spin reverses, Takano's formula, in sqrt(g/c)", per_body=True),
-    "n_c2_minus": Variable("float64", "1", "negative spin below which spin reverses, Takano's formula, in sqrt(g/c)", per_body=True),
-    "n_c1_plus_linear": Variable("float64", "1", "positive spin above which rattle grows, eigenvalues of the model, in sqrt(g/c)", per_body=True),
-    "n_c1_minus_linear": Variable("float64", "1", "negative spin below which rattle grows, eigenvalues of the model, in sqrt(g/c)", per_body=True),
+    "n_c1_plus": _critical("+", "rattle grows", _FORMULA),
+    "n_c1_minus": _critical("-", "rattle grows", _FORMULA),
+    "n_c2_plus": _critical("+", "spin reverses", _FORMULA),
+    "n_c2_minus": _critical("-", "spin reverses", _FORMULA),
+    "n_c1_plus_linear": _critical("+", "rattle grows", _EIGENVALUES),
+    "n_c1_minus_linear": _critical("-", "rattle grows", _EIGENVALUES),
     "form_factor": Variable("float64", "1", "form factor L(f) of Takano (2011)", per_body=True),
-}  # fmt: skip
+}
 
 
-def measured(kernel: Kernel, images: Array) -> dict[str, Array]:
+def measured(kernel: Kernel, images: Array, t_end: float) -> dict[str, Array]:
     """The simulated variables, each of shape (cells,), from images at their ends."""
     model = kernel.model
     states, constants = images[:, : len(model.states)].T, images[:, len(model.states) : kernel.row("step")].T
@@ -82,7 +90,7 @@ def measured(kernel: Kernel, images: Array) -> dict[str, Array]:
     result = {
         "status": row("status"),
         "spin_final": spin,
-        "t_stop": row("done") * row("step"),
+        "t_stop": row("done") / row("goal") * t_end,
         "step": row("step"),
     }
     if "reversals" in kernel.measure:
@@ -157,7 +165,7 @@ def provenance(config: Config, seconds: float, cells: int) -> dict[str, Any]:
         "git_commit": _git_commit(),
         **{f"{name}_version": metadata.version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
         "python_version": platform.python_version(),
-        "cpu": numba.core.config.CPU_NAME or _cpu_name(),
+        "cpu": llvmlite.binding.get_host_cpu_name(),
         "threads": numba.get_num_threads(),
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "wall_time": seconds,
@@ -174,20 +182,13 @@ def _step_words(config: Config) -> str:
     )
 
 
-def _cpu_name() -> str:
-    import llvmlite.binding
-
-    return str(llvmlite.binding.get_host_cpu_name())
-
-
 def _git_commit() -> str:
     """The commit of the checkout that the package runs from; "unknown" for an installed one."""
+    root = Path(__file__).parent.parent
+    if not (root / ".git").exists():
+        return "unknown"
     try:
-        return subprocess.run(
-            ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=40"],
-            capture_output=True, text=True, check=True, timeout=5,
-        ).stdout.strip()  # fmt: skip
+        command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return "unknown"
-
-

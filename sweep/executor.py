@@ -33,7 +33,7 @@ def execute(
     images: Array,
     *,
     stop_when_settled: bool,
-    after_chunk: Callable[[Progress], None] = lambda progress: None,
+    after_chunk: Callable[[Progress], None] | None = None,
     chunk_blocks: int | None = None,
 ) -> None:
     """Advance all unfinished `images`, in place, until every trajectory has ended.
@@ -60,9 +60,9 @@ def execute(
         kernel.advance(images, pending, blocks, stop_when_settled)
         if chunk_blocks is None:
             blocks = _rescale(blocks, time.perf_counter() - chunk_began)
-        done = int((status != RUNNING).sum())
-        failed = int(np.isin(status, FAILURES).sum())
-        after_chunk(Progress(len(images), done, failed, done_before, time.perf_counter() - began))
+        if after_chunk:
+            done, failed = int((status != RUNNING).sum()), int(np.isin(status, FAILURES).sum())
+            after_chunk(Progress(len(images), done, failed, done_before, time.perf_counter() - began))
 
 
 def _rescale(blocks: int, seconds: float) -> int:

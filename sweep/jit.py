@@ -68,9 +68,9 @@ def source_file(function: Any) -> str:
     return inspect.getfile(getattr(function, "py_func", function))
 
 
-class _SpecialisedCache(FunctionCache):  # type: ignore[misc]
+class _SpecialisedCache(FunctionCache):
     def __init__(self, function: Callable[..., Any], key: tuple[str, str]) -> None:
-        super().__init__(function)
+        super().__init__(function)  # type: ignore[no-untyped-call]
         self._key = key
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
@@ -79,4 +79,4 @@ class _SpecialisedCache(FunctionCache):  # type: ignore[misc]
     def holds(self, sig: tuple[Any, ...]) -> bool:
         context = cpu_target.target_context
         context.refresh()
-        return self._index_key(sig, context.codegen()) in self._cache_file._load_index()
+        return self._index_key(sig, context.codegen()) in self._cache_file._load_index()  # type: ignore[no-untyped-call]

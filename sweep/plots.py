@@ -23,6 +23,7 @@ SYMBOLS = {"mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀", 
 # An axis of more values than this is drawn as an axis; a shorter one gets a panel for each value.
 _PANEL_VALUES = 4
 _MAX_ROWS = 8
+_MAX_COLOURS = 40
 
 
 def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
@@ -75,10 +76,10 @@ def _maps(dataset: xr.Dataset, names: list[str], across: list[str], panels: list
     figure = Figure(figsize=(1.5 + 4.6 * len(names), 1.2 + 3.6 * len(panels)), dpi=110, layout="constrained")
     figure.suptitle(_heading(dataset), fontsize=10)
     grid = figure.subplots(len(panels), len(names), squeeze=False, sharex=True, sharey=True)
-    colours, norm = _colours(dataset, names)
     for row, panel in zip(grid, panels, strict=True):
+        colours, norm = _colours(dataset.isel(panel), names)
         for axes, name in zip(row, names, strict=True):
-            chosen = dataset.isel({d: i for d, i in panel.items() if d in dataset[name].dims})
+            chosen = dataset.isel(panel)
             values = chosen[name].transpose(down, right).values
             empty = _without_result(chosen, name, (down, right))
             # cells without a result: dark with a hatch, never a colour of the scale
@@ -132,10 +133,7 @@ def _colours(dataset: xr.Dataset, names: list[str]) -> tuple[Colormap, Normalize
         n = len(dataset[names[0]].attrs["flag_values"])
         return ListedColormap(mpl.colormaps["tab10"].colors[:n]), BoundaryNorm(np.arange(n + 1) - 0.5, n)  # type: ignore[attr-defined]
     if values.dtype.kind == "i":
-        top = int(values.max(initial=1))
-        unit = -(-(top + 1) // 24)  # at most two dozen steps of colour
-        edges = np.arange(-0.5, top + unit + 0.5, unit)
-        return mpl.colormaps["viridis"].resampled(len(edges) - 1), BoundaryNorm(edges, len(edges) - 1)
+        return _count_colours(values)
     finite = values[np.isfinite(values)]
     low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
     if low > 0 and high > 100 * low:
@@ -143,12 +141,23 @@ def _colours(dataset: xr.Dataset, names: list[str]) -> tuple[Colormap, Normalize
     return mpl.colormaps["viridis"], Normalize(low, high)
 
 
+def _count_colours(values: Array) -> tuple[Colormap, BoundaryNorm]:
+    """A colour for each integer; the rare few of the highest counts share the last one."""
+    top = max(int(np.quantile(values, 0.995)), 1)
+    unit = -(-(top + 1) // _MAX_COLOURS)
+    edges = np.arange(-0.5, top + unit + 0.5, unit)
+    over = values.max() > edges[-1]
+    norm = BoundaryNorm(edges, len(edges) - 1 + over, extend="max" if over else "neither")
+    return mpl.colormaps["viridis"].resampled(len(edges) - 1 + over), norm
+
+
 def _label_bar(bar: Any, dataset: xr.Dataset, name: str, norm: Normalize) -> None:
     if isinstance(norm, BoundaryNorm):
         edges = np.asarray(norm.boundaries)
         unit = int(edges[1] - edges[0])
         first = (edges[:-1] + 0.5).astype(int)
-        labels = [str(i) if unit == 1 else f"{i}–{i + unit - 1}" for i in first]
+        sparse = -(-len(first) // 12)
+        labels = [("" if k % sparse else str(i)) if unit == 1 else f"{i}–{i + unit - 1}" for k, i in enumerate(first)]
         if meanings := dataset[name].attrs.get("flag_meanings"):
             labels = meanings.split()
         bar.set_ticks((edges[:-1] + edges[1:]) / 2, labels=labels, fontsize=7)
@@ -162,30 +171,31 @@ def _curves(dataset: xr.Dataset, names: list[str], across: list[str], panels: li
     x = across[0] if across else None
     for axes, panel in zip(rows, panels, strict=True):
         for name in names:
-            chosen = dataset.isel({d: i for d, i in panel.items() if d in dataset[name].dims})
+            chosen = dataset.isel(panel)
             values = np.atleast_1d(chosen[name].values).astype(float)
             at = np.atleast_1d(dataset[x].values) if x else np.zeros(1)
             if name != "reversals_predicted" and "status" in chosen:
                 failed = np.isin(np.atleast_1d(chosen["status"].values), (0, *FAILURES))
                 values = np.where(failed, np.nan, values)
-                axes.plot(at[failed], np.zeros(failed.sum()), "v", color="crimson", label="no result" if failed.any() else None)
-            style = {"marker": "s", "fillstyle": "none"} if name == "reversals_predicted" else {"marker": "x"}
-            axes.plot(at, values, linestyle="none", label=_words(name), **style)  # type: ignore[arg-type]
+                if failed.any():
+                    axes.plot(at[failed], np.zeros(failed.sum()), "v", color="crimson", label="no result")
+            style: dict[str, Any] = (
+                {"marker": "s", "fillstyle": "none"} if name == "reversals_predicted" else {"marker": "x"}
+            )
+            axes.plot(at, values, linestyle="none", label=_words(name), **style)
         if x == "b" and names[0] == "reversals":
             _add_form_factor(axes, dataset, panel)
         axes.set_ylabel("reversals" if len(names) > 1 else _words(names[0]))
         axes.set_title(_title(dataset, panel), fontsize=9)
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=7, loc="upper left")
+        axes.legend(fontsize=7)
     rows[-1].set_xlabel(_symbol(x) if x else "")
     return figure
 
 
 def _add_form_factor(axes: Axes, dataset: xr.Dataset, panel: dict[str, int]) -> None:
-    factor = dataset["form_factor"]
-    factor = factor.isel({d: i for d, i in panel.items() if d in factor.dims})
     twin = axes.twinx()
-    twin.plot(dataset["b"], factor, color="0.5", linewidth=1)
+    twin.plot(dataset["b"], dataset.isel(panel)["form_factor"], color="0.5", linewidth=1)
     twin.set_ylabel("L(f)", color="0.4")
     twin.set_ylim(bottom=0)
     axes.set_ylim(bottom=0)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from sweep import executor, run
+from sweep import executor
+from sweep.run import Reporter
 
 
-class Terminal(run.Reporter):
+class Terminal(Reporter):
     """A bar with cells done, failures so far, trajectories a second and time left."""
 
     def __init__(self, quiet: bool = False) -> None:

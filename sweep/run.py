@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep import dataset, executor, plots
+from sweep import dataset, executor
 from sweep.config import Config, load_config
 from sweep.executor import Progress
 from sweep.grid import Array, Grid
@@ -92,6 +91,8 @@ def run(
     result = collect(job, seconds)
     if files:
         files.save_dataset(result)
+        from sweep import plots  # matplotlib: a third of the time that `import sweep` would take
+
         plots.draw(result).savefig(files.folder / f"{config.name}.png")
     return result
 
@@ -126,10 +127,7 @@ def plan(config: Config) -> Plan:
     else:
         step, rule = np.full(grid.size, config.integrator.step), np.full(grid.size, stepsize.FIXED)
     body = grid.bodies()[1]
-    upper, lower = prediction.n_c1_linear
-    images = kernel.images(
-        columns, step, config.integrator.t_end, (lower[body], upper[body]), prediction.period[body]
-    )
+    images = kernel.images(columns, step, config.integrator.t_end, prediction.stable[:, body], prediction.period[body])
     return Plan(config, grid, kernel, prediction, rule, images)
 
 
@@ -168,7 +166,7 @@ def simulate(job: Plan, files: RunFiles | None, reporter: Reporter) -> float:
 def collect(job: Plan, seconds: float) -> xr.Dataset:
     """The labelled dataset of a finished job."""
     arrays = {
-        **dataset.measured(job.kernel, job.images),
+        **dataset.measured(job.kernel, job.images, job.config.integrator.t_end),
         "step_rule": job.step_rule,
         **dataset.predicted(job.prediction),
     }

@@ -76,7 +76,7 @@ class RunFiles:
             where the checkpoint is of another run, or damaged.
         """
         try:
-            with np.load(self.checkpoint, allow_pickle=False) as archive:
+            with self.checkpoint.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
                 images, note = archive["images"], json.loads(str(archive["note"]))
         except FileNotFoundError:
             return None
@@ -105,9 +105,8 @@ class RunFiles:
 
     def save_dataset(self, dataset: xr.Dataset) -> None:
         """Write the finished dataset; the checkpoint has then served."""
-        encoding = {
-            name: {"_FillValue": None} for name in dataset.variables if dataset[name].dtype.kind != "f" or name in dataset.coords
-        }
+        filled = {name for name, variable in dataset.data_vars.items() if variable.dtype.kind == "f"}
+        encoding = {name: {"_FillValue": None} for name in set(dataset.variables) - filled}
         with replacing(self.dataset) as temporary:
             dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
         self.checkpoint.unlink(missing_ok=True)

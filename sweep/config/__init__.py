@@ -74,7 +74,8 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         elif name in (columns or {}):
             continue
         elif default is None:
-            faults.append(source.fault((PARAMETERS[name].section, name), f"missing; allowed: {PARAMETERS[name].allowed}"))
+            parameter = PARAMETERS[name]
+            faults.append(source.fault((parameter.section, name), f"missing; allowed: {parameter.allowed}"))
         else:
             parameters[name] = Values((default,), False, default)
     if faults:

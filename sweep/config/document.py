@@ -14,12 +14,13 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
-from ruamel.yaml.tokens import AliasToken, AnchorToken, TagToken
 
 from sweep.config.faults import ConfigError, Fault, Path
 
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _SPECIAL = {".inf": float("inf"), "-.inf": float("-inf"), ".nan": float("nan")}
+# What an untagged node can resolve to; timestamps and the like are read as the words they look like.
+_PLAIN = {"map", "seq", "str", "int", "float", "bool", "null", "timestamp", "merge", "value"}
 _WORDS: dict[str, bool | None] = {
     "true": True, "True": True, "false": False, "False": False, "null": None, "~": None, "": None,
 }  # fmt: skip
@@ -91,11 +92,6 @@ def parse_value(text: str, source: str) -> Any:
 
 def _compose(text: str, file: str) -> Node | None:
     try:
-        for token in YAML(pure=True).scan(text):
-            if isinstance(token, AliasToken | AnchorToken | TagToken):
-                mark, what = token.start_mark, type(token).__name__.removesuffix("Token").lower()
-                raise ConfigError([Fault(file, mark.line + 1, mark.column + 1, (),
-                                         f"YAML {what} not allowed: plain values only")])  # fmt: skip
         return YAML(pure=True).compose(text)  # type: ignore[no-any-return]
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -112,6 +108,10 @@ def _convert(node: Node, path: Path, document: Document, faults: list[Fault]) ->
         return document.file, of.start_mark.line + 1, of.start_mark.column + 1
 
     document.places[path] = place(node)
+    # An alias leads back to a node with an anchor, so none is ever followed.
+    if node.anchor or str(node.tag).removeprefix("tag:yaml.org,2002:") not in _PLAIN:
+        faults.append(Fault(*place(node), path, "a YAML tag or anchor; allowed: plain values"))
+        return None
     if isinstance(node, ScalarNode):
         return _scalar(node)
     if isinstance(node, SequenceNode):

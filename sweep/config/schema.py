@@ -33,10 +33,10 @@ class Range(_Strict):
 
     def values(self) -> list[float]:
         if self.spacing == "linear":
-            return np.linspace(self.start, self.stop, self.num).tolist()
+            return list(map(float, np.linspace(self.start, self.stop, self.num)))
         if self.start * self.stop <= 0:
             raise _wrong("a log range needs start and stop of one sign, both not zero", "spacing")
-        return np.geomspace(self.start, self.stop, self.num).tolist()
+        return list(map(float, np.geomspace(self.start, self.stop, self.num)))
 
 
 def _wrong(reason: str, *at: str | int) -> PydanticCustomError:
@@ -136,9 +136,8 @@ class _Top(_Strict):
     max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
 
 
-Schema: Any = create_model(
-    "Configuration", __base__=_Top, **{name: (_section(name), Field(default_factory=dict)) for name in SECTIONS}
-)
+_sections: dict[str, Any] = {name: (_section(name), Field(default_factory=dict)) for name in SECTIONS}
+Schema: Any = create_model("Configuration", __base__=_Top, **_sections)
 
 
 @dataclass(frozen=True)
@@ -177,7 +176,7 @@ class Config:
     def to_yaml(self) -> str:
         stream = StringIO()
         yaml = YAML(typ="safe", pure=True)
-        yaml.sort_base_mapping_type_on_output = False  # type: ignore[attr-defined]
+        yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
         yaml.dump(self.document(), stream)
         return stream.getvalue()
 

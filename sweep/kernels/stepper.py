@@ -8,7 +8,7 @@ states: plain assignments, which dissolve into registers.
 from __future__ import annotations
 
 import linecache
-from collections.abc import Callable
+from collections.abc import Iterable
 from typing import Any
 
 from sweep.jit import inline
@@ -33,11 +33,12 @@ def step_source(tableau: Tableau, n_states: int) -> str:
     for stage, row in enumerate(tableau.a, start=1):
         weights = {j: f"h{stage}_{j}" for j, w in enumerate(row) if w}
         lines += [f"    {name} = h * {float(row[j])!r}" for j, name in weights.items()]
-        states = _tuple(n_states, lambda i, w=weights: f"y[{i}] + ({_sum(f'{n} * k{j}[{i}]' for j, n in w.items())})")
-        lines.append(f"    k{stage}, m{stage} = rhs({states}, p)")
+        sums = [_sum(f"{name} * k{j}[{i}]" for j, name in weights.items()) for i in range(n_states)]
+        lines.append(f"    k{stage}, m{stage} = rhs({_tuple(f'y[{i}] + ({sums[i]})' for i in range(n_states))}, p)")
     b = {j: repr(float(w)) for j, w in enumerate(tableau.b) if w}
     stages = range(last + 1)
-    result = _tuple(n_states, lambda i: f"y[{i}] + h * ({_sum(f'{w} * k{j}[{i}]' for j, w in b.items())})")
+    sums = [_sum(f"{w} * k{j}[{i}]" for j, w in b.items()) for i in range(n_states)]
+    result = _tuple(f"y[{i}] + h * ({sums[i]})" for i in range(n_states))
     return "\n".join(
         [
             *lines,
@@ -53,23 +54,21 @@ def step_source(tableau: Tableau, n_states: int) -> str:
 
 def make_load(first: int, count: int, lanes: int) -> Any:
     """Compiled (group, lane) -> tuple of `count` rows of one lane, from row `first` on."""
-    rows = _tuple(count, lambda i: f"group[{(first + i) * lanes} + lane]")
+    rows = _tuple(f"group[{(first + i) * lanes} + lane]" for i in range(count))
     return _compile("load", f"def load(group, lane):\n    return {rows}", {})
 
 
 def make_store(first: int, count: int, lanes: int) -> Any:
     """Compiled (group, lane, keep, new, old): writes `new` where `keep`, else `old`."""
-    lines = [
-        f"    group[{(first + i) * lanes} + lane] = new[{i}] if keep else old[{i}]" for i in range(count)
-    ]
+    lines = [f"    group[{(first + i) * lanes} + lane] = new[{i}] if keep else old[{i}]" for i in range(count)]
     return _compile("store", "\n".join(["def store(group, lane, keep, new, old):", *lines]), {})
 
 
-def _tuple(count: int, item: Callable[[int], str]) -> str:
-    return f"({' '.join(item(i) + ',' for i in range(count))})"
+def _tuple(items: Iterable[str]) -> str:
+    return f"({' '.join(item + ',' for item in items)})"
 
 
-def _sum(terms: Any) -> str:
+def _sum(terms: Iterable[str]) -> str:
     return " + ".join(terms)
 
 

@@ -45,7 +45,7 @@ def reversal_count(columns: Columns) -> Array:
 def form_factor(columns: Columns) -> Array:
     """L(f) = |f - 1/f| / (1 + f²) (ff): the share of the shape in the number of reversals."""
     f = coefficients({**columns, "mu": np.ones_like(columns["c"])}).f
-    return np.abs(f - 1 / f) / (1 + f**2)
+    return np.asarray(np.abs(f - 1 / f) / (1 + f**2))
 
 
 def best_b(a: float, c: float = 1.0) -> float:

@@ -12,6 +12,9 @@ from sweep.models.model import Array, Columns, Model, stack
 # Beyond this spin, in sqrt(g/c), upright spin is taken as stable for good: fifty times a hand's.
 _SPIN_LIMIT = 10.0
 
+# Spins looked at, beyond n_c1, for another stable range.
+_OUTER_SAMPLES = 24
+
 
 def jacobian(model: Model, constants: Array, spin: Array) -> Array:
     """Jacobian of the rattle at upright spin, shape (cells, m, m), m = number of states less spin.
@@ -57,6 +60,44 @@ def critical_spins(model: Model, columns: Columns, guess: tuple[Array, Array]) -
     at_rest = growth_rate(model, constants, np.zeros(constants.shape[1])) < 0
     upper, lower = (_boundary(model, constants, at_rest, side) for side in guess)
     return upper, np.where(np.isinf(lower), -np.inf, lower)
+
+
+def outer_range(model: Model, columns: Columns, n_c1: Array, reach: Array) -> tuple[Array, Array]:
+    """The next range of spins beyond `n_c1` at which the rattle decays: its near and far end.
+
+    Nearly round bodies have one: a fast spin detunes the two modes whose coupling feeds the rattle.
+
+    Parameters
+    ----------
+    n_c1 : critical spin of either sign, shape (cells,), where the first range ends
+    reach : largest |spin| of interest, shape (cells,)
+
+    Returns
+    -------
+    Two arrays of shape (cells,): NaN where there is no such range within reach; the far end is
+    infinite where it lies beyond reach.
+    """
+    constants, sign = stack(model.constants(columns)), np.sign(n_c1)
+    near, far = np.full_like(n_c1, np.nan), np.full_like(n_c1, np.nan)
+    cells = np.flatnonzero(np.isfinite(n_c1) & (np.abs(n_c1) < reach))
+    if not len(cells):
+        return near, far
+    spins = sign[cells] * np.geomspace(1.001 * np.abs(n_c1[cells]), 1.001 * reach[cells], _OUTER_SAMPLES)
+    growth = np.array([growth_rate(model, constants[:, cells], spin) for spin in spins])
+    enters = (growth[:-1] >= 0) & (growth[1:] < 0)
+    first = np.where(enters.any(axis=0), enters.argmax(axis=0), _OUTER_SAMPLES)
+    later = np.arange(_OUTER_SAMPLES - 1)[:, None] > first
+    leaves = (growth[:-1] < 0) & (growth[1:] >= 0) & later
+    last = np.where(leaves.any(axis=0), leaves.argmax(axis=0), _OUTER_SAMPLES)
+    far[cells[enters.any(axis=0)]] = np.inf
+    for end, sample in ((near, first), (far, last)):
+        at = np.flatnonzero(sample < _OUTER_SAMPLES)
+        i = sample[at]
+        end[cells[at]] = _root(
+            lambda spin, which, at=at: growth_rate(model, constants[:, cells[at[which]]], spin),
+            spins[i, at], spins[i + 1, at], growth[i, at], growth[i + 1, at],
+        )  # fmt: skip
+    return near, np.where(np.isinf(far), sign * np.inf, far)
 
 
 def _boundary(model: Model, constants: Array, at_rest: Array, guess: Array) -> Array:

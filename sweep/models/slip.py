@@ -169,7 +169,7 @@ def fastest_decay(columns: Columns) -> Array:
             rate2 = 2 * (1 - share) * energy_start / (own + rho2 + z2)
             R = 1 + np.maximum(curvature, 0) * rate2
             worst = np.maximum(worst, R * np.maximum(1 + z2 / other + rho2 / I3, 1 + z2 / own))
-    return columns["mu"] * worst
+    return np.asarray(columns["mu"] * worst)
 
 
 MODEL = Model(
