@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sweep.config.faults import ConfigError
+from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +29,16 @@ def main() -> None:
     """
 
 
-@main.command()
+def _parameter_help() -> str:
+    """The parameters' table as help text."""
+    lines = ["\b", "Parameters (a number, a list, or {start, stop, num, spacing: linear|log}):"]
+    for p in PARAMETERS.values():
+        default = "required" if p.default is None else f"default {p.default:g}"
+        lines.append(f"  {p.path:13} {p.long_name}; {default}; {p.allowed}")
+    return "\n".join(lines)
+
+
+@main.command(epilog=_parameter_help())
 @click.argument("config", type=click.Path(path_type=Path))
 @click.option("--output", type=click.Path(path_type=Path), help="Folder for the results [default: runs/NAME].")
 @click.option("--set", "settings", multiple=True, metavar="PATH=VALUE",
@@ -105,6 +115,8 @@ def info(file: Path) -> None:
             raise StoreError(f"{file}: not a dataset of sweep: no variable status")
         click.echo(dataset.attrs.get("title", file.name))
         click.echo(_summary(dataset))
+        for name, variable in dataset.data_vars.items():
+            click.echo(f"  {name} ({', '.join(map(str, variable.dims))}): {variable.attrs.get('long_name', '')}")
         for key in sorted(set(dataset.attrs) - {"title", "config"}):
             click.echo(f"{key}: {dataset.attrs[key]}")
         click.echo(f"config:\n{dataset.attrs.get('config', '')}")

@@ -20,6 +20,7 @@ from sweep.config import Config
 from sweep.grid import Array, Grid
 from sweep.kernels import lanes, stepsize
 from sweep.kernels.lanes import Kernel
+from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
 from sweep.prediction import Prediction
 
@@ -106,18 +107,15 @@ def measured(kernel: Kernel, images: Array, t_end: float) -> dict[str, Array]:
 
 def predicted(prediction: Prediction) -> dict[str, Array]:
     """The predicted variables, over cells or bodies."""
-    plus, minus = prediction.n_c1
-    plus_linear, minus_linear = (np.where(np.isfinite(n), n, np.nan) for n in prediction.n_c1_linear)
-    return {
-        "reversals_predicted": prediction.reversals,
-        "n_c1_plus": plus,
-        "n_c1_minus": minus,
-        "n_c2_plus": 2 * plus,
-        "n_c2_minus": 2 * minus,
-        "n_c1_plus_linear": plus_linear,
-        "n_c1_minus_linear": minus_linear,
-        "form_factor": prediction.form_factor,
-    }
+    result = {"form_factor": prediction.form_factor}
+    if formulas := prediction.formulas:
+        plus, minus = formulas.n_c1
+        result["reversals_predicted"] = formulas.reversals
+        result |= {"n_c1_plus": plus, "n_c1_minus": minus, "n_c2_plus": 2 * plus, "n_c2_minus": 2 * minus}
+    if stability := prediction.stability:
+        finite = [np.where(np.isfinite(n), n, np.nan) for n in stability.n_c1]
+        result["n_c1_plus_linear"], result["n_c1_minus_linear"] = finite
+    return result
 
 
 def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: Mapping[str, Any]) -> xr.Dataset:
@@ -160,7 +158,7 @@ def provenance(config: Config, seconds: float, cells: int) -> dict[str, Any]:
     return {
         "config": config.to_yaml(),
         "config_hash": config.fingerprint(),
-        "integrator": f"{config.integrator.method}, fixed step, {_step_words(config)}",
+        "integrator": _integrator_words(config),
         "sweep_version": metadata.version("rattleback-sweep"),
         "git_commit": _git_commit(),
         **{f"{name}_version": metadata.version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
@@ -173,12 +171,15 @@ def provenance(config: Config, seconds: float, cells: int) -> dict[str, Any]:
     }
 
 
-def _step_words(config: Config) -> str:
+def _integrator_words(config: Config) -> str:
+    if config.model not in MODELS:
+        return "none"
     if config.integrator.step != "auto":
-        return f"{config.integrator.step:g} sqrt(c/g)"
+        return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"
     return (
-        f"per trajectory the smaller of {stepsize.STABILITY_SHARE:g} of the stability limit "
-        f"and {stepsize.RADIANS_A_STEP:g} rad of the fastest rattle"
+        f"{config.integrator.method}, fixed step, per trajectory the smaller of "
+        f"{stepsize.STABILITY_SHARE:g} of the stability limit "
+        f"and {MODELS[config.model].radians_a_step:g} rad of the fastest motion"
     )
 
 

@@ -50,7 +50,7 @@ PARAMETERS: dict[str, Parameter] = {
             "delta", "body", "radian", "angle from the ellipsoid's axes to the axes of inertia",
             0.03, above=-pi / 2, below=pi / 2,
         ),
-        Parameter("mu", "friction", "1", "viscous friction coefficient, in sqrt(g/c)", None, at_least=0),
+        Parameter("mu", "friction", "1", "viscous friction coefficient, in 1/sqrt(g c)", None, at_least=0),
         Parameter("n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05),
         Parameter("x0", "start", "1", "start contact point along x, in c", 0.01),
         Parameter("y0", "start", "1", "start contact point along y, in c", 0.01),

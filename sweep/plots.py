@@ -36,7 +36,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
         where the dataset has no such variable, or too many panels to draw.
     """
     if variable is None and "reversals" in dataset:
-        names = ["reversals", "reversals_predicted"]
+        names = [name for name in ("reversals", "reversals_predicted") if name in dataset]
     else:
         names = [variable or "spin_final"]
     if missing := [name for name in names if name not in dataset]:

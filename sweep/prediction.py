@@ -1,4 +1,4 @@
-"""What theory says of every cell: the paper's formulas and the full model's eigenvalues."""
+"""What theory says of every cell: the paper's formulas and a model's eigenvalues."""
 
 from __future__ import annotations
 
@@ -8,46 +8,56 @@ import numpy as np
 
 from sweep.grid import Array, Grid
 from sweep.models import analytic, linear
-from sweep.models.coefficients import rattle_period
-from sweep.models.model import Columns, Model, stack
+from sweep.models.model import Columns, Model, Tier, stack
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """The paper's predictions for bodies with friction."""
+
+    reversals: Array
+    """Over the cells."""
+    n_c1: tuple[Array, Array]
+    """Plus and minus, over the bodies; n_c2 is twice that."""
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Where a model's rattle decays, over the bodies: the cells without their start."""
+
+    n_c1: tuple[Array, Array]
+    """Plus and minus; infinite where the rattle decays at every spin, NaN where at none."""
+    ranges: Array
+    """Shape (6, bodies), as `Kernel.images` takes them."""
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Arrays over the cells (`reversals`) or over the bodies, the cells without their start."""
-
-    reversals: Array
-    n_c1: tuple[Array, Array]
-    """Plus and minus, by the paper's formulas; n_c2 is twice that."""
-    n_c1_linear: tuple[Array, Array]
-    """From the model's own eigenvalues; infinite where the rattle decays at every spin."""
-    stable: Array
-    """Ranges of spin in which the rattle decays, shape (6, bodies), as `Kernel.images` takes them."""
     form_factor: Array
-    period: Array
-    """Of the slower rattle: the window over which spins are averaged."""
+    """Over the bodies."""
+    formulas: Formulas | None
+    """None for a tier without friction: it reverses for ever."""
+    stability: Stability | None
+    """None for a tier that is not simulated."""
 
 
-def predict(model: Model, grid: Grid) -> Prediction:
+def predict(tier: Tier, grid: Grid) -> Prediction:
     columns, (body_grid, body) = grid.columns(), grid.bodies()
     bodies = body_grid.columns()
-    n_c1 = analytic.critical_spins(bodies)
-    upper, lower = linear.critical_spins(model, bodies, n_c1)
-    reach = np.zeros(body_grid.size)
-    np.maximum.at(reach, body, _fastest_spin(model, columns))
+    formulas = None
+    if "mu" in tier.parameters:
+        formulas = Formulas(analytic.reversal_count(columns), analytic.critical_spins(bodies))
+    stability = _stability(tier, columns, bodies, body, formulas) if isinstance(tier, Model) else None
+    return Prediction(analytic.form_factor(bodies), formulas, stability)
+
+
+def _stability(model: Model, columns: Columns, bodies: Columns, body: Array, formulas: Formulas | None) -> Stability:
+    cells = len(bodies["a"])
+    if formulas is None:
+        never = np.full(cells, np.nan)
+        return Stability((never, never), stack((never,) * 6))
+    upper, lower = linear.critical_spins(model, bodies, formulas.n_c1)
+    reach = np.zeros(cells)
+    np.maximum.at(reach, body, linear.fastest_spin(model, columns))
     below, above = (linear.outer_range(model, bodies, n, reach) for n in (lower, upper))
-    return Prediction(
-        reversals=analytic.reversal_count(columns),
-        n_c1=n_c1,
-        n_c1_linear=(upper, lower),
-        stable=np.stack([lower, upper, *below[::-1], *above]),
-        form_factor=analytic.form_factor(bodies),
-        period=rattle_period(bodies),
-    )
-
-
-def _fastest_spin(model: Model, columns: Columns) -> Array:
-    """The |spin| that a start could reach if all its energy went into it."""
-    start = stack(model.start(columns)), stack(model.constants(columns))
-    spin, rattle, inertia = model.energy.py_func(*start)  # type: ignore[attr-defined]
-    return np.asarray(np.sqrt(spin**2 + 2 * rattle / inertia))
+    return Stability((upper, lower), stack((lower, upper, *below[::-1], *above)))

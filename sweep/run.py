@@ -15,9 +15,10 @@ from sweep.executor import Progress
 from sweep.grid import Array, Grid
 from sweep.jit import fingerprint
 from sweep.kernels import stepsize
-from sweep.kernels.lanes import Kernel
+from sweep.kernels.lanes import SETTLED, Kernel
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import MODELS
+from sweep.models import MODELS, TIERS
+from sweep.models.coefficients import rattle_period
 from sweep.prediction import Prediction
 from sweep.prediction import predict as predict_grid
 from sweep.store import Identity, RunFiles
@@ -25,12 +26,12 @@ from sweep.store import Identity, RunFiles
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything a run needs, before the first step is taken."""
+    """Everything a simulation needs, before the first step is taken."""
 
     config: Config
     grid: Grid
-    kernel: Kernel
     prediction: Prediction
+    kernel: Kernel
     step_rule: Array
     images: Array
 
@@ -68,7 +69,7 @@ def run(
 
     Returns
     -------
-    The dataset described in docs/dataset.md.
+    Dataset over the axes of the configuration; every variable carries its meaning as `long_name`.
 
     Raises
     ------
@@ -86,9 +87,12 @@ def run(
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
             return finished
 
-    job = plan(config)
-    seconds = simulate(job, files, reporter)
-    result = collect(job, seconds)
+    if config.model in MODELS:
+        job = plan(config)
+        seconds = simulate(job, files, reporter)
+        result = collect(job, seconds)
+    else:
+        result = evaluate(config)
     if files:
         files.save_dataset(result)
         from sweep import plots  # matplotlib: a third of the time that `import sweep` would take
@@ -101,7 +105,7 @@ def predict(config: Config | str | Path, **overrides: Any) -> xr.Dataset:
     """The predictions alone, of the paper and of the linear theory, on the grid of `config`."""
     config = as_config(config, overrides)
     grid = Grid.of(config)
-    return dataset.label(config, grid, dataset.predicted(predict_grid(MODELS[config.model], grid)), {})
+    return dataset.label(config, grid, dataset.predicted(predict_grid(TIERS[config.model], grid)), {})
 
 
 def as_config(config: Config | str | Path, overrides: dict[str, Any]) -> Config:
@@ -116,19 +120,33 @@ def identify(config: Config) -> Identity:
     return Identity(config.to_yaml(), config.fingerprint(), fingerprint())
 
 
+def evaluate(config: Config) -> xr.Dataset:
+    """The dataset of a tier that is a formula."""
+    grid = Grid.of(config)
+    arrays = dataset.predicted(predict_grid(TIERS[config.model], grid))
+    arrays["status"] = np.full(grid.size, SETTLED)
+    if "reversals" in config.measure:
+        arrays["reversals"] = arrays["reversals_predicted"]
+    attributes = {"source_hash": fingerprint(), **dataset.provenance(config, 0.0, grid.size)}
+    return dataset.label(config, grid, arrays, attributes)
+
+
 def plan(config: Config) -> Plan:
     """Lay out the cells of `config` with their steps, limits and starts."""
     grid, model = Grid.of(config), MODELS[config.model]
     columns = grid.columns()
     kernel = Kernel(model, DOPRI5, config.measure)
     prediction = predict_grid(model, grid)
+    assert prediction.stability is not None  # it is a model
     if config.integrator.step == "auto":
         step, rule = stepsize.automatic_step(model, DOPRI5, columns)
     else:
         step, rule = np.full(grid.size, config.integrator.step), np.full(grid.size, stepsize.FIXED)
     body = grid.bodies()[1]
-    images = kernel.images(columns, step, config.integrator.t_end, prediction.stable[:, body], prediction.period[body])
-    return Plan(config, grid, kernel, prediction, rule, images)
+    images = kernel.images(
+        columns, step, config.integrator.t_end, prediction.stability.ranges[:, body], rattle_period(columns)
+    )
+    return Plan(config, grid, prediction, kernel, rule, images)
 
 
 def simulate(job: Plan, files: RunFiles | None, reporter: Reporter) -> float:

@@ -13,7 +13,7 @@ from sweep.config import cases, document, schema
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import off_the_body
-from sweep.models import MODELS
+from sweep.models import TIERS
 from sweep.parameters import PARAMETERS
 
 __all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "load_config"]
@@ -56,7 +56,7 @@ def _full_path(key: str) -> tuple[str, ...]:
 
 def _resolve(checked: Any, source: document.Document) -> Config:
     """Fill in defaults, order the axes, and check what one value says of another."""
-    model = MODELS[checked.model]
+    model = TIERS[checked.model]
     given = {
         key: getattr(getattr(checked, section), key)
         for section, keys in source.values.items()
@@ -85,7 +85,7 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         model=checked.model,
         parameters=parameters,
         integrator=checked.integrator,
-        measure=tuple(checked.measure),
+        measure=model.measures if checked.measure is None else tuple(checked.measure),
         max_failed_fraction=checked.max_failed_fraction,
         cases=columns,
         cases_file=checked.cases,
@@ -100,10 +100,11 @@ def _rank(name: str, names: tuple[str, ...]) -> int:
 
 
 def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document.Document) -> Any:
-    model = MODELS[checked.model]
+    model = TIERS[checked.model]
     for name in given:
         path = (PARAMETERS[name].section, name)
-        if name not in model.parameters:
+        # A number that the model has no use for may stay: one file then serves every model.
+        if name not in model.parameters and given[name].is_axis:
             yield source.fault(
                 path, f"the {model.name} model has no {name}; allowed: {', '.join(model.parameters)}", at_key=True
             )
@@ -114,7 +115,7 @@ def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document
     for name in columns or {}:
         if name not in model.parameters:
             yield source.fault(("cases",), f"column {name}: the {model.name} model has no {name}")
-    for i, name in enumerate(checked.measure):
+    for i, name in enumerate(checked.measure or ()):
         if name not in model.measures:
             yield source.fault(
                 ("measure", i), f"not measured on the {model.name} model; allowed: {', '.join(model.measures)}"

@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
 from sweep.kernels.lanes import MEASURES
-from sweep.models import MODELS
+from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
 MAX_AXIS = 10_000_000
@@ -126,13 +126,17 @@ def _section(name: str) -> Any:
 
 class _Top(_Strict):
     name: str = Field(default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")
-    model: Literal[tuple(MODELS)] = "slip"  # type: ignore[valid-type]
+    model: Literal[tuple(TIERS)] = "slip"  # type: ignore[valid-type]
     cases: str | None = None
     integrator: Integrator = Integrator()
-    measure: Annotated[
-        list[Literal[MEASURES]],  # type: ignore[valid-type]
-        BeforeValidator(lambda names: _distinct(names) if isinstance(names, list) else names),
-    ] = Field(default_factory=lambda: list(MEASURES))
+    measure: (
+        Annotated[
+            list[Literal[MEASURES]],  # type: ignore[valid-type]
+            BeforeValidator(lambda names: _distinct(names) if isinstance(names, list) else names),
+        ]
+        | None
+    ) = None
+    """By default all that the model has."""
     max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
 
 

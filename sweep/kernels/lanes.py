@@ -267,7 +267,7 @@ def _make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...])
     GOAL, DONE, STATUS, START, ENERGY, STABLE_STEP = (
         rows.index(name) * LANES for name in ("goal", "done", "status", "energy_start", "energy", "stable_step")
     )
-    lanes, allowed = LANES, 1.0 + ENERGY_GAIN
+    lanes, allowed, conserved = LANES, 1.0 + ENERGY_GAIN, "energy_error" in model.measures
 
     @numba.njit(error_model="numpy")
     def inspect(group: Any, stop_when_settled: bool) -> None:
@@ -290,7 +290,7 @@ def _make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...])
             failed = (status == LIFT_OFF) | (status == PARADOX)
             # A step beyond the stability limit shows as energy from nowhere, or lets the slip swing
             # up until it feigns one of these ends.
-            false = (total > before * allowed) | (failed & (group[STABLE_STEP + lane] == 0.0))
+            false = (conserved & (total > before * allowed)) | (failed & (group[STABLE_STEP + lane] == 0.0))
             group[STATUS + lane] = DIVERGED if (running | failed) & false else status
             store_states(group, lane, bounded & (rattle < NEGLIGIBLE), upright(spin), y)
 

@@ -1,6 +1,8 @@
-"""The ladder of models, one file each."""
+"""The ladder of models, one file each, each an approximation of the one before."""
 
-from sweep.models import slip
-from sweep.models.model import Model
+from sweep.models import analytic, averaged, effective, noslip, slip
+from sweep.models.model import Model, Tier
 
-MODELS: dict[str, Model] = {module.MODEL.name: module.MODEL for module in (slip,)}
+MODELS: dict[str, Model] = {module.MODEL.name: module.MODEL for module in (slip, noslip, effective, averaged)}
+
+TIERS: dict[str, Tier] = {**MODELS, analytic.MODEL.name: analytic.MODEL}

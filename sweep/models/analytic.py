@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.models.coefficients import coefficients
-from sweep.models.model import Array, Columns
+from sweep.models.model import Array, Columns, Tier
 
 
 def critical_spins(columns: Columns) -> tuple[Array, Array]:
@@ -52,3 +52,11 @@ def best_b(a: float, c: float = 1.0) -> float:
     """The b of largest form factor at given a: f² = 2 + √5; NaN where no b > 0 reaches it."""
     b_squared = ((a / c) ** 2 + 6) / (2 + np.sqrt(5)) - 6
     return float(c * np.sqrt(b_squared)) if b_squared > 0 else float("nan")
+
+
+MODEL = Tier(
+    name="analytic",
+    summary="the count by formula, nothing is simulated (Takano 2011, nrk0, nrk1)",
+    parameters=("a", "b", "c", "delta", "mu", "n0"),
+    measures=("reversals",),
+)

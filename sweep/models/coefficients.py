@@ -83,3 +83,12 @@ def rattle_period(columns: Columns) -> Array:
     """τ = 2π / min(ν1, ν2) in sqrt(c/g): the window over which a spin is averaged."""
     k = coefficients({**columns, "mu": np.ones_like(columns["c"])})
     return 2 * np.pi / np.minimum(k.nu1, k.nu2) * np.sqrt(columns["c"])
+
+
+def normal_coordinates(columns: Columns) -> tuple[Array, Array]:
+    """X and Y of the start (x0, y0), by (X, Y) = T J P (x, y) (xX)."""
+    k = coefficients({**columns, "mu": np.ones_like(columns["c"])})
+    x, y = columns["x0"] / columns["c"], columns["y0"] / columns["c"]
+    first, second = np.sqrt(k.J2) * (k.p * x + k.q * y), np.sqrt(k.J1) * (k.q * x + k.s * y)
+    cos, sin = np.cos(k.theta), np.sin(k.theta)
+    return cos * first + sin * second, cos * second - sin * first

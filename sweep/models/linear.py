@@ -37,10 +37,22 @@ def growth_rate(model: Model, constants: Array, spin: Array) -> Array:
     return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)).real.max(axis=-1))
 
 
-def fastest_oscillation(model: Model, columns: Columns) -> Array:
-    """Largest frequency of the rattle at the start spin, in sqrt(g/c), shape (cells,)."""
-    values = np.linalg.eigvals(jacobian(model, stack(model.constants(columns)), columns["n0"]))
-    return np.asarray(np.abs(values.imag).max(axis=-1))
+def fastest_motion(model: Model, columns: Columns) -> Array:
+    """Largest |λ| of the rattle at the fastest spins within reach, friction's quick decay left out.
+
+    What an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.
+    """
+    constants, reach = stack(model.constants(columns)), fastest_spin(model, columns)
+    values = np.concatenate([np.linalg.eigvals(jacobian(model, constants, spin)) for spin in (reach, -reach)], axis=-1)
+    moving = -values.real <= np.abs(values.imag)
+    return np.asarray(np.where(moving, np.abs(values), 0.0).max(axis=-1))
+
+
+def fastest_spin(model: Model, columns: Columns) -> Array:
+    """The |spin| that a start could reach if all its energy went into it, shape (cells,)."""
+    start = stack(model.start(columns)), stack(model.constants(columns))
+    spin, rattle, inertia = model.energy.py_func(*start)  # type: ignore[attr-defined]
+    return np.asarray(np.sqrt(spin**2 + 2 * rattle / inertia))
 
 
 def critical_spins(model: Model, columns: Columns, guess: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -57,7 +69,8 @@ def critical_spins(model: Model, columns: Columns, guess: tuple[Array, Array]) -
     search, NaN where it does not decay at rest (no friction, or no dissipation in the model).
     """
     constants = stack(model.constants(columns))
-    at_rest = growth_rate(model, constants, np.zeros(constants.shape[1])) < 0
+    # Without friction the real parts are zero but for rounding.
+    at_rest = growth_rate(model, constants, np.zeros(constants.shape[1])) < -1e-13
     upper, lower = (_boundary(model, constants, at_rest, side) for side in guess)
     return upper, np.where(np.isinf(lower), -np.inf, lower)
 

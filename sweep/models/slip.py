@@ -1,13 +1,8 @@
 """The full model: a rattleback that slips with viscous friction (Takano 2011, Ldot … visf).
 
-Body axes are the principal axes of inertia, z downward; lengths in c, times in sqrt(c/g).
-The unknowns (u1, u2, ω1, ω2, ω3, v1, v2) are components in the body of the upward normal u, the
-angular velocity ω and the slip velocity v_p of the contact point.  All but ω3 vanish in upright
-spin, so however small a rattle is, it keeps its relative precision.
-
-With A the matrix of the squared semi-axes, turned by δ into the inertia axes, the contact point
-is x_p = -A u / r, r = sqrt(uᵀ A u) being the height of the centre of mass: exact for the ellipsoid,
-where the paper expands.  The equations are
+Lengths in c, times in sqrt(c/g).  The unknowns (u1, u2, ω1, ω2, ω3, v1, v2) are components in the
+body of the upward normal u, the angular velocity ω and the slip velocity v_p of the contact point.
+All but ω3 vanish in upright spin, so however small a rattle is, it keeps its relative precision.
 
     u' = u × ω                                                        (omega)
     I ω' = x_p × F - ω × I ω,   F = R (u + f),   f = -μ v_p           (Ldot, visf)
@@ -24,38 +19,22 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
+from sweep.models import ellipsoid
+from sweep.models.ellipsoid import contact
 from sweep.models.model import Array, Columns, Model
-
-
-def _shape(columns: Columns) -> tuple[Array, Array, Array, Array]:
-    """A11, A12, A22, A33: squared semi-axes in the axes of inertia."""
-    a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
-    cos, sin = np.cos(columns["delta"]), np.sin(columns["delta"])
-    return a2 * cos**2 + b2 * sin**2, (b2 - a2) * sin * cos, a2 * sin**2 + b2 * cos**2, c2
 
 
 def constants(columns: Columns) -> tuple[Array, ...]:
     """Shape, inverse moments of inertia, Euler's inertia ratios, friction: eleven arrays."""
-    a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
-    I1, I2, I3 = (b2 + c2) / 5, (a2 + c2) / 5, (a2 + b2) / 5
+    I1, I2, I3 = ellipsoid.inertia(columns)
     ratios = (I2 - I3) / I1, (I3 - I1) / I2, (I1 - I2) / I3
-    return (*_shape(columns), 1 / I1, 1 / I2, 1 / I3, *ratios, columns["mu"])
+    return (*ellipsoid.shape(columns), 1 / I1, 1 / I2, 1 / I3, *ratios, columns["mu"])
 
 
 def start(columns: Columns) -> tuple[Array, ...]:
-    """At rest but for the spin n0, with contact point (x0, y0): ω = n0 u, v_p = 0.
-
-    The start point must lie inside the ellipse of the body seen from above.
-    """
-    A11, A12, A22, A33 = _shape(columns)
-    x, y, n0 = columns["x0"], columns["y0"], columns["n0"]
-    det = A11 * A22 - A12**2
-    # x_p = -A u / r means u ∝ -A⁻¹ x_p.
-    w1, w2 = (A22 * x - A12 * y) / det, (A11 * y - A12 * x) / det
-    w3 = np.sqrt(1 - (x * w1 + y * w2)) / np.sqrt(A33)
-    norm = np.sqrt(w1**2 + w2**2 + w3**2)
-    u1, u2, u3 = -w1 / norm, -w2 / norm, -w3 / norm
-    rest = np.zeros_like(u1)
+    """At rest but for the spin n0, with contact point (x0, y0): ω = n0 u, v_p = 0."""
+    u1, u2, u3 = ellipsoid.start(columns)
+    n0, rest = columns["n0"], np.zeros_like(u1)
     return u1, u2, n0 * u1, n0 * u2, n0 * u3, rest, rest
 
 
@@ -68,21 +47,7 @@ def upright(n: Any) -> Any:
 def rhs(y: Any, p: Any) -> Any:
     u1, u2, w1, w2, w3, v1, v2 = y
     A11, A12, A22, A33, i1, i2, i3, d1, d2, d3, mu = p
-
-    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    au1, au2, au3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
-    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
-    # One division serves 1/r and 1/u3.
-    shared = 1.0 / (r * u3)
-    inv_r, inv_u3 = shared * u3, shared * r
-    x, y_, z = -au1 * inv_r, -au2 * inv_r, -au3 * inv_r
-
-    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
-    # x_p' (components in the body) = -(A u' + x_p (u' · A u) / r) / r
-    s = (du1 * au1 + du2 * au2 + du3 * au3) * inv_r
-    dx = -inv_r * (A11 * du1 + A12 * du2 + x * s)
-    dy = -inv_r * (A12 * du1 + A22 * du2 + y_ * s)
-    dz = -inv_r * (A33 * du3 + z * s)
+    (u3, inv_u3), (x, y_, z), (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, A11, A12, A22, A33)
 
     v3 = -(v1 * u1 + v2 * u2) * inv_u3
     # u + f, the contact force per unit of R
@@ -109,34 +74,36 @@ def rhs(y: Any, p: Any) -> Any:
 
 @inline
 def energy(y: Any, p: Any) -> Any:
-    """E = ωᵀIω/2 + |v_g|²/2 + (r - c), split with ω = n u + w, w ⊥ u.
+    u1, u2, w1, w2, w3, v1, v2 = y
+    return ellipsoid.energy(u1, u2, w1, w2, w3, v1, v2, p)
 
-    Each term but I3 n²/2 is quadratic in small quantities and formed as such: no difference of
-    O(1) numbers is taken.
+
+def observe(y: Array, p: Array) -> dict[str, Array]:
+    """What a trajectory shows beside spin and energy: contact point, slip, its derivatives, force.
+
+    v̇_p is the derivative in the body's axes; v̇_0 that in space, (d/dt) v_0 of the paper.
     """
     u1, u2, w1, w2, w3, v1, v2 = y
-    A11, A12, A22, A33, i1, i2, i3, _d1, _d2, _d3, _mu = p
-    I1, I2, I3 = 1.0 / i1, 1.0 / i2, 1.0 / i3
+    _, point, _, moving = contact.py_func(u1, u2, w1, w2, w3, *p[:4])
+    slopes, (_, _, R, _) = rhs.py_func(y, p)
+    omega, slope = y[2:5], np.stack(slopes[2:5])
+    x_p, dx_p = np.stack(point), np.stack(moving)
 
-    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    n = u1 * w1 + u2 * w2 + u3 * w3
-    o1, o2 = w1 - n * u1, w2 - n * u2
-    o3 = -(u1 * o1 + u2 * o2) / u3
-    spin_part = 0.5 * n * n * ((I1 - I3) * u1 * u1 + (I2 - I3) * u2 * u2)
-    cross_part = n * ((I1 - I3) * u1 * o1 + (I2 - I3) * u2 * o2)
-    tilt_part = 0.5 * (I1 * o1 * o1 + I2 * o2 * o2 + I3 * o3 * o3)
+    def cross(a: Array, b: Array) -> Array:
+        return np.cross(a, b, axis=0)
 
-    au1, au2, au3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
-    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
-    # r - c = (r² - c²)/(r + c)
-    c = np.sqrt(A33)
-    height = ((A11 - A33) * u1 * u1 + 2.0 * A12 * u1 * u2 + (A22 - A33) * u2 * u2) / (r + c)
-
-    x, y_, z = -au1 / r, -au2 / r, -au3 / r
-    v3 = -(v1 * u1 + v2 * u2) / u3
-    g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
-    drift = 0.5 * (g1 * g1 + g2 * g2 + g3 * g3)
-    return n, spin_part + cross_part + tilt_part + height + drift, I3
+    dv0 = cross(dx_p, omega) + cross(x_p, slope) + cross(omega, cross(x_p, omega))
+    return {
+        "contact_x": x_p[0],
+        "contact_y": x_p[1],
+        "slip_1": v1,
+        "slip_2": v2,
+        "slip_rate_1": slopes[5],
+        "slip_rate_2": slopes[6],
+        "v0_rate_1": dv0[0],
+        "v0_rate_2": dv0[1],
+        "normal_force": R,
+    }
 
 
 def fastest_decay(columns: Columns) -> Array:
@@ -153,7 +120,7 @@ def fastest_decay(columns: Columns) -> Array:
     diverges at 1.1 to 1.3 of it in most.
     """
     a, b, c = columns["a"], columns["b"], columns["c"]
-    I1, I2, I3 = (b**2 + c**2) / 5, (a**2 + c**2) / 5, (a**2 + b**2) / 5
+    I1, I2, I3 = ellipsoid.inertia(columns)
     spin, rattle, inertia = energy.py_func(start(columns), constants(columns))
     energy_start = rattle + 0.5 * inertia * spin**2
     worst = np.zeros_like(energy_start)
@@ -185,4 +152,5 @@ MODEL = Model(
     upright=upright,
     rhs=rhs,
     energy=energy,
+    observe=observe,
 )

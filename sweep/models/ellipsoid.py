@@ -1,0 +1,94 @@
+"""The body: an ellipsoid on a plane, its axes of inertia turned by δ against its own.
+
+Body axes are the principal axes of inertia, z downward; u is the upward normal of the plane in
+these axes.  With A the matrix of the squared semi-axes, turned by δ into the axes of inertia, the
+contact point is x_p = -A u / r, and r = sqrt(uᵀ A u) is the height of the centre of mass: exact for the
+ellipsoid, where Takano (2011) expands (xp, u).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models.model import Array, Columns
+
+
+def shape(columns: Columns) -> tuple[Array, Array, Array, Array]:
+    """A11, A12, A22, A33: squared semi-axes in the axes of inertia."""
+    a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
+    cos, sin = np.cos(columns["delta"]), np.sin(columns["delta"])
+    return a2 * cos**2 + b2 * sin**2, (b2 - a2) * sin * cos, a2 * sin**2 + b2 * cos**2, c2
+
+
+def inertia(columns: Columns) -> tuple[Array, Array, Array]:
+    """I1, I2, I3 of the homogeneous ellipsoid, by the paper's definition (for small δ)."""
+    a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
+    return (b2 + c2) / 5, (a2 + c2) / 5, (a2 + b2) / 5
+
+
+def start(columns: Columns) -> tuple[Array, Array, Array]:
+    """u with the contact point at (x0, y0), which must lie inside the body seen from above."""
+    A11, A12, A22, A33 = shape(columns)
+    x, y = columns["x0"], columns["y0"]
+    det = A11 * A22 - A12**2
+    # x_p = -A u / r means u ∝ -A⁻¹ x_p.
+    w1, w2 = (A22 * x - A12 * y) / det, (A11 * y - A12 * x) / det
+    w3 = np.sqrt(1 - (x * w1 + y * w2)) / np.sqrt(A33)
+    norm = np.sqrt(w1**2 + w2**2 + w3**2)
+    return -w1 / norm, -w2 / norm, -w3 / norm
+
+
+@inline
+def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, A11: Any, A12: Any, A22: Any, A33: Any) -> Any:
+    """(u3, 1/u3), the contact point, u' and the contact point's velocity in the body.
+
+    u' = u × ω (omega) and x_p' = -(A u' + x_p (u' · A u) / r) / r.
+    """
+    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
+    au1, au2, au3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
+    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
+    # One division serves 1/r and 1/u3.
+    shared = 1.0 / (r * u3)
+    inv_r, inv_u3 = shared * u3, shared * r
+    x, y, z = -au1 * inv_r, -au2 * inv_r, -au3 * inv_r
+
+    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
+    s = (du1 * au1 + du2 * au2 + du3 * au3) * inv_r
+    dx = -inv_r * (A11 * du1 + A12 * du2 + x * s)
+    dy = -inv_r * (A12 * du1 + A22 * du2 + y * s)
+    dz = -inv_r * (A33 * du3 + z * s)
+    return (u3, inv_u3), (x, y, z), (du1, du2, du3), (dx, dy, dz)
+
+
+@inline
+def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any) -> Any:
+    """(spin, energy of the rattle, I3): E = ωᵀIω/2 + |v_g|²/2 + (r - c), split with ω = n u + w, w ⊥ u.
+
+    Each term but I3 n²/2 is quadratic in small quantities and formed as such: no difference of
+    O(1) numbers is taken.  `p` begins with A11, A12, A22, A33, 1/I1, 1/I2, 1/I3.
+    """
+    A11, A12, A22, A33, i1, i2, i3 = p[0], p[1], p[2], p[3], p[4], p[5], p[6]
+    I1, I2, I3 = 1.0 / i1, 1.0 / i2, 1.0 / i3
+
+    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
+    n = u1 * w1 + u2 * w2 + u3 * w3
+    o1, o2 = w1 - n * u1, w2 - n * u2
+    o3 = -(u1 * o1 + u2 * o2) / u3
+    spin_part = 0.5 * n * n * ((I1 - I3) * u1 * u1 + (I2 - I3) * u2 * u2)
+    cross_part = n * ((I1 - I3) * u1 * o1 + (I2 - I3) * u2 * o2)
+    tilt_part = 0.5 * (I1 * o1 * o1 + I2 * o2 * o2 + I3 * o3 * o3)
+
+    au1, au2, au3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
+    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
+    # r - c = (r² - c²)/(r + c)
+    c = np.sqrt(A33)
+    height = ((A11 - A33) * u1 * u1 + 2.0 * A12 * u1 * u2 + (A22 - A33) * u2 * u2) / (r + c)
+
+    x, y, z = -au1 / r, -au2 / r, -au3 / r
+    v3 = -(v1 * u1 + v2 * u2) / u3
+    g1, g2, g3 = v1 + y * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y * w1
+    drift = 0.5 * (g1 * g1 + g2 * g2 + g3 * g3)
+    return n, spin_part + cross_part + tilt_part + height + drift, I3

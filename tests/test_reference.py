@@ -1,0 +1,31 @@
+"""Reversal counts against another derivation of the equations and an adaptive integrator.
+
+`data/reference_counts.csv` was made by `scripts/reference_counts.py`; `data/README.md` says how.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from conftest import ROOT
+
+import sweep
+
+
+def test_reversal_counts(tmp_path: Path) -> None:
+    table = ROOT / "data" / "reference_counts.csv"
+    names = table.read_text().splitlines()[0].split(",")
+    rows = dict(zip(names, np.loadtxt(table, delimiter=",", skiprows=1).T, strict=True))
+    inputs = ["a", "b", "delta", "mu", "n0", "x0", "y0"]
+    cases = np.column_stack([rows[name] for name in inputs])
+    np.savetxt(tmp_path / "cells.csv", cases, delimiter=",", header=",".join(inputs), comments="", fmt="%.17g")
+    (tmp_path / "c.yaml").write_text("cases: cells.csv\n")
+    ours = sweep.run(tmp_path / "c.yaml")
+    assert len(cases) >= 80
+    assert set(np.unique(rows["reversals"])) >= set(range(6))
+    wrong = np.flatnonzero(ours.reversals.values != rows["reversals"])
+    assert len(wrong) <= len(cases) / 75, cases[wrong]
+    # Late reversals start from round-off and differ by a few per cent; the first do not.
+    few = (rows["reversals"] > 0) & (rows["reversals"] <= 2)
+    np.testing.assert_allclose(ours.t_last_reversal.values[few], rows["t_last_reversal"][few], rtol=2e-3)
