@@ -6,5 +6,6 @@
 from sweep.config import Config, ConfigError, load_config
 from sweep.run import predict, run
 from sweep.store import StoreError
+from sweep.trajectory import trajectory
 
-__all__ = ["Config", "ConfigError", "StoreError", "load_config", "predict", "run"]
+__all__ = ["Config", "ConfigError", "StoreError", "load_config", "predict", "run", "trajectory"]

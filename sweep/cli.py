@@ -83,6 +83,60 @@ def run(config: Path, output: Path | None, settings: tuple[str, ...], dry_run: b
 
 
 @main.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@click.option("--at", "cells", multiple=True, metavar="NAME=VALUE",
+              help="Which cell, e.g. --at mu=60 --at b=3; a parameter given again adds a trajectory.")  # fmt: skip
+@click.option("--output", type=click.Path(path_type=Path), help="Folder for the results [default: runs/NAME].")
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Replace a value of the configuration.")
+def trajectory(config: Path, cells: tuple[str, ...], output: Path | None, settings: tuple[str, ...]) -> None:
+    """Follow single cells of CONFIG densely in time.
+
+    Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip,
+    normal force, energy and the work of friction.  Several trajectories are laid over each other.
+    """
+    with _explained():
+        from sweep import trajectory_plot
+        from sweep.config import load_config
+        from sweep.store import RunFiles
+        from sweep.trajectory import trajectory as follow
+
+        checked = load_config(config, _parse_settings(settings))
+        at: dict[str, Any] = {}
+        for name, value in (_parse_pair(cell, "--at") for cell in cells):
+            at.setdefault(name, []).append(value)
+        result = follow(checked, **at)
+        files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
+        files.save_result(result, trajectory_plot.draw(result))
+        click.echo(f"wrote {files.dataset} and .png")
+
+
+@main.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@click.option("--width", type=click.FloatRange(1e-12, 0.5), default=1e-3, show_default=True,
+              help="Relative width of the brackets from simulation.")  # fmt: skip
+@click.option("--output", type=click.Path(path_type=Path), help="Folder for the results [default: runs/NAME].")
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Replace a value of the configuration.")
+@click.option("--quiet", is_flag=True, help="Print errors alone.")
+def critical(config: Path, width: float, output: Path | None, settings: tuple[str, ...], quiet: bool) -> None:
+    """Critical spins over the axes of CONFIG but n0: by formula, linear stability and simulation.
+
+    Writes NAME_critical.nc and .png.
+    """
+    with _explained():
+        from sweep import plots
+        from sweep.config import load_config
+        from sweep.critical import critical as search
+        from sweep.store import RunFiles
+
+        checked = load_config(config, _parse_settings(settings))
+        result = search(checked, width, lambda message: None if quiet else click.echo(message, err=True))
+        files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_critical")
+        files.save_result(result, plots.draw_critical(result))
+        if not quiet:
+            click.echo(f"wrote {files.dataset} and .png")
+
+
+@main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--var", "variable", help="Variable to draw [default: reversals, simulated beside predicted].")
 @click.option("--output", type=click.Path(path_type=Path), help="PNG file [default: beside FILE].")
@@ -152,6 +206,16 @@ def _parse_settings(settings: tuple[str, ...]) -> dict[str, Any]:
             raise ConfigError([Fault(f"--set {setting}", None, None, (), "not a setting; allowed: PATH=VALUE")])
         parsed[path] = parse_value(value, f"--set {path}")
     return parsed
+
+
+def _parse_pair(text: str, option: str) -> tuple[str, float]:
+    from sweep.config.faults import Fault
+
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise ConfigError([Fault(f"{option} {text}", None, None, (), "allowed: NAME=NUMBER")]) from None
 
 
 def _estimate(job: Plan) -> str:

@@ -33,6 +33,9 @@ STATUSES = {
     lanes.PARADOX: "paradox",
 }
 
+EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND = range(4)
+REASONS = {EXISTS: "exists", NO_FRICTION: "no_friction", NO_COUPLING: "no_coupling", NOT_FOUND: "not_found"}
+
 STEP_RULES = {stepsize.FIXED: "fixed", stepsize.ACCURACY: "accuracy", stepsize.STABILITY: "stability"}
 
 
@@ -76,6 +79,15 @@ VARIABLES: dict[str, Variable] = {
     "n_c1_plus_linear": _critical("+", "rattle grows", _EIGENVALUES),
     "n_c1_minus_linear": _critical("-", "rattle grows", _EIGENVALUES),
     "form_factor": Variable("float64", "1", "form factor L(f) of Takano (2011)", per_body=True),
+    **{
+        f"n_{n}_{side}_simulated{suffix}": _critical(
+            {"plus": "+", "minus": "-"}[side], event, f"bisection of simulations{words}"
+        )
+        for n, event in (("c1", "rattle grows"), ("c2", "spin reverses"))
+        for side in ("plus", "minus")
+        for suffix, words in (("", ""), ("_inner", ": end of the bracket nearer zero"), ("_outer", ": far end"))
+    },
+    "critical_reason": Variable("int8", "1", "why a critical spin is not a number", REASONS, per_body=True),
 }
 
 

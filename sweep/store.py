@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
 from sweep.grid import Array
 
@@ -110,6 +111,13 @@ class RunFiles:
         with replacing(self.dataset) as temporary:
             dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
         self.checkpoint.unlink(missing_ok=True)
+
+    def save_result(self, dataset: xr.Dataset, figure: Figure) -> None:
+        """Write a dataset that no run resumes from, and its picture."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.save_dataset(dataset)
+        with replacing(self.dataset.with_suffix(".png")) as temporary:
+            figure.savefig(temporary, format="png")
 
     def discard(self) -> None:
         for path in (self.dataset, self.checkpoint):

@@ -321,7 +321,7 @@ def test_automatic_step_keeps_the_spin_to_2e_8(parameters: dict[str, float]) -> 
 def test_vectorised(measure: tuple[str, ...]) -> None:
     """The loop over lanes is vector instructions: twelve square roots and divisions a step, all packed."""
     rows = Kernel(MODELS["slip"], DOPRI5, measure).rows
-    block = _make_run_block(MODELS["slip"], DOPRI5, rows, measure)
+    block = _make_run_block(MODELS["slip"], DOPRI5, rows, measure, BLOCK)
     block(np.zeros(len(rows) * LANES))
     assembly = next(iter(block.inspect_asm().values()))
     assert assembly.count("divpd") >= 12

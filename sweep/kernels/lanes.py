@@ -60,13 +60,13 @@ NEGLIGIBLE = 1e-120
 class Kernel:
     """`advance` for one model, method and choice of measurements, and the layout of its images."""
 
-    def __init__(self, model: Model, tableau: Tableau, measure: Iterable[str]) -> None:
+    def __init__(self, model: Model, tableau: Tableau, measure: Iterable[str], block: int = BLOCK) -> None:
         self.model, self.tableau = model, tableau
         self.measure = tuple(name for name in MEASURES if name in measure)
         measured = [row for name in self.measure for row in _MEASURED[name]]
         constants = [f"constant{i}" for i in range(_count_constants(model))]
         self.rows = (*model.states, *constants, *_BASE, *measured)
-        self._advance = _make_advance(model, tableau, self.rows, self.measure)
+        self._advance = _make_advance(model, tableau, self.rows, self.measure, block)
 
     def row(self, name: str) -> int:
         return self.rows.index(name)
@@ -107,7 +107,7 @@ class Kernel:
     def advance(self, images: Array, cells: Array, blocks: int, stop_when_settled: bool) -> None:
         """Move the trajectories `cells` (indices into `images`) on, in place.
 
-        Returns after `blocks` blocks of `BLOCK` steps in every lane, or when all cells have ended.
+        Returns after `blocks` blocks of steps in every lane, or when all cells have ended.
         """
         self._advance(images, cells, blocks, stop_when_settled, numba.get_num_threads())
 
@@ -129,8 +129,8 @@ def _count_constants(model: Model) -> int:
     return len(model.constants({name: np.ones(1) for name in model.parameters}))
 
 
-def _make_advance(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
-    run_block = _make_run_block(model, tableau, rows, measure)
+def _make_advance(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...], block: int) -> Any:
+    run_block = _make_run_block(model, tableau, rows, measure, block)
     inspect = _make_inspect(model, rows, measure)
     n_rows, lanes, status = len(rows), LANES, rows.index("status") * LANES
 
@@ -179,12 +179,12 @@ def _make_advance(model: Model, tableau: Tableau, rows: tuple[str, ...], measure
         for g in numba.prange(groups):
             run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
 
-    name = f"{model.name}-{tableau.name}-{'+'.join(measure)}"
+    name = f"{model.name}-{tableau.name}-{'+'.join(measure)}-{block}"
     return parallel(advance, name, source_file(model.rhs))
 
 
-def _make_run_block(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
-    """Compiled group -> None: `BLOCK` steps of all lanes, with what is measured in every step."""
+def _make_run_block(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...], block: int) -> Any:
+    """Compiled group -> None: `block` steps of all lanes, with what is measured in every step."""
     n, n_constants = len(model.states), _count_constants(model)
     load_states, load_constants = make_load(0, n, LANES), make_load(n, n_constants, LANES)
     store_states = make_store(0, n, LANES)
@@ -193,7 +193,7 @@ def _make_run_block(model: Model, tableau: Tableau, rows: tuple[str, ...], measu
     watch_spin = _make_watch_spin(rows) if count_reversals else _watch_nothing
     STEP, GOAL, DONE, STATUS = (rows.index(name) * LANES for name in ("step", "goal", "done", "status"))
     WORK = rows.index("work") * LANES if add_work else 0
-    lanes, block = LANES, BLOCK
+    lanes = LANES
 
     @numba.njit(error_model="numpy")
     def run_block(group: Any) -> None:

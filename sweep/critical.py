@@ -1,0 +1,176 @@
+"""Critical spins three ways: the paper's formulas, the model's eigenvalues, simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep import dataset, executor
+from sweep.config import Config, Values
+from sweep.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
+from sweep.grid import Array, Grid
+from sweep.kernels import stepsize
+from sweep.kernels.lanes import RUNNING, Kernel
+from sweep.kernels.tableau import DOPRI5
+from sweep.models import MODELS
+from sweep.models.coefficients import rattle_period
+from sweep.models.linear import fastest_motion
+from sweep.prediction import Prediction, predict
+
+WIDTH = 1e-3
+"""Relative width to which simulation brackets a critical spin."""
+
+TINY = 1e-8
+"""Contact point of the rattle whose growth is looked at, in c: linear to sixteen digits."""
+
+# Growth is read between two looks: when the other mode is gone, and this much later.
+_FIRST_LOOK, _LOOK_LATER = 1500.0, 2500.0
+_LOOKS = 24
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """Where a critical spin lies; arrays over the bodies, NaN where it was not found."""
+
+    inner: Array
+    """Closer to zero, where what it is critical for does not happen yet."""
+    outer: Array
+
+    @property
+    def middle(self) -> Array:
+        return (self.inner + self.outer) / 2
+
+
+def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] = lambda _: None) -> xr.Dataset:
+    """Critical spins over all axes of `config` but n0.
+
+    n_c1: where a tiny rattle begins to grow; simulated, by the growth of the energy of one of
+    size `TINY` once the other mode has decayed.  n_c2: where the trajectory from the
+    configuration's start point begins to reverse; simulated, by the count.  Bisection on n0, over
+    all bodies at once, down to `width` relative to the spin.
+
+    Returns
+    -------
+    Dataset over the axes without n0; `*_simulated` with its bracket `*_inner`, `*_outer`, and
+    `critical_reason`, which says why a spin is NaN.
+    """
+    grid = Grid.of(_without_n0(config))
+    model = MODELS[config.model]
+    prediction = predict(model, grid)
+    arrays: dict[str, Array] = dict(dataset.predicted(prediction))
+    arrays.pop("reversals_predicted", None)
+    columns = grid.columns()
+    reason = _reasons(prediction, columns, grid)
+    arrays["critical_reason"] = reason
+    search = np.flatnonzero(reason == EXISTS)
+    for sign, side in ((1, "plus"), (-1, "minus")):
+        for name, grows in (("n_c1", _rattle_grows), ("n_c2", _reverses)):
+            note(f"{name} {side}: bisection over {len(search)} bodies")
+            bracket = _bisect(config, grows, columns, search, sign, width)
+            for suffix, values in (("", bracket.middle), ("_inner", bracket.inner), ("_outer", bracket.outer)):
+                arrays[f"{name}_{side}_simulated{suffix}"] = values
+            reason[search[np.isnan(bracket.middle[search])]] = NOT_FOUND
+    attributes = {"relative_width": width, **dataset.provenance(config, 0.0, grid.size)}
+    return dataset.label(config, grid, arrays, attributes).drop_vars("n0")
+
+
+def _without_n0(config: Config) -> Config:
+    """`config` at one start spin, which no critical spin depends on."""
+    parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
+    cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
+    return replace(config, parameters=parameters, cases=cases or None)
+
+
+def _reasons(prediction: Prediction, columns: dict[str, Array], grid: Grid) -> Array:
+    if prediction.formulas is None:
+        return np.full(grid.size, NO_FRICTION)
+    assert prediction.stability is not None  # it is a model
+    upper = prediction.stability.n_c1[0][grid.bodies()[1]]
+    reason = np.where(np.isinf(upper), NO_COUPLING, np.where(np.isnan(upper), NO_FRICTION, EXISTS))
+    return np.where(columns["mu"] == 0, NO_FRICTION, reason)
+
+
+def _bisect(
+    config: Config, happens: Callable[..., Array], columns: dict[str, Array], search: Array, sign: int, width: float
+) -> Bracket:
+    """Bracket the |n0| from which on `happens`, for the cells `search`, all at once."""
+    cells = len(columns["a"])
+    inner, outer = np.zeros(cells), np.full(cells, 1e-3)
+
+    def ask(which: Array, size: Array) -> Array:
+        return happens(config, {n: v[which] for n, v in columns.items()} | {"n0": sign * size})
+
+    # Walk outwards until it happens.
+    walking = search
+    while len(walking):
+        yes = ask(walking, outer[walking])
+        inner[walking[~yes]] = outer[walking[~yes]]
+        walking = walking[~yes]
+        outer[walking] *= 2
+        walking = walking[outer[walking] < 2]
+    lost = np.setdiff1d(np.arange(cells), search[outer[search] < 2])
+    open_ = np.setdiff1d(search, lost)
+    while len(open_):
+        middle = (inner[open_] + outer[open_]) / 2
+        yes = ask(open_, middle)
+        outer[open_[yes]], inner[open_[~yes]] = middle[yes], middle[~yes]
+        open_ = open_[outer[open_] - inner[open_] > width * outer[open_]]
+    inner[lost] = outer[lost] = np.nan
+    return Bracket(sign * inner, sign * outer)
+
+
+def _reverses(config: Config, columns: dict[str, Array]) -> Array:
+    """Whether trajectories reverse at least once."""
+    kernel, images = _images(config, columns, ("reversals",), config.integrator.t_end)
+    executor.execute(kernel, images, stop_when_settled=True)
+    return np.asarray(images[:, kernel.row("reversals")] > 0)
+
+
+def _rattle_grows(config: Config, columns: dict[str, Array]) -> Array:
+    """Whether a tiny rattle grows, by the mean logarithm of its energy in two series of looks.
+
+    Each series averages over the energy's ripple at uneven intervals; what is left of it blurs the
+    rate by about 1e-6, or 1e-4 of a critical spin at μ = 75.
+    """
+    tiny = columns | {"x0": np.full_like(columns["n0"], TINY), "y0": np.full_like(columns["n0"], TINY)}
+    kernel, images = _images(config, tiny, (), _LOOK_LATER * 2)
+    step = images[:, kernel.row("step")]
+    means = []
+    interval = 1.0 / fastest_motion(kernel.model, tiny)
+    for begin in (_FIRST_LOOK, _FIRST_LOOK + _LOOK_LATER):
+        logs = []
+        for look in range(_LOOKS):
+            _carry_on(kernel, images, np.round((begin + look * 1.618 * interval) / step))
+            logs.append(np.log(_rattle(kernel, images)))
+        means.append(np.mean(logs, axis=0))
+    return np.asarray(means[1] > means[0])
+
+
+def _carry_on(kernel: Kernel, images: Array, steps: Array) -> None:
+    images[:, kernel.row("goal")] = steps
+    images[:, kernel.row("status")] = RUNNING
+    executor.execute(kernel, images, stop_when_settled=False)
+
+
+def _rattle(kernel: Kernel, images: Array) -> Array:
+    n = len(kernel.model.states)
+    states, constants = images[:, :n].T, images[:, n : kernel.row("step")].T
+    _, rattle, _ = kernel.model.energy.py_func(states, constants)  # type: ignore[attr-defined]
+    return np.asarray(np.broadcast_to(rattle, len(images)))
+
+
+def _images(config: Config, columns: dict[str, Array], measure: Any, t_end: float) -> tuple[Kernel, Array]:
+    model = MODELS[config.model]
+    grid = Grid({}, {}, columns)
+    stability = predict(model, grid).stability
+    assert stability is not None  # it is a model
+    kernel = Kernel(model, DOPRI5, measure)
+    if config.integrator.step == "auto":
+        step = stepsize.automatic_step(model, DOPRI5, columns)[0]
+    else:
+        step = np.full(grid.size, config.integrator.step)
+    return kernel, kernel.images(columns, step, t_end, stability.ranges, rattle_period(columns))

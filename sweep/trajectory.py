@@ -1,0 +1,148 @@
+"""Single trajectories, dense in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep import executor
+from sweep.config import Config, ConfigError, Fault
+from sweep.grid import Array, off_the_body
+from sweep.kernels.lanes import RUNNING, Kernel
+from sweep.models import MODELS, TIERS
+from sweep.models.linear import fastest_motion
+from sweep.models.model import Model
+from sweep.parameters import PARAMETERS
+from sweep.run import Plan, as_config, collect, plan
+
+SAMPLES_A_RADIAN = 3
+"""Samples in a radian of the fastest motion: nearly twenty a period."""
+
+# name: units, long_name
+SERIES: dict[str, tuple[str, str]] = {
+    "spin": ("1", "spin about the upward normal, in sqrt(g/c)"),
+    "contact_x": ("1", "contact point along x, in c"),
+    "contact_y": ("1", "contact point along y, in c"),
+    "slip_1": ("1", "slip velocity v_p along x, in sqrt(g c)"),
+    "slip_2": ("1", "slip velocity v_p along y, in sqrt(g c)"),
+    "slip_rate_1": ("1", "time derivative of the slip velocity along x, in g"),
+    "slip_rate_2": ("1", "time derivative of the slip velocity along y, in g"),
+    "v0_rate_1": ("1", "time derivative of v_0 = x_p × omega along x, in g"),
+    "v0_rate_2": ("1", "time derivative of v_0 = x_p × omega along y, in g"),
+    "normal_force": ("1", "normal force R, in m g"),
+    "amplitude_1": ("1", "averaged amplitude A of the first mode"),
+    "amplitude_2": ("1", "averaged amplitude B of the second mode"),
+    "mode_1": ("1", "normal coordinate X"),
+    "mode_2": ("1", "normal coordinate Y"),
+    "energy": ("1", "energy above rest, in m g c"),
+    "dissipated": ("1", "work done against friction, in m g c"),
+}
+
+
+def trajectory(config: Config | str | Path, *, every: float | None = None, **at: float | Sequence[float]) -> xr.Dataset:
+    """Dense series of the cells of `config` picked by parameters, such as ``mu=60, n0=[0.02, 0.05]``.
+
+    Parameters
+    ----------
+    config : a configuration or the path of one
+    every : time between samples, in sqrt(c/g), rounded to whole steps; by default nearly twenty in
+        a period of the fastest motion
+    at : values by parameter; each combination is one trajectory.  Parameters that are axes of
+        `config` and not named take their first value.
+
+    Returns
+    -------
+    Dataset over (trajectory, sample): `time` and the series that the model shows, NaN behind the
+    end of a trajectory; over (trajectory): all that a sweep gives for the cell, from the same run,
+    whose steps the sampling does not touch.
+    """
+    job = plan(_choose(as_config(config, {}), {name: np.atleast_1d(values) for name, values in at.items()}))
+    start = job.images.copy()
+    executor.execute(job.kernel, job.images, stop_when_settled=job.config.integrator.stop_when_settled)
+    summary = collect(job, 0.0).reset_coords(drop=False)
+    series = [_sample(job, start[[i]], job.images[i], every) for i in range(len(start))]
+    length = max(len(s["time"]) for s in series)
+    variables: dict[str, Any] = {}
+    for name in series[0]:
+        units, words = ("1", "time, in sqrt(c/g)") if name == "time" else SERIES[name]
+        padded = np.full((len(series), length), np.nan)
+        for row, one in zip(padded, series, strict=True):
+            row[: len(one[name])] = one[name]
+        variables[name] = (("trajectory", "sample"), padded, {"units": units, "long_name": words})
+    flat = summary.rename({"case": "trajectory"})
+    index = ("trajectory", flat["trajectory"].values, {"units": "1", "long_name": "number of the trajectory"})
+    return flat.drop_vars("trajectory").assign(variables).assign_coords(trajectory=index)
+
+
+def _choose(config: Config, at: dict[str, Array]) -> Config:
+    """`config` with the cells picked by `at` as its cases; `ConfigError` if they cannot be."""
+    constants = {name: v.numbers[0] for name, v in config.parameters.items()}
+    if config.cases is not None:
+        constants |= {name: column[0] for name, column in config.cases.items()}
+    faults = [
+        Fault("--at", None, None, (name,), message)
+        for name, values in at.items()
+        if (message := _wrong(config, name, values))
+    ]
+    if faults:
+        raise ConfigError(faults)
+    combinations = list(product(*at.values())) if at else [()]
+    cases = {
+        name: tuple(dict(zip(at, values, strict=True)).get(name, constant) for values in combinations)
+        for name, constant in constants.items()
+    }
+    chosen = replace(config, parameters={}, cases=cases)
+    if beyond := off_the_body(chosen):
+        raise ConfigError([Fault("--at", None, None, (), beyond)])
+    return chosen
+
+
+def _wrong(config: Config, name: str, values: Array) -> str:
+    """What is wrong with values asked for a parameter; "" if nothing is."""
+    model = TIERS[config.model]
+    if not isinstance(model, Model):
+        return f"the {model.name} model has no trajectories; allowed: {', '.join(MODELS)}"
+    if name not in model.parameters:
+        return f"no parameter of the {model.name} model; allowed: {', '.join(model.parameters)}"
+    wrong = [v for v in values if not (np.isfinite(v) and PARAMETERS[name].allows(v))]
+    return f"{wrong[0]:g}; allowed: {PARAMETERS[name].allowed}" if wrong else ""
+
+
+def _sample(job: Plan, start: Array, end: Array, every: float | None) -> dict[str, Array]:
+    """Step the trajectory again to its end, looking at it on the way.
+
+    Moving the goal from sample to sample runs the very instructions of the sweep, where a kernel
+    of its own could round differently.
+    """
+    model = job.kernel.model
+    # Blocks of one step: a look costs what it shows, not a hundred steps of idle lanes.
+    kernel = Kernel(model, job.kernel.tableau, job.kernel.measure, block=1)
+    step, steps = float(end[kernel.row("step")]), int(end[kernel.row("done")])
+    stride = max(1, round(_interval(job) / step if every is None else every / step))
+    goals = np.unique([*range(0, steps, stride), steps])
+    images, snapshots = start.copy(), [start[0].copy()]
+    for goal in goals[1:]:
+        images[:, kernel.row("goal")] = goal
+        images[:, kernel.row("status")] = RUNNING
+        kernel.advance(images, np.zeros(1, dtype=np.int64), int(goal - images[0, kernel.row("done")]), False)
+        snapshots.append(images[0].copy())
+    table = np.array(snapshots)
+    n = len(model.states)
+    states, constants = table[:, :n].T, table[0, n : kernel.row("step"), None]
+    spin, rattle, inertia = model.energy.py_func(states, constants)  # type: ignore[attr-defined]
+    series = {"time": goals * step, "spin": spin, **model.observe(states, constants)}
+    if "energy_error" in kernel.measure:
+        series["energy"] = rattle + 0.5 * inertia * spin**2
+        series["dissipated"] = table[:, kernel.row("work")]
+    return {name: np.broadcast_to(values, goals.shape) for name, values in series.items()}
+
+
+def _interval(job: Plan) -> float:
+    columns = {name: values[:1] for name, values in job.grid.columns().items()}
+    return float(1 / (SAMPLES_A_RADIAN * max(fastest_motion(job.kernel.model, columns)[0], 0.1)))
