@@ -137,6 +137,27 @@ def critical(config: Path, width: float, output: Path | None, settings: tuple[st
 
 
 @main.command()
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    default="runs/reproduce",
+    show_default=True,
+    help="Folder for the report.",
+)
+def reproduce(output: Path) -> None:
+    """Every number and figure of Takano (2011) beside ours, in one HTML report.
+
+    Exit code 0 only if every row holds, 1 otherwise.
+    """
+    with _explained():
+        from sweep.reproduce import reproduce as compare
+
+        failed = compare(output, click.echo)
+        click.echo(f"\nwrote {output / 'reproduce.html'}; {len(failed)} rows do not hold")
+        sys.exit(1 if failed else DONE)
+
+
+@main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--var", "variable", help="Variable to draw [default: reversals, simulated beside predicted].")
 @click.option("--output", type=click.Path(path_type=Path), help="PNG file [default: beside FILE].")

@@ -18,7 +18,8 @@ from sweep.kernels.lanes import RUNNING, Kernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
-from sweep.models.linear import fastest_motion
+from sweep.models.linear import growth_rate
+from sweep.models.model import stack
 from sweep.prediction import Prediction, predict
 
 WIDTH = 1e-3
@@ -27,8 +28,9 @@ WIDTH = 1e-3
 TINY = 1e-8
 """Contact point of the rattle whose growth is looked at, in c: linear to sixteen digits."""
 
-# Growth is read between two looks: when the other mode is gone, and this much later.
-_FIRST_LOOK, _LOOK_LATER = 1500.0, 2500.0
+# Growth is read between two series of looks: when the other mode is gone, and later; in times that
+# the slower rattle takes to decay by e at rest.
+_FIRST_LOOK, _SECOND_LOOK = 5.0, 13.0
 _LOOKS = 24
 
 
@@ -134,14 +136,15 @@ def _rattle_grows(config: Config, columns: dict[str, Array]) -> Array:
     """Whether a tiny rattle grows, by the mean logarithm of its energy in two series of looks.
 
     Each series averages over the energy's ripple at uneven intervals; what is left of it blurs the
-    rate by about 1e-6, or 1e-4 of a critical spin at μ = 75.
+    critical spin by less than 1e-4.
     """
     tiny = columns | {"x0": np.full_like(columns["n0"], TINY), "y0": np.full_like(columns["n0"], TINY)}
-    kernel, images = _images(config, tiny, (), _LOOK_LATER * 2)
-    step = images[:, kernel.row("step")]
+    model = MODELS[config.model]
+    decay = -growth_rate(model, stack(model.constants(tiny)), np.zeros_like(columns["n0"]))
+    kernel, images = _images(config, tiny, (), float(2 * _SECOND_LOOK / decay.min()))
+    step, interval = images[:, kernel.row("step")], rattle_period(tiny) / (2 * np.pi)
     means = []
-    interval = 1.0 / fastest_motion(kernel.model, tiny)
-    for begin in (_FIRST_LOOK, _FIRST_LOOK + _LOOK_LATER):
+    for begin in (_FIRST_LOOK / decay, _SECOND_LOOK / decay):
         logs = []
         for look in range(_LOOKS):
             _carry_on(kernel, images, np.round((begin + look * 1.618 * interval) / step))

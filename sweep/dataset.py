@@ -58,6 +58,7 @@ _FORMULA, _EIGENVALUES = "the formula of Takano (2011)", "the eigenvalues of the
 
 VARIABLES: dict[str, Variable] = {
     "reversals": Variable("int16", "1", "spin reversals of the simulated trajectory"),
+    "t_first_reversal": Variable("float64", "1", "time of the first spin reversal, in sqrt(c/g)"),
     "t_last_reversal": Variable("float64", "1", "time of the last spin reversal, in sqrt(c/g)"),
     "spin_mean": Variable("float64", "1", "spin averaged over the last full window before t_stop, in sqrt(g/c)"),
     "status": Variable("int8", "1", "how the simulation of the trajectory ended", STATUSES),
@@ -110,6 +111,8 @@ def measured(kernel: Kernel, images: Array, t_end: float) -> dict[str, Array]:
         closed = row("done") * row("step") >= row("period")
         result["reversals"] = row("reversals")
         result["t_last_reversal"] = row("last_reversal")
+        if "first_reversal" in kernel.measure:
+            result["t_first_reversal"] = row("first_reversal")
         result["spin_mean"] = np.where(closed, row("closed_window") / row("period"), np.nan)
     if "energy_error" in kernel.measure:
         start, violation = row("energy_start"), row("violation")

@@ -62,7 +62,11 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     end of a trajectory; over (trajectory): all that a sweep gives for the cell, from the same run,
     whose steps the sampling does not touch.
     """
-    job = plan(_choose(as_config(config, {}), {name: np.atleast_1d(values) for name, values in at.items()}))
+    job = plan(
+        _choose(
+            as_config(config, {}), {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}
+        )
+    )
     start = job.images.copy()
     executor.execute(job.kernel, job.images, stop_when_settled=job.config.integrator.stop_when_settled)
     summary = collect(job, 0.0).reset_coords(drop=False)
@@ -80,7 +84,7 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     return flat.drop_vars("trajectory").assign(variables).assign_coords(trajectory=index)
 
 
-def _choose(config: Config, at: dict[str, Array]) -> Config:
+def _choose(config: Config, at: dict[str, list[float]]) -> Config:
     """`config` with the cells picked by `at` as its cases; `ConfigError` if they cannot be."""
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
@@ -103,7 +107,7 @@ def _choose(config: Config, at: dict[str, Array]) -> Config:
     return chosen
 
 
-def _wrong(config: Config, name: str, values: Array) -> str:
+def _wrong(config: Config, name: str, values: list[float]) -> str:
     """What is wrong with values asked for a parameter; "" if nothing is."""
     model = TIERS[config.model]
     if not isinstance(model, Model):

@@ -49,7 +49,10 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
     for name, variable in small.variables.items():
         assert {"long_name", "units"} <= set(variable.attrs), name
     assert small["delta"].attrs["units"] == "radian"
-    assert set(small.data_vars) == set(VARIABLES)
+    assert set(small.data_vars) == {n for n in VARIABLES if "simulated" not in n} - {
+        "critical_reason",
+        "t_first_reversal",
+    }
     assert {name: str(small[name].dtype) for name in ("reversals", "status", "spin_final", "reversals_predicted")} == {
         "reversals": "int16", "status": "int8", "spin_final": "float64", "reversals_predicted": "int16",
     }  # fmt: skip

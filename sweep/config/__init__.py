@@ -14,6 +14,7 @@ from sweep.config.faults import ConfigError, Fault
 from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import off_the_body
 from sweep.models import TIERS
+from sweep.models.model import Tier
 from sweep.parameters import PARAMETERS
 
 __all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "load_config"]
@@ -85,7 +86,7 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         model=checked.model,
         parameters=parameters,
         integrator=checked.integrator,
-        measure=model.measures if checked.measure is None else tuple(checked.measure),
+        measure=_measures(checked.measure, model),
         max_failed_fraction=checked.max_failed_fraction,
         cases=columns,
         cases_file=checked.cases,
@@ -93,6 +94,12 @@ def _resolve(checked: Any, source: document.Document) -> Config:
     if beyond := off_the_body(config):
         raise ConfigError([source.fault(("start", "x0"), beyond)])
     return config
+
+
+def _measures(asked: list[str] | None, model: Tier) -> tuple[str, ...]:
+    if asked is not None:
+        return tuple(asked)
+    return tuple(name for name in schema.DEFAULT_MEASURES if name in model.measures)
 
 
 def _rank(name: str, names: tuple[str, ...]) -> int:
@@ -120,3 +127,5 @@ def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document
             yield source.fault(
                 ("measure", i), f"not measured on the {model.name} model; allowed: {', '.join(model.measures)}"
             )
+        elif name == "first_reversal" and "reversals" not in checked.measure:
+            yield source.fault(("measure", i), "measured with the reversals; allowed: reversals beside it")

@@ -18,6 +18,8 @@ from sweep.kernels.lanes import MEASURES
 from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
+DEFAULT_MEASURES = ("reversals", "energy_error")
+
 MAX_AXIS = 10_000_000
 
 
@@ -136,7 +138,7 @@ class _Top(_Strict):
         ]
         | None
     ) = None
-    """By default all that the model has."""
+    """By default `DEFAULT_MEASURES`, as far as the model has them."""
     max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
 
 

@@ -34,7 +34,7 @@ BLOCK = 128
 # Ends of a trajectory; `dataset` gives them their meanings for the user.
 RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX = range(6)
 
-MEASURES = ("reversals", "energy_error")
+MEASURES = ("reversals", "energy_error", "first_reversal")
 
 # Ranges of spin in which the rattle decays: about zero, and the next to either side.
 _STABLE = ("stable_from", "stable_to", "below_from", "below_to", "above_from", "above_to")
@@ -42,6 +42,7 @@ _BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energ
 _MEASURED = {
     "reversals": ("step_rate", "period", "phase", "window", "closed_window", "reversals", "last_reversal"),
     "energy_error": ("work", "violation"),
+    "first_reversal": ("first_reversal",),
 }
 
 # A rattle settles when it could not carry the spin across a limit even with this many times its energy.
@@ -102,6 +103,8 @@ class Kernel:
             images[:, self.row("period")] = period
             images[:, self.row("step_rate")] = goal / t_end
             images[:, self.row("last_reversal")] = np.nan
+        if "first_reversal" in self.measure:
+            images[:, self.row("first_reversal")] = np.nan
         return images
 
     def advance(self, images: Array, cells: Array, blocks: int, stop_when_settled: bool) -> None:
@@ -233,6 +236,9 @@ def _make_watch_spin(rows: tuple[str, ...]) -> Any:
         for name in ("step_rate", "period", "phase", "window", "closed_window", "reversals", "last_reversal")
     )
 
+    keep_first = "first_reversal" in rows
+    FIRST = rows.index("first_reversal") * LANES if keep_first else 0
+
     @inline
     def watch_spin(group: Any, lane: int, accepted: Any, spin: Any, spin_integral: Any, h: Any, now: Any) -> None:
         period, previous = group[PERIOD + lane], group[CLOSED + lane]
@@ -247,6 +253,9 @@ def _make_watch_spin(rows: tuple[str, ...]) -> Any:
         crossing = now - over - period * (0.5 + closed / (closed - previous))
         group[COUNT + lane] += 1.0 if reverses else 0.0
         group[LAST + lane] = crossing if reverses else group[LAST + lane]
+        if keep_first:
+            first = reverses & (group[COUNT + lane] == 1.0)
+            group[FIRST + lane] = crossing if first else group[FIRST + lane]
         group[CLOSED + lane] = closed if closes else previous
         group[PHASE + lane] = (over if closes else phase) if accepted else group[PHASE + lane]
         group[WINDOW + lane] = (after if closes else window) if accepted else group[WINDOW + lane]

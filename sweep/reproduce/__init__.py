@@ -1,0 +1,5 @@
+"""Every number and figure of Takano (2011) beside ours, as rows with a verdict and redrawn figures."""
+
+from sweep.reproduce.report import reproduce
+
+__all__ = ["reproduce"]

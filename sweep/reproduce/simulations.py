@@ -1,0 +1,269 @@
+"""The paper's numerical results (sec. sim), run again and drawn in its arrangement."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from sweep.config import Config, Integrator, Values
+from sweep.grid import Array
+from sweep.models import MODELS, TIERS, analytic
+from sweep.parameters import PARAMETERS
+from sweep.reproduce.rows import Section, against, against_paper, states
+from sweep.reproduce.theory import standard
+from sweep.run import run
+from sweep.trajectory import trajectory
+from sweep.trajectory_plot import draw_spin
+
+
+def configure(model: str = "slip", t_end: float = 30_000.0, measure: Any = ("reversals",), **parameters: Any) -> Config:
+    """The paper's standard case at μ = 60 with some parameters replaced; arrays are axes."""
+    values = {name: p.default for name, p in PARAMETERS.items() if name in TIERS[model].parameters}
+    if "mu" in values:
+        values["mu"] = 60.0
+    chosen = {}
+    for name, value in (values | {n: v for n, v in parameters.items() if n in values}).items():
+        numbers = tuple(np.atleast_1d(np.asarray(value, float)).tolist())
+        chosen[name] = Values(numbers, np.ndim(value) > 0, list(numbers))
+    order = sorted(chosen, key=lambda n: ("mu", "b", "n0").index(n) if n in ("mu", "b", "n0") else 3)
+    return Config(
+        name="reproduce",
+        model=model,
+        parameters={n: chosen[n] for n in order},
+        integrator=Integrator(t_end=t_end),
+        measure=tuple(m for m in measure if m in TIERS[model].measures),
+        max_failed_fraction=1.0,
+    )
+
+
+def slip_ratio() -> Section:
+    """Figs. v01vp1m100 … v02vp2m200: the slip's acceleration is small beside that of v_0."""
+    both = trajectory(configure(t_end=400.0), mu=[100, 200])
+    section = Section("Is dv_p/dt small beside dv_0/dt?")
+    for i, mu in enumerate((100, 200)):
+        figure = Figure(figsize=(8, 3), dpi=100, layout="constrained")
+        for axes, component in zip(figure.subplots(1, 2), (1, 2), strict=True):
+            # The start at rest makes the slip jump once; the figures' amplitudes are those after.
+            late = both.isel(trajectory=i, sample=both["time"][i].values > 1.0)
+            v0, vp = late[f"v0_rate_{component}"], late[f"slip_rate_{component}"]
+            ratio = float(np.sqrt((vp**2).mean() / (v0**2).mean()))
+            section.rows.append(
+                against_paper(
+                    f"slip_ratio_{mu}", f"amplitude (rms) of v̇_p{component} over v̇_0{component}, μ = {mu}", ratio
+                )
+            )
+            axes.plot(late["time"], v0, linewidth=0.5, label=f"v̇_0{component}")
+            axes.plot(late["time"], vp, linewidth=0.5, label=f"v̇_p{component}")
+            axes.legend(fontsize=7)
+            axes.set_xlabel("t")
+        section.figures.append((f"v01vp1m{mu}, v02vp2m{mu}: μ = {mu}", figure))
+    return section
+
+
+def critical_spins() -> Section:
+    """Fig. nc21pm: below n_c1 the rattle decays, from n_c2 on the spin reverses."""
+    section = Section("Spins below, between and above the critical ones, μ = 75")
+    figure = Figure(figsize=(8, 6.5), dpi=100, layout="constrained")
+    for axes, starts in zip(figure.subplots(2, 1), ((0.0015, 0.003, 0.005), (-0.006, -0.015, -0.025)), strict=True):
+        three = trajectory(configure(measure=("reversals", "energy_error"), t_end=8000.0), mu=75, n0=starts, every=2.0)
+        draw_spin(axes, three)
+        for i, (n0, grows, reverses) in enumerate(zip(starts, (False, True, True), (False, False, True), strict=True)):
+            one = three.isel(trajectory=i)
+            rattle = one["energy"] - 0.5 * 21.8 * one["spin"] ** 2
+            early, peak = float(rattle[:40].mean()), float(rattle[40:].max())
+            found = (peak > 3 * early, int(one["reversals"]) > 0)
+            section.rows.append(
+                states(
+                    f"n0 = {n0:g}",
+                    "nc21pm",
+                    _behaviour(grows, reverses),
+                    _behaviour(*found),
+                    found == (grows, reverses),
+                )
+            )
+    section.figures.append(("nc21pm: (a) positive, (b) negative start spin", figure))
+    return section
+
+
+def _behaviour(grows: bool, reverses: bool) -> str:
+    return f"rattle {'grows' if grows else 'does not grow'}, spin {'reverses' if reverses else 'does not reverse'}"
+
+
+def friction() -> Section:
+    """Fig. mu601000: counts at three frictions, and the way to rolling."""
+    section = Section("From three reversals to rolling")
+    figure = Figure(figsize=(8, 6.5), dpi=100, layout="constrained")
+    top, bottom = figure.subplots(2, 1)
+    three = trajectory(configure(), mu=[60, 130, 200], every=3.0)
+    draw_spin(top, three.isel(sample=three["time"][0].values < 6000), critical=False)
+    for i, mu in enumerate((60, 130, 200)):
+        section.rows.append(against_paper(f"reversals_{mu}", f"reversals at μ = {mu}", int(three["reversals"][i])))
+    rough = trajectory(configure(t_end=1500.0), mu=[500, 1000, 1500], every=0.25)
+    rolling = trajectory(configure("noslip", t_end=1500.0), every=0.25)
+    draw_spin(bottom, rough, critical=False)
+    bottom.plot(rolling["time"][0], rolling["spin"][0], "k--", linewidth=0.8, label="no slip")
+    bottom.legend(fontsize=7)
+    distance = [_distance(rough.isel(trajectory=i), rolling.isel(trajectory=0), 400.0) for i in range(3)]
+    closer = distance[0] > distance[1] > distance[2]
+    found = ", ".join(f"{d:.2g}" for d in distance)
+    section.rows.append(
+        states(
+            "largest distance from no-slip, t < 400, μ = 500, 1000, 1500", "mu601000 (b)", "falls with μ", found, closer
+        )
+    )
+    after = configure(t_end=6000.0)
+    endless = replace(after, integrator=Integrator(t_end=6000.0, stop_when_settled=False))
+    tail = trajectory(endless, mu=60, every=3.0)["spin"][0].values[-100:]
+    found = f"varies by {np.ptp(tail) / abs(tail[-1]):.1g} of itself over 5700 < t < 6000"
+    constant = bool(np.ptp(tail) < 1e-3 * abs(tail[-1]))
+    section.rows.append(states("spin after the last reversal, μ = 60", "sec. sim C", "stays constant", found, constant))
+    section.figures.append(("mu601000: (a) μ = 60, 130, 200, (b) μ = 500, 1000, 1500 and no slip", figure))
+    return section
+
+
+def _distance(one: xr.Dataset, other: xr.Dataset, until: float) -> float:
+    times = np.arange(0, until, 0.25)
+    spins = [np.interp(times, d["time"].dropna("sample"), d["spin"].dropna("sample")) for d in (one, other)]
+    return float(np.abs(spins[0] - spins[1]).max())
+
+
+def count_against_friction() -> Section:
+    """Fig. nrvsmu: predicted and simulated reversals over μ."""
+    maps = run(configure(mu=np.arange(20, 201, 2.0)))
+    ours, theirs, mu = (
+        maps["reversals"].values.astype(int),
+        maps["reversals_predicted"].values.astype(int),
+        maps["mu"].values,
+    )
+    apart = np.flatnonzero(np.abs(ours - theirs) > 1)
+    limit = float(mu[apart[0] - 1]) if len(apart) else float(mu[-1])
+    rough = mu > 70
+    larger = float((theirs >= ours)[rough].mean())
+    low, high = (float((ours == theirs)[part].mean()) for part in (~rough, rough))
+    figure = Figure(figsize=(7, 3.6), dpi=100, layout="constrained")
+    axes = figure.subplots()
+    axes.plot(mu, theirs, "s", fillstyle="none", label="n_r:ap, predicted")
+    axes.plot(mu, ours, "x", label="n_r:ex, simulated")
+    axes.set(xlabel="μ", ylabel="n_r")
+    axes.legend()
+    section = Section("Reversals against friction", figures=[("nrvsmu", figure)])
+    section.rows = [
+        against_paper(
+            "agree_up_to",
+            "counts agree within one up to μ =",
+            limit,
+            f"equal in {low:.0%} of the cells up to 70, in {high:.0%} beyond",
+        ),
+        states(
+            "beyond μ = 70, n_ap >= n_ex", "nrvsmu", "n_ap is larger", f"in {larger:.0%} of the cells", larger > 0.95
+        ),
+    ]
+    return section
+
+
+def count_against_shape() -> Section:
+    """Figs. vsb and lf: reversals over b beside the form factor."""
+    b = np.linspace(1.2, 9.8, 87)
+    maps = run(configure(mu=np.array([100.0, 200.0]), b=b))
+    figure = Figure(figsize=(7, 6), dpi=100, layout="constrained")
+    top, bottom = figure.subplots(2, 1, sharex=True)
+    section = Section("Reversals against shape", figures=[("vsb and lf: counts and form factor over b", figure)])
+    factor = analytic.form_factor(standard(b=b))
+    best = analytic.best_b(10.0)
+    for i, mu in enumerate((100, 200)):
+        count = maps["reversals"].values[i].astype(float)
+        top.plot(b, count, "x", label=f"μ = {mu}")
+        smooth = _running_median(count, 9)
+        found = float(b[smooth == smooth.max()].mean())
+        predicted = maps["reversals_predicted"].values[i]
+        peak = float(b[predicted == predicted.max()].mean())
+        section.rows.append(
+            against(
+                f"best b, simulated, μ = {mu}",
+                "vsb",
+                best,
+                found,
+                1.8,
+                "«similar to the form factor»",
+                f"the paper's own n_r is largest at b = {peak:.1f}: beside L(f) it has |sin θ cos θ|, "
+                "and θ depends on b too",
+            )
+        )
+        likeness = float(np.corrcoef(smooth, factor)[0, 1])
+        section.rows.append(
+            states(
+                f"n_r over b is like L(f), μ = {mu}", "vsb", "similar", f"correlation {likeness:.2f}", likeness > 0.7
+            )
+        )
+    top.set_ylabel("n_r:ex")
+    top.legend()
+    bottom.plot(b, factor)
+    bottom.axvline(best, linestyle="--", color="0.5")
+    bottom.set(xlabel="b", ylabel="L(f)")
+    return section
+
+
+def _running_median(values: Array, width: int) -> Array:
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))
+
+
+def ladder() -> Section:
+    """How good each rung is: count, reversal times and cost of each model beside the full one."""
+    mu, b = np.linspace(20, 200, 19), np.linspace(1.5, 9.0, 16)
+    measure = ("reversals", "first_reversal")
+    maps = {}
+    for name in (*MODELS, "analytic"):
+        config = configure(name, t_end=15_000.0, measure=measure, mu=mu, b=b)
+        tiny = {n: replace(v, numbers=v.numbers[:1]) for n, v in config.parameters.items()}
+        run(replace(config, parameters=tiny, integrator=Integrator(t_end=10.0)))  # compiles
+        maps[name] = run(config)
+    full = maps["slip"]
+    lines = [
+        [
+            "model",
+            "equal counts",
+            "within one",
+            "first reversal off by (median)",
+            "last reversal off by (median)",
+            "trajectories/s",
+        ]
+    ]
+    figure = Figure(figsize=(12, 3.6), dpi=100, layout="constrained")
+    panels = figure.subplots(1, 3, sharey=True)
+    for name, axes in zip(("effective", "averaged", "analytic"), panels, strict=True):
+        off = maps[name]["reversals"].astype(int) - full["reversals"].astype(int)
+        mesh = axes.pcolormesh(b, mu, off.transpose("mu", "b"), cmap="RdBu_r", vmin=-6, vmax=6, shading="nearest")
+        axes.set(title=name, xlabel="b")
+    panels[0].set_ylabel("μ")
+    figure.colorbar(mesh, ax=list(panels), label="count minus the full model's")
+    for name, one in maps.items():
+        lines.append(
+            [name, *_agreement(one, full), f"{one.attrs['trajectories_per_second']:.3g}" if name in MODELS else "—"]
+        )
+    caption = (
+        "19 × 16 cells, μ = 20 … 200, b = 1.5 … 9, n0 = 0.05, t < 15 000; no-slip: 16 cells, it never stops reversing"
+    )
+    return Section("How good is each rung", figures=[(caption, figure)], tables=[(caption, lines)])
+
+
+def _agreement(one: xr.Dataset, full: xr.Dataset) -> list[str]:
+    if "mu" in one.dims:
+        off = abs(one["reversals"].astype(int) - full["reversals"].astype(int)).values
+        shares = [f"{(off == 0).mean():.1%}", f"{(off <= 1).mean():.1%}"]
+    else:
+        shares = ["—", "—"]
+    times = []
+    for name in ("t_first_reversal", "t_last_reversal"):
+        if name not in one or (name == "t_last_reversal" and "mu" not in one.dims):
+            times.append("—")
+            continue
+        relative = abs(one[name] / full[name] - 1)
+        if "mu" in one.dims:
+            relative = relative.where(one["reversals"] == full["reversals"])
+        times.append(f"{float(relative.median()):.1%}")
+    return [*shares, *times]

@@ -1,0 +1,89 @@
+"""The report of the paper's numbers, and that a wrong coefficient anywhere shows in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sweep.cli import main
+from sweep.models import MODELS, analytic, coefficients
+from sweep.reproduce import report, rows, simulations, theory
+from sweep.reproduce.rows import Section
+
+GROUPS: dict[str, Callable[[], list[Any]]] = {
+    "slip": theory._slip_rows,
+    "noslip": theory._rolling_rows,
+    "effective": theory._reduced_rows,
+    "averaged": theory._reduced_rows,
+}
+
+
+def failures(group: Callable[[], list[Any]]) -> list[str]:
+    return [row.what for row in group() if not row.holds]
+
+
+@pytest.mark.parametrize("group", sorted(set(GROUPS.values()), key=lambda g: g.__name__), ids=lambda g: g.__name__)
+def test_the_models_agree_among_themselves(group: Callable[[], list[Any]]) -> None:
+    assert failures(group) == []
+
+
+# A coefficient of each kind: shape, inertia, friction; frequency, coupling, friction.
+@pytest.mark.parametrize(
+    ("name", "index"),
+    [("slip", 0), ("slip", 4), ("slip", 9), ("slip", 10), ("noslip", 1), ("noslip", 5), ("effective", 2),
+     ("effective", 6), ("effective", 9), ("averaged", 0), ("averaged", 1), ("averaged", 2), ("averaged", 3)],
+)  # fmt: skip
+def test_a_wrong_coefficient_of_a_model_shows(name: str, index: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = MODELS[name]
+
+    def wrong(columns: Any) -> tuple[np.ndarray, ...]:
+        values = list(right.constants(columns))
+        values[index] = 1.1 * values[index]
+        return tuple(values)
+
+    monkeypatch.setitem(MODELS, name, replace(right, constants=wrong))
+    assert failures(GROUPS[name])
+
+
+def test_a_wrong_coefficient_of_the_formulas_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong(columns: Any) -> coefficients.Coefficients:
+        k = coefficients.coefficients(columns)
+        return replace(k, m1=1.01 * k.m1)
+
+    monkeypatch.setattr(analytic, "coefficients", wrong)
+    assert failures(lambda: theory.formulas().rows)
+
+
+def test_command_fails_with_the_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def two(holds: bool) -> Callable[[], Section]:
+        return lambda: Section(
+            "Two", [rows.below("one", "eq", 1.0, 2.0, "why"), rows.states("<two>", "eq", "a", "b", holds)]
+        )
+
+    command = ["reproduce", "--output", str(tmp_path)]
+    monkeypatch.setattr(report, "SECTIONS", (theory.formulas, two(True)))
+    assert CliRunner().invoke(main, command, catch_exceptions=False).exit_code == 0
+    monkeypatch.setattr(report, "SECTIONS", (theory.formulas, two(False)))
+    result = CliRunner().invoke(main, command, catch_exceptions=False)
+    assert result.exit_code == 1
+    assert "FAIL <two>" in result.stdout
+    page = (tmp_path / "reproduce.html").read_text(encoding="utf-8")
+    assert "&lt;two&gt;" in page
+    assert "does not hold" in page
+    assert "http" not in page.replace("http-equiv", "")
+
+
+def test_every_published_number_is_in_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = set()
+    monkeypatch.setattr(theory, "against_paper", lambda key, *_: asked.add(key))
+    monkeypatch.setattr(simulations, "against_paper", lambda key, *_: asked.add(key))
+    theory.formulas()
+    source = Path(simulations.__file__).read_text(encoding="utf-8")
+    left = set(rows.published()) - asked
+    assert all(f'"{key}"' in source or f'"{key.rsplit("_", 1)[0]}_{{mu}}"' in source for key in left), left
