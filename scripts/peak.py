@@ -104,7 +104,7 @@ def plain(x: Any) -> float:
 def flops_per_step() -> int:
     """Of one dopri5 step of the slip model without measurements."""
     model = MODELS["slip"]
-    names: dict[str, Any] = {"rhs": model.rhs.py_func}
+    names: dict[str, Any] = {"rhs": model.rhs}
     exec(step_source(DOPRI5, len(model.states)), names)
     y = tuple(map(Counting, (1e-3, 2e-3, 1e-3, 1e-3, -0.05, 1e-5, 1e-5)))
     p = tuple(map(Counting, (100.0, -2.7, 9.1, 1.0, 0.5, 0.05, 0.05, -0.8, 0.98, -0.83, 60.0)))

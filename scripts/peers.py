@@ -94,7 +94,7 @@ class Problem:
 
     def spin(self, states: Array) -> Array:
         """Of states of shape (states, trajectories)."""
-        return np.asarray(MODEL.rhs.py_func(states, self.constants)[1][0])
+        return np.asarray(MODEL.rhs(states, self.constants)[1][0])
 
 
 @dataclass
@@ -122,7 +122,7 @@ class Entry:
 
 def traced_rhs(sqrt: Callable[[Any], Any]) -> Callable[..., Any]:
     """The model's right-hand side for symbols: the same code with another square root."""
-    return FunctionType(MODEL.rhs.py_func.__code__, {"np": SimpleNamespace(sqrt=sqrt)})
+    return FunctionType(MODEL.rhs.__code__, {"np": SimpleNamespace(sqrt=sqrt)})
 
 
 def count_constants() -> int:

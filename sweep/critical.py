@@ -162,7 +162,7 @@ def _carry_on(kernel: Kernel, images: Array, steps: Array) -> None:
 def _rattle(kernel: Kernel, images: Array) -> Array:
     n = len(kernel.model.states)
     states, constants = images[:, :n].T, images[:, n : kernel.row("step")].T
-    _, rattle, _ = kernel.model.energy.py_func(states, constants)  # type: ignore[attr-defined]
+    _, rattle, _ = kernel.model.energy(states, constants)
     return np.asarray(np.broadcast_to(rattle, len(images)))
 
 

@@ -100,7 +100,7 @@ def measured(kernel: Kernel, images: Array, t_end: float) -> dict[str, Array]:
     def row(name: str) -> Array:
         return np.asarray(images[:, kernel.row(name)])
 
-    spin, _, _ = model.energy.py_func(states, constants)  # type: ignore[attr-defined]
+    spin, _, _ = model.energy(states, constants)
     result = {
         "status": row("status"),
         "spin_final": spin,

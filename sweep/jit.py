@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import platform
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +13,7 @@ import numba
 import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.registry import cpu_target
+from numba.extending import register_jitable
 
 # contract: fuse a*b + c into one FMA; nsz, arcp: free on the values met here.
 # Not nnan/ninf: they turn `x > 0` and isfinite(x) into constants for the very states to be caught.
@@ -27,9 +27,13 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FASTMATH}
 _NUMERIC_SOURCES = ("jit.py", "models/*.py", "kernels/*.py")
 
 
-def inline(function: Callable[..., Any]) -> Any:
-    """Compile `function` so that it dissolves into the loop that calls it."""
-    return numba.njit(function, forceinline=True, **OPTIONS)
+def inline(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Let `function` dissolve into compiled code that calls it.
+
+    Called from Python it stays Python, all the way down: on arrays, real or complex, it compiles nothing.
+    """
+    jitable: Callable[..., Any] = register_jitable(forceinline=True, **OPTIONS)(function)
+    return jitable
 
 
 def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -> Any:
@@ -61,11 +65,6 @@ def fingerprint(*modules: str) -> str:
     for version in (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__):
         digest.update(version.encode())
     return digest.hexdigest()[:16]
-
-
-def source_file(function: Any) -> str:
-    """The file that defines a (compiled) function."""
-    return inspect.getfile(getattr(function, "py_func", function))
 
 
 class _SpecialisedCache(FunctionCache):

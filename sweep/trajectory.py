@@ -139,7 +139,7 @@ def _sample(job: Plan, start: Array, end: Array, every: float | None) -> dict[st
     table = np.array(snapshots)
     n = len(model.states)
     states, constants = table[:, :n].T, table[0, n : kernel.row("step"), None]
-    spin, rattle, inertia = model.energy.py_func(states, constants)  # type: ignore[attr-defined]
+    spin, rattle, inertia = model.energy(states, constants)
     series = {"time": goals * step, "spin": spin, **model.observe(states, constants)}
     if "energy_error" in kernel.measure:
         series["energy"] = rattle + 0.5 * inertia * spin**2

@@ -50,7 +50,7 @@ def run(table: np.ndarray, *, kernel: Kernel = KERNEL, **options: Any) -> np.nda
 
 
 def spin(table: np.ndarray) -> np.ndarray:
-    return slip.energy.py_func(table[:, :N_STATES].T, table[:, N_STATES : N_STATES + 11].T)[0]
+    return slip.energy(table[:, :N_STATES].T, table[:, N_STATES : N_STATES + 11].T)[0]
 
 
 def of(table: np.ndarray, name: str, kernel: Kernel = KERNEL) -> np.ndarray:
@@ -206,7 +206,7 @@ def test_energy_error_is_the_largest_violation() -> None:
     blocks = 0
     while of(table, "status")[0] == 0:
         KERNEL.advance(table, np.array([0]), 1, True)
-        n, rattle, inertia = slip.energy.py_func(table[0, :N_STATES], table[0, N_STATES : N_STATES + 11])
+        n, rattle, inertia = slip.energy(table[0, :N_STATES], table[0, N_STATES : N_STATES + 11])
         worst = max(worst, abs(rattle + 0.5 * inertia * n**2 + of(table, "work")[0] - before))
         blocks += 1
     assert blocks == 20

@@ -49,7 +49,7 @@ def test_energy_changes_by_friction_alone(y: np.ndarray, body: dict[str, float])
     slopes, (_, dissipation, _, _) = evaluate(y, body)
     constants = stack(slip.constants(columns(**body)))[:, 0]
     # The derivative of the energy along the motion, by a complex step.
-    spin, rattle, inertia = slip.energy.py_func(y + 1e-30j * slopes, constants)
+    spin, rattle, inertia = slip.energy(y + 1e-30j * slopes, constants)
     change = (rattle + 0.5 * inertia * spin**2).imag / 1e-30
     assert change == pytest.approx(-dissipation, abs=1e-10 * (1 + abs(dissipation)))
 
@@ -112,7 +112,7 @@ def test_fastest_decay_bounds_the_slip_at_the_start(start: dict[str, float]) -> 
     for j in range(2):
         shifted = y.copy()
         shifted[5 + j] += 1e-30j
-        slopes, _ = slip.rhs.py_func(shifted, p)
+        slopes, _ = slip.rhs(shifted, p)
         block[:, j] = [slopes[5].imag[0] / 1e-30, slopes[6].imag[0] / 1e-30]
     rate = -np.linalg.eigvals(block).real.min()
     assert rate * 0.98 <= slip.fastest_decay(body)[0] <= 12 * rate

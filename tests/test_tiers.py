@@ -44,7 +44,7 @@ def simulate(model: Model, t_end: float, step: float | None = None, **parameters
 
 def spin(table: np.ndarray, kernel: Kernel) -> np.ndarray:
     n = len(kernel.model.states)
-    return kernel.model.energy.py_func(table[:, :n].T, table[:, n : kernel.row("step")].T)[0]
+    return kernel.model.energy(table[:, :n].T, table[:, n : kernel.row("step")].T)[0]
 
 
 @given(st.tuples(small, small, quick, quick, quick).map(np.array), bodies)
@@ -74,8 +74,8 @@ def test_rolling_obeys_newton_and_euler(y: np.ndarray, body: dict[str, float]) -
 @given(st.tuples(small, small, quick, quick, quick).map(np.array), bodies)
 def test_rolling_conserves_energy(y: np.ndarray, body: dict[str, float]) -> None:
     p = stack(noslip.constants(columns(**body)))[:, 0]
-    slopes, _ = noslip.rhs.py_func(y, p)
-    n, rattle, inertia = noslip.energy.py_func(y + 1e-30j * np.array(slopes), p)
+    slopes, _ = noslip.rhs(y, p)
+    n, rattle, inertia = noslip.energy(y + 1e-30j * np.array(slopes), p)
     assert abs((rattle + 0.5 * inertia * n**2).imag / 1e-30) < 1e-11 * (1 + np.abs(slopes).max())
 
 
@@ -152,8 +152,8 @@ def test_effective_is_the_papers_equations_in_x_and_y(
 @given(st.tuples(small, small, quick).map(np.array), st.floats(0.1, 5))
 def test_averaged_energy_balance(y: np.ndarray, c: float) -> None:
     p = stack(averaged.constants(columns(c=c)))[:, 0]
-    slopes, (_, dissipation, _, _) = averaged.rhs.py_func(y, p)
-    n, rattle, inertia = averaged.energy.py_func(y + 1e-30j * np.array(slopes), p)
+    slopes, (_, dissipation, _, _) = averaged.rhs(y, p)
+    n, rattle, inertia = averaged.energy(y + 1e-30j * np.array(slopes), p)
     assert (rattle + 0.5 * inertia * n**2).imag / 1e-30 == pytest.approx(-dissipation, abs=1e-12)
 
 

@@ -14,12 +14,13 @@ instructions.  A lane that ends is written back and takes the next cell.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from inspect import getfile
 from typing import Any
 
 import numba
 import numpy as np
 
-from sweep.jit import inline, is_cached, parallel, source_file
+from sweep.jit import inline, is_cached, parallel
 from sweep.kernels.stepper import make_load, make_step, make_store
 from sweep.kernels.tableau import Tableau
 from sweep.models.model import Array, Columns, Model, stack
@@ -89,7 +90,7 @@ class Kernel:
         images[:, : len(states)] = states.T
         images[:, len(states) : len(states) + len(constants)] = constants.T
         goal = np.ceil(t_end / step)
-        spin, rattle, inertia = self.model.energy.py_func(states, constants)  # type: ignore[attr-defined]
+        spin, rattle, inertia = self.model.energy(states, constants)
         for name, value in {
             "goal": goal,
             "stable_step": t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability,
@@ -183,7 +184,7 @@ def _make_advance(model: Model, tableau: Tableau, rows: tuple[str, ...], measure
             run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
 
     name = f"{model.name}-{tableau.name}-{'+'.join(measure)}-{block}"
-    return parallel(advance, name, source_file(model.rhs))
+    return parallel(advance, name, getfile(model.rhs))
 
 
 def _make_run_block(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...], block: int) -> Any:

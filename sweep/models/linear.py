@@ -21,13 +21,13 @@ def jacobian(model: Model, constants: Array, spin: Array) -> Array:
 
     By complex steps of 1e-30: to the last digit, without a difference or a second derivation.
     """
-    states = stack(model.upright.py_func(spin)).astype(complex)  # type: ignore[attr-defined]
+    states = stack(model.upright(spin)).astype(complex)
     rattle = [i for i in range(len(model.states)) if i != model.spin_state]
     columns = []
     for i in rattle:
         shifted = states.copy()
         shifted[i] += 1e-30j
-        slopes, _ = model.rhs.py_func(shifted, constants)  # type: ignore[attr-defined]
+        slopes, _ = model.rhs(shifted, constants)
         columns.append(np.stack(np.broadcast_arrays(*slopes))[rattle].imag / 1e-30)
     return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
 
@@ -51,7 +51,7 @@ def fastest_motion(model: Model, columns: Columns) -> Array:
 def fastest_spin(model: Model, columns: Columns) -> Array:
     """The |spin| that a start could reach if all its energy went into it, shape (cells,)."""
     start = stack(model.start(columns)), stack(model.constants(columns))
-    spin, rattle, inertia = model.energy.py_func(*start)  # type: ignore[attr-defined]
+    spin, rattle, inertia = model.energy(*start)
     return np.asarray(np.sqrt(spin**2 + 2 * rattle / inertia))
 
 

@@ -34,9 +34,9 @@ class Tier:
 class Model(Tier):
     """A rung that is simulated.
 
-    The functions compiled with `sweep.jit.inline` work on the scalars of one trajectory, written
-    so that their `py_func` also takes arrays, real or complex: starts, energies and Jacobians
-    are computed with the very same code.
+    The functions marked `sweep.jit.inline` dissolve into the kernel, where they work on the scalars
+    of one trajectory.  Called from Python they take arrays too, real or complex: starts, energies
+    and Jacobians are computed with the very same code.
     """
 
     states: tuple[str, ...]
@@ -50,12 +50,12 @@ class Model(Tier):
     """Bound on |λ| of the fastest damped mode anywhere on the trajectory, shape (cells,); it
     limits the step of an explicit method.  Zeros where nothing is stiff."""
     upright: Callable[..., tuple[Any, ...]]
-    """Compiled, spin -> states: steady upright spin without rattle."""
+    """Inline, spin -> states: steady upright spin without rattle."""
     rhs: Callable[..., tuple[Any, ...]]
-    """Compiled, (states, constants) -> (derivatives, (spin, dissipated power, normal force,
+    """Inline, (states, constants) -> (derivatives, (spin, dissipated power, normal force,
     Painlevé denominator)); what a model lacks of the last three is a literal 0.0, 1.0, 1.0."""
     energy: Callable[..., tuple[Any, ...]]
-    """Compiled, (states, constants) -> (spin, energy of the rattle, inertia J of the spin):
+    """Inline, (states, constants) -> (spin, energy of the rattle, inertia J of the spin):
     rattle + J n²/2 is the energy above rest, which friction alone changes.  Each term must keep
     its relative precision however small the rattle is."""
     radians_a_step: float = 0.07

@@ -77,8 +77,8 @@ def energy(y: Any, p: Any) -> Any:
 
 def observe(y: Array, p: Array) -> dict[str, Array]:
     """Contact point and normal force."""
-    _, point, _, _ = contact.py_func(*y, *p[:4])
-    _, (_, _, R, _) = rhs.py_func(y, p)
+    _, point, _, _ = contact(*y, *p[:4])
+    _, (_, _, R, _) = rhs(y, p)
     return {"contact_x": point[0], "contact_y": point[1], "normal_force": R}
 
 

@@ -84,8 +84,8 @@ def observe(y: Array, p: Array) -> dict[str, Array]:
     v̇_p is the derivative in the body's axes; v̇_0 that in space, (d/dt) v_0 of the paper.
     """
     u1, u2, w1, w2, w3, v1, v2 = y
-    _, point, _, moving = contact.py_func(u1, u2, w1, w2, w3, *p[:4])
-    slopes, (_, _, R, _) = rhs.py_func(y, p)
+    _, point, _, moving = contact(u1, u2, w1, w2, w3, *p[:4])
+    slopes, (_, _, R, _) = rhs(y, p)
     omega, slope = y[2:5], np.stack(slopes[2:5])
     x_p, dx_p = np.stack(point), np.stack(moving)
 
@@ -121,7 +121,7 @@ def fastest_decay(columns: Columns) -> Array:
     """
     a, b, c = columns["a"], columns["b"], columns["c"]
     I1, I2, I3 = ellipsoid.inertia(columns)
-    spin, rattle, inertia = energy.py_func(start(columns), constants(columns))
+    spin, rattle, inertia = energy(start(columns), constants(columns))
     energy_start = rattle + 0.5 * inertia * spin**2
     worst = np.zeros_like(energy_start)
     for share in np.linspace(0, 1, 9):

@@ -35,7 +35,7 @@ def simulate(name: str, columns: Columns, t_end: float, step: float | None = Non
     execute(kernel, images, stop_when_settled=False)
     n = len(model.states)
     states, constants = images[:, :n].T, images[:, n : kernel.row("step")].T
-    spin = model.energy.py_func(states, constants)[0]  # type: ignore[attr-defined]
+    spin = model.energy(states, constants)[0]
     violation = images[:, kernel.row("violation")] / images[:, kernel.row("energy_start")] if measure else np.zeros(n)
     return states, spin, violation
 
