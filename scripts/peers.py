@@ -45,6 +45,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from sweep.kernels.lanes import BLOCK, TIME_LIMIT, Kernel
 from sweep.kernels.tableau import DOPRI5
+from sweep.models import ellipsoid
 from sweep.models.coefficients import rattle_period
 from sweep.models.model import Array, stack
 from sweep.models.slip import MODEL
@@ -121,8 +122,10 @@ class Entry:
 
 
 def traced_rhs(sqrt: Callable[[Any], Any]) -> Callable[..., Any]:
-    """The model's right-hand side for symbols: the same code with another square root."""
-    return FunctionType(MODEL.rhs.__code__, {"np": SimpleNamespace(sqrt=sqrt)})
+    """Our right-hand side for another tool's numbers, which know another square root than numpy's."""
+    numbers = SimpleNamespace(sqrt=sqrt)
+    contact = FunctionType(ellipsoid.contact.__code__, {"np": numbers})
+    return FunctionType(MODEL.rhs.__code__, {"np": numbers, "contact": contact})
 
 
 def count_constants() -> int:
