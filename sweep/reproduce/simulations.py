@@ -99,7 +99,7 @@ def friction() -> Section:
     figure = Figure(figsize=(8, 6.5), dpi=100, layout="constrained")
     top, bottom = figure.subplots(2, 1)
     three = trajectory(configure(), mu=[60, 130, 200], every=3.0)
-    draw_spin(top, three.isel(sample=three["time"][0].values < 6000), critical=False)
+    draw_spin(top, three.isel(sample=three["time"].max("trajectory").values < 6000), critical=False)
     for i, mu in enumerate((60, 130, 200)):
         section.rows.append(against_paper(f"reversals_{mu}", f"reversals at μ = {mu}", int(three["reversals"][i])))
     rough = trajectory(configure(t_end=1500.0), mu=[500, 1000, 1500], every=0.25)
