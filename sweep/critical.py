@@ -13,7 +13,7 @@ from sweep import dataset, executor
 from sweep.config import Config, Values
 from sweep.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
 from sweep.grid import Array, Grid
-from sweep.kernels import stepsize
+from sweep.kernels import methods
 from sweep.kernels.lanes import RUNNING, Kernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
@@ -173,7 +173,7 @@ def _images(config: Config, columns: dict[str, Array], measure: Any, t_end: floa
     assert stability is not None  # it is a model
     kernel = Kernel(model, DOPRI5, measure)
     if config.integrator.step == "auto":
-        step = stepsize.automatic_step(model, DOPRI5, columns)[0]
+        step = methods.automatic_step("dopri5", model, columns)[0]
     else:
         step = np.full(grid.size, config.integrator.step)
     return kernel, kernel.images(columns, step, t_end, stability.ranges, rattle_period(columns))

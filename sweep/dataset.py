@@ -18,7 +18,7 @@ import xarray as xr
 
 from sweep.config import Config
 from sweep.grid import Array, Grid
-from sweep.kernels import lanes, stepsize
+from sweep.kernels import lanes, methods
 from sweep.kernels.lanes import Kernel
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
@@ -36,7 +36,7 @@ STATUSES = {
 EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND = range(4)
 REASONS = {EXISTS: "exists", NO_FRICTION: "no_friction", NO_COUPLING: "no_coupling", NOT_FOUND: "not_found"}
 
-STEP_RULES = {stepsize.FIXED: "fixed", stepsize.ACCURACY: "accuracy", stepsize.STABILITY: "stability"}
+STEP_RULES = {methods.FIXED: "fixed", methods.ACCURACY: "accuracy", methods.STABILITY: "stability"}
 
 
 @dataclass(frozen=True)
@@ -104,11 +104,11 @@ def measured(kernel: Kernel, images: Array, t_end: float) -> dict[str, Array]:
     result = {
         "status": row("status"),
         "spin_final": spin,
-        "t_stop": row("done") / row("goal") * t_end,
+        "t_stop": kernel.times(images, t_end),
         "step": row("step"),
     }
     if "reversals" in kernel.measure:
-        closed = row("done") * row("step") >= row("period")
+        closed = kernel.times(images, t_end) >= row("period")
         result["reversals"] = row("reversals")
         result["t_last_reversal"] = row("last_reversal")
         if "first_reversal" in kernel.measure:
@@ -191,11 +191,10 @@ def _integrator_words(config: Config) -> str:
         return "none"
     if config.integrator.step != "auto":
         return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"
-    return (
-        f"{config.integrator.method}, fixed step, per trajectory the smaller of "
-        f"{stepsize.STABILITY_SHARE:g} of the stability limit "
-        f"and {MODELS[config.model].radians_a_step:g} rad of the fastest motion"
-    )
+    rule = f"a spin error of {config.integrator.tolerance:g} at t = 400"
+    if config.integrator.method == "dopri5":
+        rule = f"the shorter of {methods.STABILITY_SHARE:g} of the stability limit and {rule}"
+    return f"{config.integrator.method}, fixed step, per trajectory by {rule}"
 
 
 def _git_commit() -> str:

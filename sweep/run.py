@@ -14,9 +14,8 @@ from sweep.config import Config, load_config
 from sweep.executor import Progress
 from sweep.grid import Array, Grid
 from sweep.jit import fingerprint
-from sweep.kernels import stepsize
+from sweep.kernels import methods
 from sweep.kernels.lanes import SETTLED, Kernel
-from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS, TIERS
 from sweep.models.coefficients import rattle_period
 from sweep.prediction import Prediction
@@ -88,7 +87,7 @@ def run(
             return finished
 
     if config.model in MODELS:
-        job = plan(config)
+        job = plan(config, reporter)
         seconds = simulate(job, files, reporter)
         result = collect(job, seconds)
     else:
@@ -131,17 +130,20 @@ def evaluate(config: Config) -> xr.Dataset:
     return dataset.label(config, grid, arrays, attributes)
 
 
-def plan(config: Config) -> Plan:
+def plan(config: Config, reporter: Reporter | None = None) -> Plan:
     """Lay out the cells of `config` with their steps, limits and starts."""
     grid, model = Grid.of(config), MODELS[config.model]
     columns = grid.columns()
-    kernel = Kernel(model, DOPRI5, config.measure)
+    method = config.integrator.method
+    kernel = methods.make_kernel(method, model, config.measure)
+    if reporter and not kernel.is_compiled():
+        reporter.compiling()
     prediction = predict_grid(model, grid)
     assert prediction.stability is not None  # it is a model
     if config.integrator.step == "auto":
-        step, rule = stepsize.automatic_step(model, DOPRI5, columns)
+        step, rule = methods.automatic_step(method, model, columns, config.integrator.tolerance)
     else:
-        step, rule = np.full(grid.size, config.integrator.step), np.full(grid.size, stepsize.FIXED)
+        step, rule = np.full(grid.size, config.integrator.step), np.full(grid.size, methods.FIXED)
     body = grid.bodies()[1]
     images = kernel.images(
         columns, step, config.integrator.t_end, prediction.stability.ranges[:, body], rattle_period(columns)
@@ -155,8 +157,6 @@ def simulate(job: Plan, files: RunFiles | None, reporter: Reporter) -> float:
     if files and (left := files.load_checkpoint(identity, job.images.shape)):
         job.images[:], before = left
         reporter.note(f"{files.checkpoint}: going on from there")
-    if not job.kernel.is_compiled():
-        reporter.compiling()
 
     def save() -> None:
         if files:
@@ -168,6 +168,7 @@ def simulate(job: Plan, files: RunFiles | None, reporter: Reporter) -> float:
         reporter.chunk(progress)
         save()
 
+    job.kernel.compile()
     try:
         executor.execute(
             job.kernel,

@@ -101,7 +101,9 @@ def _choose(config: Config, at: dict[str, list[float]]) -> Config:
         name: tuple(dict(zip(at, values, strict=True)).get(name, constant) for values in combinations)
         for name, constant in constants.items()
     }
-    chosen = replace(config, parameters={}, cases=cases)
+    # Looks between the steps need a method without a history.
+    integrator = config.integrator.model_copy(update={"method": "dopri5"})
+    chosen = replace(config, parameters={}, cases=cases, integrator=integrator)
     if beyond := off_the_body(chosen):
         raise ConfigError([Fault("--at", None, None, (), beyond)])
     return chosen

@@ -11,7 +11,7 @@ from conftest import columns
 from scipy.integrate import solve_ivp
 
 from sweep.executor import execute
-from sweep.kernels import stepsize
+from sweep.kernels import methods
 from sweep.kernels.lanes import (
     BLOCK,
     DIVERGED,
@@ -279,7 +279,7 @@ def test_a_rattle_of_1e_30_grows_at_the_linear_rate() -> None:
 
 def test_settled_means_that_nothing_changes_any_more() -> None:
     parameters = {"mu": np.array([40.0, 60.0, 75.0]), "n0": np.array([0.05, 0.05, -0.004])}
-    step, _ = stepsize.automatic_step(MODELS["slip"], DOPRI5, columns(**parameters))
+    step, _ = methods.automatic_step("dopri5", MODELS["slip"], columns(**parameters))
     settled = run(images(step, 9000.0, settle=True, **parameters))
     assert set(of(settled, "status")) == {SETTLED}
     full = images(step, 9000.0, settle=True, **parameters)
@@ -305,14 +305,14 @@ def test_a_settled_rattle_ends_as_exact_zeros() -> None:
 
 def test_automatic_step_says_what_decided() -> None:
     body = columns(mu=[1.0, 20.0, 200.0])
-    step, rule = stepsize.automatic_step(MODELS["slip"], DOPRI5, body)
-    assert list(rule) == [stepsize.ACCURACY, stepsize.ACCURACY, stepsize.STABILITY]
+    step, rule = methods.automatic_step("dopri5", MODELS["slip"], body)
+    assert list(rule) == [methods.ACCURACY, methods.ACCURACY, methods.STABILITY]
     assert step[2] * slip.fastest_decay(body)[2] == pytest.approx(0.9 * DOPRI5.real_stability)
 
 
 @pytest.mark.parametrize("parameters", [{"mu": 20.0}, {"mu": 60.0}, {"mu": 20.0, "n0": 0.1}, {"mu": 200.0, "b": 6.0}])
 def test_automatic_step_keeps_the_spin_to_2e_8(parameters: dict[str, float]) -> None:
-    step, _ = stepsize.automatic_step(MODELS["slip"], DOPRI5, columns(**parameters))
+    step, _ = methods.automatic_step("dopri5", MODELS["slip"], columns(**parameters))
     coarse, fine = (spin(run(images(h, 400.0, **parameters)))[0] for h in (step, step / 4))
     assert abs(coarse - fine) < 2e-8
 

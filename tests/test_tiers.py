@@ -17,7 +17,7 @@ import sweep
 from sweep import ConfigError
 from sweep.executor import execute
 from sweep.kernels.lanes import TIME_LIMIT, Kernel
-from sweep.kernels.stepsize import automatic_step
+from sweep.kernels.methods import automatic_step
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS, averaged, effective, noslip
 from sweep.models.coefficients import coefficients, normal_coordinates, rattle_period
@@ -34,7 +34,7 @@ small, quick = st.floats(-0.3, 0.3), st.floats(-0.5, 0.5)
 def simulate(model: Model, t_end: float, step: float | None = None, **parameters: Any) -> tuple[np.ndarray, Kernel]:
     """Final images of trajectories that are never taken as settled."""
     body = columns(**parameters)
-    steps = automatic_step(model, DOPRI5, body)[0] if step is None else np.full(len(body["mu"]), step)
+    steps = automatic_step("dopri5", model, body)[0] if step is None else np.full(len(body["mu"]), step)
     kernel = Kernel(model, DOPRI5, model.measures)
     table = kernel.images(body, steps, t_end, np.full((6, len(steps)), np.nan), rattle_period(body))
     execute(kernel, table, stop_when_settled=False)

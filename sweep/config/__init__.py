@@ -13,8 +13,9 @@ from sweep.config import cases, document, schema
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import off_the_body
+from sweep.kernels import methods
 from sweep.models import TIERS
-from sweep.models.model import Tier
+from sweep.models.model import Model, Tier
 from sweep.parameters import PARAMETERS
 
 __all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "load_config"]
@@ -122,6 +123,9 @@ def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document
     for name in columns or {}:
         if name not in model.parameters:
             yield source.fault(("cases",), f"column {name}: the {model.name} model has no {name}")
+    if isinstance(model, Model) and checked.integrator.method not in methods.allowed(model):
+        names = ", ".join(methods.allowed(model))
+        yield source.fault(("integrator", "method"), f"cannot run the {model.name} model; allowed: {names}")
     for i, name in enumerate(checked.measure or ()):
         if name not in model.measures:
             yield source.fault(

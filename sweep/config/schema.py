@@ -15,6 +15,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
 from sweep.kernels.lanes import MEASURES
+from sweep.kernels.methods import METHODS, TOLERANCE
 from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
@@ -107,8 +108,10 @@ def _distinct(names: list[str]) -> list[str]:
 
 
 class Integrator(_Strict):
-    method: Literal["dopri5"] = "dopri5"
+    method: Literal[METHODS] = "dopri5"  # type: ignore[valid-type]
     step: Annotated[float | Literal["auto"], BeforeValidator(_step)] = "auto"
+    tolerance: float = Field(default=TOLERANCE, gt=0, lt=1)
+    """Error in spin that an automatic step keeps to, at t = 400."""
     t_end: float = Field(default=30_000.0, gt=0)
     stop_when_settled: bool = True
 

@@ -21,7 +21,7 @@ import numba
 import numpy as np
 
 from sweep.jit import inline, is_cached, parallel
-from sweep.kernels.stepper import make_load, make_step, make_store
+from sweep.kernels.stepper import make_load, make_rest, make_step, make_store
 from sweep.kernels.tableau import Tableau
 from sweep.models.model import Array, Columns, Model, stack
 
@@ -63,12 +63,22 @@ class Kernel:
     """`advance` for one model, method and choice of measurements, and the layout of its images."""
 
     def __init__(self, model: Model, tableau: Tableau, measure: Iterable[str], block: int = BLOCK) -> None:
-        self.model, self.tableau = model, tableau
+        self.tableau = tableau
+        self._lay_out(model, measure)
+        run_block = _make_run_block(model, tableau, self.rows, self.measure, block)
+        self._advance = self._make_advance(run_block, f"{tableau.name}-{block}")
+
+    def _lay_out(self, model: Model, measure: Iterable[str], more: Iterable[str] = ()) -> None:
+        self.model = model
         self.measure = tuple(name for name in MEASURES if name in measure)
         measured = [row for name in self.measure for row in _MEASURED[name]]
-        constants = [f"constant{i}" for i in range(_count_constants(model))]
-        self.rows = (*model.states, *constants, *_BASE, *measured)
-        self._advance = _make_advance(model, tableau, self.rows, self.measure, block)
+        constants = [f"constant{i}" for i in range(count_constants(model))]
+        self.rows = (*model.states, *constants, *_BASE, *measured, *more)
+
+    def _make_advance(self, run_block: Any, method: str) -> Any:
+        advance = make_advance(run_block, make_inspect(self.model, self.rows, self.measure), self.rows)
+        name = f"{self.model.name}-{method}-{'+'.join(self.measure)}"
+        return parallel(advance, name, getfile(self.model.rhs))
 
     def row(self, name: str) -> int:
         return self.rows.index(name)
@@ -85,16 +95,22 @@ class Kernel:
             below and the next above, shape (6, cells); NaN where there is none
         period : length of the window over which the spin is averaged, shape (cells,)
         """
+        goal = np.ceil(t_end / step)
+        stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
+        return self._start(columns, t_end / goal, goal, stable_step, stable, period)
+
+    def _start(
+        self, columns: Columns, step: Array, goal: Array, stable_step: Array, stable: Array, period: Array
+    ) -> Array:
         states, constants = stack(self.model.start(columns)), stack(self.model.constants(columns))
         images = np.zeros((len(step), len(self.rows)))
         images[:, : len(states)] = states.T
         images[:, len(states) : len(states) + len(constants)] = constants.T
-        goal = np.ceil(t_end / step)
         spin, rattle, inertia = self.model.energy(states, constants)
         for name, value in {
             "goal": goal,
-            "stable_step": t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability,
-            "step": t_end / goal,
+            "stable_step": stable_step,
+            "step": step,
             "energy_start": rattle + 0.5 * inertia * spin**2,
             "energy": rattle + 0.5 * inertia * spin**2,
             **dict(zip(_STABLE, stable, strict=True)),
@@ -102,7 +118,7 @@ class Kernel:
             images[:, self.row(name)] = value
         if "reversals" in self.measure:
             images[:, self.row("period")] = period
-            images[:, self.row("step_rate")] = goal / t_end
+            images[:, self.row("step_rate")] = 1 / step
             images[:, self.row("last_reversal")] = np.nan
         if "first_reversal" in self.measure:
             images[:, self.row("first_reversal")] = np.nan
@@ -115,9 +131,17 @@ class Kernel:
         """
         self._advance(images, cells, blocks, stop_when_settled, numba.get_num_threads())
 
+    def times(self, images: Array, t_end: float) -> Array:
+        """Times that the images have reached, shape (cells,)."""
+        return np.asarray(images[:, self.row("done")] / images[:, self.row("goal")] * t_end)
+
     def is_compiled(self) -> bool:
         """Whether the first call of `advance` finds machine code, in memory or on disk."""
         return bool(self._advance.signatures) or is_cached(self._advance, _SIGNATURE)
+
+    def compile(self) -> None:
+        """Compile `advance`, or load it from disk, so that no run's time has it in."""
+        self._advance.compile(_SIGNATURE)
 
 
 _SIGNATURE = (
@@ -129,13 +153,12 @@ _SIGNATURE = (
 )
 
 
-def _count_constants(model: Model) -> int:
+def count_constants(model: Model) -> int:
     return len(model.constants({name: np.ones(1) for name in model.parameters}))
 
 
-def _make_advance(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...], block: int) -> Any:
-    run_block = _make_run_block(model, tableau, rows, measure, block)
-    inspect = _make_inspect(model, rows, measure)
+def make_advance(run_block: Any, inspect: Any, rows: tuple[str, ...]) -> Any:
+    """The kernel proper (see the module) around a compiled block of steps and a look between two."""
     n_rows, lanes, status = len(rows), LANES, rows.index("status") * LANES
 
     @numba.njit
@@ -183,18 +206,17 @@ def _make_advance(model: Model, tableau: Tableau, rows: tuple[str, ...], measure
         for g in numba.prange(groups):
             run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
 
-    name = f"{model.name}-{tableau.name}-{'+'.join(measure)}-{block}"
-    return parallel(advance, name, getfile(model.rhs))
+    return advance
 
 
 def _make_run_block(model: Model, tableau: Tableau, rows: tuple[str, ...], measure: tuple[str, ...], block: int) -> Any:
     """Compiled group -> None: `block` steps of all lanes, with what is measured in every step."""
-    n, n_constants = len(model.states), _count_constants(model)
+    n, n_constants = len(model.states), count_constants(model)
     load_states, load_constants = make_load(0, n, LANES), make_load(n, n_constants, LANES)
     store_states = make_store(0, n, LANES)
     step = make_step(tableau, model.rhs, n)
     count_reversals, add_work = "reversals" in measure, "energy_error" in measure
-    watch_spin = _make_watch_spin(rows) if count_reversals else _watch_nothing
+    watch_spin = make_watch_spin(rows) if count_reversals else watch_nothing
     STEP, GOAL, DONE, STATUS = (rows.index(name) * LANES for name in ("step", "goal", "done", "status"))
     WORK = rows.index("work") * LANES if add_work else 0
     lanes = LANES
@@ -221,11 +243,11 @@ def _make_run_block(model: Model, tableau: Tableau, rows: tuple[str, ...], measu
 
 
 @inline
-def _watch_nothing(*_: Any) -> None:
+def watch_nothing(*_: Any) -> None:
     """In the place of `watch_spin` where no reversals are asked for; leaves no instruction."""
 
 
-def _make_watch_spin(rows: tuple[str, ...]) -> Any:
+def make_watch_spin(rows: tuple[str, ...]) -> Any:
     """Compiled: add a step to the running window of the spin, count where its sign changes.
 
     A reversal is a change of sign between the spin averaged over one window of the rattle's
@@ -264,12 +286,12 @@ def _make_watch_spin(rows: tuple[str, ...]) -> Any:
     return watch_spin
 
 
-def _make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
+def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
     """Compiled (group, stop_when_settled): look at all lanes between two blocks, decide who ends."""
     n = len(model.states)
-    load_states, load_constants = make_load(0, n, LANES), make_load(n, _count_constants(model), LANES)
+    load_states, load_constants = make_load(0, n, LANES), make_load(n, count_constants(model), LANES)
     store_states = make_store(0, n, LANES)
-    energy, upright = model.energy, model.upright
+    energy, rest = model.energy, make_rest(n, model.spin_state)
     will_settle = _make_will_settle(rows, "reversals" in measure)
     watch_energy = "energy_error" in measure
     WORK = rows.index("work") * LANES if watch_energy else 0
@@ -302,7 +324,7 @@ def _make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...])
             # up until it feigns one of these ends.
             false = (conserved & (total > before * allowed)) | (failed & (group[STABLE_STEP + lane] == 0.0))
             group[STATUS + lane] = DIVERGED if (running | failed) & false else status
-            store_states(group, lane, bounded & (rattle < NEGLIGIBLE), upright(spin), y)
+            store_states(group, lane, bounded & (rattle < NEGLIGIBLE), rest(y), y)
 
     return inspect
 

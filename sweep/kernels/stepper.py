@@ -23,7 +23,7 @@ def make_step(tableau: Tableau, rhs: Any, n_states: int) -> Any:
     denominator were positive (`sound`, false also where they are not numbers), whether in some
     stage the force (`airborne`) or the denominator (`jammed`) was not.
     """
-    return _compile("step", step_source(tableau, n_states), {"rhs": rhs})
+    return compile_inline("step", step_source(tableau, n_states), {"rhs": rhs})
 
 
 def step_source(tableau: Tableau, n_states: int) -> str:
@@ -55,13 +55,19 @@ def step_source(tableau: Tableau, n_states: int) -> str:
 def make_load(first: int, count: int, lanes: int) -> Any:
     """Compiled (group, lane) -> tuple of `count` rows of one lane, from row `first` on."""
     rows = _tuple(f"group[{(first + i) * lanes} + lane]" for i in range(count))
-    return _compile("load", f"def load(group, lane):\n    return {rows}", {})
+    return compile_inline("load", f"def load(group, lane):\n    return {rows}", {})
 
 
 def make_store(first: int, count: int, lanes: int) -> Any:
     """Compiled (group, lane, keep, new, old): writes `new` where `keep`, else `old`."""
     lines = [f"    group[{(first + i) * lanes} + lane] = new[{i}] if keep else old[{i}]" for i in range(count)]
-    return _compile("store", "\n".join(["def store(group, lane, keep, new, old):", *lines]), {})
+    return compile_inline("store", "\n".join(["def store(group, lane, keep, new, old):", *lines]), {})
+
+
+def make_rest(n_states: int, spin_state: int) -> Any:
+    """Compiled states -> states: the same spin without rattle."""
+    rest = _tuple(f"y[{i}]" if i == spin_state else "0.0" for i in range(n_states))
+    return compile_inline("rest", f"def rest(y):\n    return {rest}", {})
 
 
 def _tuple(items: Iterable[str]) -> str:
@@ -72,7 +78,7 @@ def _sum(terms: Iterable[str]) -> str:
     return " + ".join(terms)
 
 
-def _compile(name: str, source: str, names: dict[str, Any]) -> Any:
+def compile_inline(name: str, source: str, names: dict[str, Any]) -> Any:
     """Compile generated source; tracebacks and debuggers find it by its file name."""
     filename = f"<sweep {name} {hash(source):x}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)

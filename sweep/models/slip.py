@@ -107,7 +107,12 @@ def observe(y: Array, p: Array) -> dict[str, Array]:
 
 
 def fastest_decay(columns: Columns) -> Array:
-    """Bound on the rate at which friction stops the slip, over the whole trajectory.
+    """Bound on the rate at which friction stops the slip, over the whole trajectory."""
+    return np.asarray(columns["mu"] * strongest_grip(columns))
+
+
+def strongest_grip(columns: Columns) -> Array:
+    """Bound on the slip's decay rate per μ: 1 + c²/I1 at rest, growing with the rattle.
 
     The slip velocity relaxes at μ R (1 + z²/I + ρ²/I3), with ρ the contact point's distance from the axis
     and I the moment about the horizontal axis in question.  Both R and the bracket grow with the
@@ -136,7 +141,7 @@ def fastest_decay(columns: Columns) -> Array:
             rate2 = 2 * (1 - share) * energy_start / (own + rho2 + z2)
             R = 1 + np.maximum(curvature, 0) * rate2
             worst = np.maximum(worst, R * np.maximum(1 + z2 / other + rho2 / I3, 1 + z2 / own))
-    return np.asarray(columns["mu"] * worst)
+    return np.asarray(worst)
 
 
 MODEL = Model(

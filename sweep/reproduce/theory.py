@@ -9,7 +9,7 @@ import numpy as np
 from sweep.executor import execute
 from sweep.grid import Array
 from sweep.kernels.lanes import Kernel
-from sweep.kernels.stepsize import automatic_step
+from sweep.kernels.methods import automatic_step
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS, analytic, linear
 from sweep.models.coefficients import coefficients, rattle_period
@@ -30,7 +30,7 @@ def simulate(name: str, columns: Columns, t_end: float, step: float | None = Non
     model = MODELS[name]
     measure = [m for m in ("energy_error",) if m in model.measures]
     kernel = Kernel(model, DOPRI5, measure)
-    steps = automatic_step(model, DOPRI5, columns)[0] if step is None else np.full(len(columns["a"]), step)
+    steps = automatic_step("dopri5", model, columns)[0] if step is None else np.full(len(columns["a"]), step)
     images = kernel.images(columns, steps, t_end, np.full((6, len(steps)), np.nan), rattle_period(columns))
     execute(kernel, images, stop_when_settled=False)
     n = len(model.states)

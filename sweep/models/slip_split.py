@@ -1,0 +1,174 @@
+"""The slip model in variables that keep its stiffness in the slip alone.
+
+The angular momentum about the contact point, M = I ω - x_p × v_g, takes the place of ω.  No friction
+and no normal force appear in
+
+    u' = u × ω,   M' = s × v_g - ω × M - u × x_p,   s = v_0 - x_p',   v_g = v_p + v_0,
+
+for forces at the contact point have no moment about it; ω = I_P⁻¹ (M + x_p × v_p) with
+I_P = I + |x_p|² - x_p x_pᵀ.  Friction is in the slip alone,
+
+    v_p' = R G - rest,   G = T (u - μ v_p),   T = 1 - [x_p] I⁻¹ [x_p],   R = num / den,   den = u · G,
+
+a 2 × 2 block that an implicit formula solves by one Newton step.  The motion is that of `slip`.
+
+With a = A u, r² = u · a, D_i = I_i r² + |a|²: r² I_P = D - a aᵀ, which Sherman and Morrison's formula
+inverts without a root or quotient, so that one division yields 1/r, 1/u3 and I_P⁻¹.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models import ellipsoid, slip
+from sweep.models.model import Array, Columns
+
+
+def constants(columns: Columns) -> tuple[Array, ...]:
+    """Shape, moments of inertia and their inverses, Euler's inertia ratios, friction: fourteen arrays."""
+    p = slip.constants(columns)
+    return (*p[:4], *ellipsoid.inertia(columns), *p[4:])
+
+
+@inline
+def momentum(y: Any, p: Any) -> Any:
+    """States (u1, u2, M1, M2, M3, v1, v2) of the slip model's states; `p` as of `constants`."""
+    u1, u2, w1, w2, w3, v1, v2 = y
+    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
+    a1, a2, a3 = p[0] * u1 + p[1] * u2, p[1] * u1 + p[2] * u2, p[3] * u3
+    r = np.sqrt(u1 * a1 + u2 * a2 + u3 * a3)
+    x, y_, z = -a1 / r, -a2 / r, -a3 / r
+    v3 = -(v1 * u1 + v2 * u2) / u3
+    g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
+    M1, M2, M3 = p[4] * w1 - (y_ * g3 - z * g2), p[5] * w2 - (z * g1 - x * g3), p[6] * w3 - (x * g2 - y_ * g1)
+    return u1, u2, M1, M2, M3, v1, v2
+
+
+def start(columns: Columns) -> tuple[Array, ...]:
+    """The slip model's start: ω = n0 u, v_p = 0, contact point (x0, y0)."""
+    states: tuple[Array, ...] = momentum(slip.start(columns), constants(columns))
+    return states
+
+
+@inline
+def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) -> Any:
+    """(u1', u2', M1', M2', M3') and what `newton` needs beside them."""
+    A11, A12, A22, A33, I1, I2, I3 = p[0], p[1], p[2], p[3], p[4], p[5], p[6]
+    c3 = 1.0 - (u1 * u1 + u2 * u2)
+    u3 = -np.sqrt(c3)
+    a1, a2, a3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
+    r2 = u1 * a1 + u2 * a2 + A33 * c3
+    r = np.sqrt(r2)
+    b1, b2, b3 = a1 * a1, a2 * a2, a3 * a3
+    square = b1 + b2 + b3
+    D1, D2, D3 = I1 * r2 + square, I2 * r2 + square, I3 * r2 + square
+    E1, E2, E3 = D2 * D3, D1 * D3, D1 * D2
+    DD = D1 * E1
+    det = DD - (b1 * E1 + b2 * E2 + b3 * E3)
+    ru, Z = r * u3, det * DD
+    shared = 1.0 / (ru * Z)
+    inv_Z, of_Z = shared * ru, shared * Z
+    minus_inv_r, inv_u3 = -(of_Z * u3), of_Z * r
+    x, y, z = a1 * minus_inv_r, a2 * minus_inv_r, a3 * minus_inv_r
+
+    t1, t2 = u1 * inv_u3, u2 * inv_u3
+    v3 = -(v1 * t1 + v2 * t2)
+    K1, K2, K3 = M1 + (y * v3 - z * v2), M2 + (z * v1 - x * v3), M3 + (x * v2 - y * v1)
+    aEK = a1 * (E1 * K1) + a2 * (E2 * K2) + a3 * (E3 * K3)
+    k = r2 * inv_Z
+    w1, w2, w3 = (k * E1) * (det * K1 + a1 * aEK), (k * E2) * (det * K2 + a2 * aEK), (k * E3) * (det * K3 + a3 * aEK)
+
+    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
+    dux = du1 * x + du2 * y + du3 * z
+    s1, s2, s3 = y * w3 - z * w2, z * w1 - x * w3, x * w2 - y * w1
+    g1, g2, g3 = s1 + v1, s2 + v2, s3 + v3
+    s1 = s1 - minus_inv_r * ((A11 * du1 + A12 * du2) - x * dux)
+    s2 = s2 - minus_inv_r * ((A12 * du1 + A22 * du2) - y * dux)
+    s3 = s3 - minus_inv_r * (A33 * du3 - z * dux)
+    q1, q2, q3 = u2 * z - u3 * y, u3 * x - u1 * z, u1 * y - u2 * x
+    dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - q1
+    dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - q2
+    dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - q3
+    geometry = (u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
+    return (du1, du2, dM1, dM2, dM3), geometry
+
+
+@inline
+def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
+    """One Newton step from v for v = b + γ v_p'(v), with the Jacobian of R G, dR/dv included.
+
+    The gyroscopic terms of v_p' are left out of the Jacobian: they are not stiff.
+
+    Multiplied by den², so R is never formed.  Returns the new v, and num and den of R at the old.
+    """
+    i1, i2, i3, d1, d2, d3, mu = p[7], p[8], p[9], p[10], p[11], p[12], p[13]
+    u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3 = geometry
+    al1, al2, al3 = d1 * w2 * w3, d2 * w3 * w1, d3 * w1 * w2
+    g1, g2, g3 = u1 - mu * v1, u2 - mu * v2, u3 - mu * v3
+    xx, yy, zz = x * x, y * y, z * z
+    T11, T22, T33 = 1.0 + zz * i2 + yy * i3, 1.0 + zz * i1 + xx * i3, 1.0 + yy * i1 + xx * i2
+    T12, T13, T23 = -(x * i3) * y, -(z * i2) * x, -(y * z) * i1
+    G1, G2, G3 = T11 * g1 + T12 * g2 + T13 * g3, T12 * g1 + T22 * g2 + T23 * g3, T13 * g1 + T23 * g2 + T33 * g3
+    den = u1 * G1 + u2 * G2 + u3 * G3
+    num = 1.0 + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)
+    e1, e2, e3 = s1 + v1, s2 + v2, s3 + v3
+    rest1 = u1 + (y * al3 - z * al2) + (w2 * e3 - w3 * e2)
+    rest2 = u2 + (z * al1 - x * al3) + (w3 * e1 - w1 * e3)
+
+    # dG_i/dv_j = -μ S_ij with v3 = -(u1 v1 + u2 v2)/u3;  d den/dv_j = -μ f_j
+    S11, S12 = T11 - T13 * t1, T12 - T13 * t2
+    S21, S22 = T12 - T23 * t1, T22 - T23 * t2
+    S31, S32 = T13 - T33 * t1, T23 - T33 * t2
+    f1, f2 = u1 * S11 + u2 * S21 + u3 * S31, u1 * S12 + u2 * S22 + u3 * S32
+    gn = gamma * num
+    k, dd = gn * mu, den * den
+    m11, m12 = dd + k * (den * S11 - G1 * f1), k * (den * S12 - G1 * f2)
+    m21, m22 = k * (den * S21 - G2 * f1), dd + k * (den * S22 - G2 * f2)
+    r1 = den * (den * ((b1 - v1) - gamma * rest1) + gn * G1)
+    r2 = den * (den * ((b2 - v2) - gamma * rest2) + gn * G2)
+    d = 1.0 / (m11 * m22 - m12 * m21)
+    return v1 + d * (m22 * r1 - m12 * r2), v2 + d * (m11 * r2 - m21 * r1), num, den
+
+
+@inline
+def energy(y: Any, p: Any) -> Any:
+    """(spin, energy of the rattle, I3), as the slip model's."""
+    u1, u2, M1, M2, M3, v1, v2 = y
+    _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
+    inverse = (p[0], p[1], p[2], p[3], p[7], p[8], p[9])
+    return ellipsoid.energy(u1, u2, geometry[7], geometry[8], geometry[9], v1, v2, inverse)
+
+
+def rocking(columns: Columns) -> Array:
+    """Jacobian of the slow rattle (u1, u2, M1, M2) about upright rest without slip, shape (cells, 4, 4)."""
+    p = constants(columns)
+    rest = np.zeros((7, len(p[0])), dtype=complex)
+    columns_ = []
+    for i in range(4):
+        shifted = rest.copy()
+        shifted[i] += 1e-30j
+        slopes, _ = slow(*shifted, p)
+        columns_.append(np.stack(np.broadcast_arrays(*slopes[:4])).imag / 1e-30)
+    return np.moveaxis(np.stack(columns_, axis=-1), 0, 1)
+
+
+def observe(y: Array, p: Array) -> dict[str, Array]:
+    """What the slip model shows."""
+    _, geometry = slow(*y, p)
+    inverse = np.concatenate([p[:4], p[7:]])
+    return slip.observe(np.stack([y[0], y[1], *geometry[7:10], y[5], y[6]]), inverse)
+
+
+SPLIT = replace(
+    slip.MODEL,
+    states=("u1", "u2", "M1", "M2", "M3", "v1", "v2"),
+    constants=constants,
+    start=start,
+    energy=energy,
+    observe=observe,
+)
+"""The slip model in these variables, for methods that use `slow` and `newton` in place of a right-hand side."""

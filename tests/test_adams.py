@@ -1,0 +1,249 @@
+"""The method that does not feel friction, against dopri5 at small steps, and its own parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from conftest import ROOT, columns
+from hypothesis import given
+from hypothesis import strategies as st
+
+import sweep
+from sweep import ConfigError
+from sweep.executor import execute
+from sweep.kernels import adams
+from sweep.kernels.adams import AdamsKernel, accurate_step, fitted_weights
+from sweep.kernels.lanes import DIVERGED, LANES, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT, Kernel
+from sweep.kernels.tableau import DOPRI5
+from sweep.models import MODELS, analytic, linear, slip, slip_split
+from sweep.models.coefficients import rattle_period
+from sweep.models.model import stack
+
+Write = Callable[..., Path]
+MEASURE = ("reversals", "energy_error")
+ADAMS, DOPRI = AdamsKernel(MEASURE), Kernel(MODELS["slip"], DOPRI5, MEASURE)
+
+
+def images(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **parameters: Any) -> np.ndarray:
+    body = columns(**parameters)
+    cells = len(body["mu"])
+    stable = np.full((6, cells), np.nan)
+    if settle:
+        stable[1], stable[0] = linear.critical_spins(MODELS["slip"], body, analytic.critical_spins(body))
+    return kernel.images(body, np.broadcast_to(step, cells).astype(float), t_end, stable, rattle_period(body))
+
+
+def run(kernel: Kernel, step: Any, t_end: float, **parameters: Any) -> np.ndarray:
+    table = images(kernel, step, t_end, **parameters)
+    execute(kernel, table, stop_when_settled=True)
+    return table
+
+
+def spin(kernel: Kernel, table: np.ndarray) -> np.ndarray:
+    n = len(kernel.model.states)
+    return kernel.model.energy(table[:, :n].T, table[:, n : kernel.row("step")].T)[0]
+
+
+tilt, rate, slide = st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.01, 0.01)
+bodies = st.fixed_dictionaries({"a": st.floats(2, 15), "b": st.floats(1.1, 10), "c": st.floats(0.5, 1.5),
+                                "delta": st.floats(-0.5, 0.5), "mu": st.floats(0.1, 300)})  # fmt: skip
+
+
+@given(st.tuples(tilt, tilt, rate, rate, rate, slide, slide).map(np.array), bodies)
+def test_the_split_equations_are_those_of_slip(y: np.ndarray, body: dict[str, float]) -> None:
+    p_slip, p = stack(slip.constants(columns(**body)))[:, 0], stack(slip_split.constants(columns(**body)))[:, 0]
+    slopes, (n, _, R, _) = slip.rhs(y, p_slip)
+    split = np.array(slip_split.momentum(y, p))
+    ours, geometry = slip_split.slow(*split, p)
+    np.testing.assert_allclose(geometry[7:10], y[2:5], atol=1e-12)
+    # M' along the slip model's motion, by a complex step through the change of variables.
+    moved = np.array(slip_split.momentum(y + 1e-30j * np.array(slopes), p)).imag / 1e-30
+    scale = 1 + np.abs(moved).max() + body["mu"]
+    np.testing.assert_allclose(ours, moved[:5], atol=1e-11 * scale)
+    # A Newton step of vanishing weight γ moves v by γ v'.
+    gamma = 1e-9
+    v1, v2, num, den = slip_split.newton(*split[[0, 1, 5, 6]], geometry, p, gamma, y[5], y[6])
+    np.testing.assert_allclose((np.array([v1, v2]) - y[5:]) / gamma, slopes[5:], atol=1e-5 * scale)
+    assert num / den == pytest.approx(R, abs=1e-9 * scale)
+    assert slip_split.energy(split, p)[0] == pytest.approx(n, abs=1e-12)
+    np.testing.assert_allclose(slip_split.energy(split, p), slip.energy(y, p_slip), atol=1e-11)
+
+
+@given(st.floats(-0.002, 0.002), st.floats(-0.002, 0.002), st.floats(10, 1000))
+def test_newtons_error_is_quadratic(v1: float, v2: float, mu: float) -> None:
+    """A tenth of the distance leaves a hundredth of the error: the Jacobian is exact but for gyroscopic terms (ω = 0 here)."""
+    p = stack(slip_split.constants(columns(mu=mu)))[:, 0]
+    split = np.array(slip_split.momentum(np.array([1e-2, 2e-2, 0, 0, 0, v1, v2]), p))
+    _, geometry = slip_split.slow(*split, p)
+
+    def step(v: np.ndarray) -> np.ndarray:
+        return np.array(slip_split.newton(split[0], split[1], *v, geometry, p, 0.05, v1, v2)[:2])
+
+    solution = np.array([v1, v2])
+    for _ in range(30):
+        solution = step(solution)
+    errors = [np.abs(step(solution + distance / mu) - solution).max() for distance in (1e-2, 1e-3)]
+    assert errors[1] < errors[0] / 50 or errors[1] < 1e-13
+
+
+@pytest.mark.parametrize("nodes", [-np.arange(8), 1 - np.arange(9)], ids=["predictor", "corrector"])
+def test_weights(nodes: np.ndarray) -> None:
+    plain = fitted_weights(nodes, np.zeros((2, 1)))[0]
+    # Adams-Bashforth 8 and Adams-Moulton 9, Hairer, Norsett & Wanner (1993), III.1.
+    assert plain[0] == pytest.approx(434241 / 120960 if len(nodes) == 8 else 1070017 / 3628800, rel=1e-12)
+    for nu in (1e-3, 0.1, 0.3, 0.45):
+        w = fitted_weights(nodes, np.array([[nu], [3 * nu]]))[0]
+        for k in range(len(nodes) - 4):
+            assert w @ nodes.astype(float) ** k == pytest.approx(1 / (k + 1), rel=1e-10)
+        for omega in (nu, 3 * nu):
+            assert w @ np.cos(omega * nodes) == pytest.approx(np.sin(omega) / omega, rel=1e-11)
+            assert w @ np.sin(omega * nodes) == pytest.approx((1 - np.cos(omega)) / omega, rel=1e-9)
+    assert fitted_weights(nodes, np.array([[1e-6], [3e-6]]))[0] == pytest.approx(plain, rel=1e-6)
+
+
+def test_bdf_and_extrapolation_are_exact_for_quartics() -> None:
+    at = -np.arange(5.0)
+    for k in range(5):
+        assert np.dot(adams.EXTRAPOLATE, at**k) == pytest.approx(1)
+        assert np.dot(adams.BDF, at**k) + adams.BDF_GAMMA * k == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "bound"),
+    [({"mu": 60.0}, 1e-6), ({"mu": 200.0}, 1e-6), ({"mu": 1000.0}, 1e-6),
+     ({"mu": 200.0, "delta": -0.03, "y0": -0.01, "n0": -0.05}, 1e-6)],
+)  # fmt: skip
+def test_spin_against_dopri5(parameters: dict[str, float], bound: float) -> None:
+    exact = spin(DOPRI, run(DOPRI, 0.2 / parameters["mu"], 400.0, **parameters))[0]
+    errors = [abs(spin(ADAMS, run(ADAMS, h, 400.0, **parameters))[0] - exact) for h in (0.125, 0.0667)]
+    assert errors[0] < bound
+    assert errors[1] < bound / 50
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-8])
+@pytest.mark.parametrize(
+    "parameters",
+    [{"mu": 20.0}, {"mu": 60.0}, {"mu": 1000.0}, {"n0": 0.1, "mu": 200.0}, {"x0": 2.0, "mu": 200.0}, {"b": 1.5},
+     {"b": 8.0, "mu": 200.0}],
+)  # fmt: skip
+def test_automatic_step_meets_the_tolerance(parameters: dict[str, float], tolerance: float) -> None:
+    step = accurate_step(columns(**parameters), tolerance)
+    fine = spin(ADAMS, run(ADAMS, step / 3, 400.0, **parameters))[0]
+    assert abs(spin(ADAMS, run(ADAMS, step, 400.0, **parameters))[0] - fine) < tolerance
+
+
+def test_step_does_not_feel_friction() -> None:
+    step = accurate_step(columns(mu=[1e2, 1e3, 1e4, 1e5]), 1e-6)
+    assert np.ptp(step) == 0
+    # Between rolling and 1e5 as little is left as 1/μ says.
+    rolling = Kernel(MODELS["noslip"], DOPRI5, ())
+    body = columns()
+    table = rolling.images(body, np.array([0.01]), 100.0, np.full((6, 1), np.nan), rattle_period(body))
+    execute(rolling, table, stop_when_settled=False)
+    distance = [abs(spin(ADAMS, run(ADAMS, 0.05, 100.0, mu=mu)) - spin(rolling, table))[0] for mu in (1e4, 1e5)]
+    assert distance[0] / distance[1] == pytest.approx(10, rel=0.2)
+
+
+def test_time_limit_is_met_exactly() -> None:
+    table = run(ADAMS, 0.1, 100.0)
+    assert table[0, ADAMS.row("status")] == TIME_LIMIT
+    reached = table[0, ADAMS.row("begin")] + table[0, ADAMS.row("done")] * table[0, ADAMS.row("step")]
+    assert reached == pytest.approx(100.0, rel=1e-14)
+    assert ADAMS.times(table, 100.0)[0] == 100.0
+
+
+MIXED = {
+    "mu": np.linspace(20, 900, 37),
+    "b": np.resize([1.5, 3.0, 5.0], 37),
+    "n0": np.resize([0.05, -0.03, 0.002, 0.02, 3.0], 37),
+}
+
+
+def mixed() -> np.ndarray:
+    return images(ADAMS, np.linspace(0.05, 0.12, 37), 900.0, settle=True, **MIXED)
+
+
+@pytest.fixture(scope="module")
+def expected() -> np.ndarray:
+    table = mixed()
+    execute(ADAMS, table, stop_when_settled=True)
+    ends = set(table[:, ADAMS.row("status")])
+    assert {SETTLED, TIME_LIMIT} <= ends
+    assert ends & {LIFT_OFF, DIVERGED, PARADOX}
+    return table
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("chunk", [1, 7, 1000])
+def test_bit_identical_for_threads_and_chunks(threads: int, chunk: int, expected: np.ndarray) -> None:
+    before = numba.get_num_threads()
+    numba.set_num_threads(min(threads, before))
+    try:
+        table = mixed()
+        execute(ADAMS, table, stop_when_settled=True, chunk_blocks=chunk)
+        np.testing.assert_array_equal(table, expected)
+    finally:
+        numba.set_num_threads(before)
+
+
+def test_bit_identical_in_any_order(expected: np.ndarray) -> None:
+    order = np.random.default_rng(1).permutation(len(expected))
+    table = mixed()[order]
+    execute(ADAMS, table, stop_when_settled=True)
+    np.testing.assert_array_equal(table, expected[order])
+
+
+def test_equilibrium_stays_exactly() -> None:
+    table = images(ADAMS, 0.1, 500.0, x0=0.0, y0=0.0, n0=[0.0, 0.05, -0.3])
+    before = table[:, :7].copy()
+    execute(ADAMS, table, stop_when_settled=True)
+    np.testing.assert_array_equal(table[:, :7], before)
+
+
+def test_a_rattle_of_1e_30_grows_as_one_of_1e_20() -> None:
+    small, large = (run(ADAMS, 0.1, 400.0, x0=x, y0=x)[0, [0, 1, 2, 3, 5, 6]] for x in (1e-30, 1e-20))
+    np.testing.assert_allclose(large, small * 1e10, rtol=1e-9)
+
+
+def test_reversals_of_the_papers_figure() -> None:
+    table = run(ADAMS, 0.08, 14_000.0, settle=True, mu=[60.0, 130.0, 200.0])
+    assert list(table[:, ADAMS.row("reversals")]) == [3, 6, 9]
+    twin = run(DOPRI, 0.026, 3000.0, settle=True)
+    last = table[0, ADAMS.row("last_reversal")]
+    assert last == pytest.approx(twin[0, DOPRI.row("last_reversal")], abs=0.01)
+
+
+def test_energy_balance() -> None:
+    """The work is summed to fourth order: the violation seen falls with the step and is small."""
+    seen = [run(ADAMS, h, 1000.0)[0, ADAMS.row("violation")] / 0.02726 for h in (0.1, 0.05)]
+    assert seen[0] < 1e-4
+    assert seen[1] < seen[0] / 10
+
+
+def test_vectorised() -> None:
+    block = adams._make_run_block(ADAMS.rows, ADAMS.measure)
+    block(np.zeros(len(ADAMS.rows) * LANES))
+    assembly = next(iter(block.inspect_asm().values()))
+    assert assembly.count("divpd") >= 3 * adams.HISTORY
+    assert assembly.count("divsd") + assembly.count("sqrtsd") == 0
+
+
+def test_counts_of_the_reference(tmp_path: Path) -> None:
+    table = np.genfromtxt(ROOT / "data" / "reference_counts.csv", delimiter=",", names=True)
+    names = ["a", "b", "delta", "mu", "n0", "x0", "y0"]
+    cells = np.column_stack([table[name] for name in names])
+    np.savetxt(tmp_path / "cells.csv", cells, delimiter=",", header=",".join(names), comments="", fmt="%.17g")
+    (tmp_path / "c.yaml").write_text("cases: cells.csv\nintegrator: {method: adams}\n")
+    ours = sweep.run(tmp_path / "c.yaml").reversals.values
+    assert (ours != table["reversals"]).sum() <= len(cells) / 75
+
+
+def test_only_the_slip_model_has_it(write: Write) -> None:
+    text = "model: averaged\nfriction: {mu: 60}\nintegrator: {method: adams}\n"
+    with pytest.raises(ConfigError, match=r"3:22: integrator\.method: cannot run the averaged model; allowed: dopri5"):
+        sweep.load_config(write(text))
