@@ -156,7 +156,7 @@ def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.
     out, interruptions, steps = tmp_path / "out", 0, [0.0]
     while True:
         try:
-            dataset = sweep.run(write(), out, reporter=Stop(3))
+            dataset = sweep.run(write(), out, reporter=Stop(2))
             break
         except KeyboardInterrupt:
             interruptions += 1
