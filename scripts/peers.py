@@ -43,15 +43,18 @@ import numba
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
+from sweep.kernels.adams import AdamsKernel
 from sweep.kernels.lanes import BLOCK, TIME_LIMIT, Kernel
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import ellipsoid
+from sweep.models import ellipsoid, slip_split
 from sweep.models.coefficients import rattle_period
 from sweep.models.model import Array, stack
 from sweep.models.slip import MODEL
 
 THREADS = 2
 T_END = 400.0
+
+ADAMS_STEPS = (0.125, 0.1, 0.08, 0.0667, 0.05)
 
 SLOW_SECONDS, SLOW_REPEATS = 3.0, 3
 """Runs longer than this are repeated no more often than that."""
@@ -150,21 +153,33 @@ def our_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
         tool = "sweep, measuring" if measure else "sweep"
         for step in map(problem.step, STEPS[1::2] if quick else STEPS):
             yield Entry(tool, f"dopri5 h={step:g}", our_run(problem, kernel, step), problem)
+        stiff = AdamsKernel(measure)
+        for step in ADAMS_STEPS[1::2] if quick else ADAMS_STEPS:
+            yield Entry(f"{tool} (adams)", f"adams h={step:g}", our_run(problem, stiff, step), problem)
 
 
 def our_run(problem: Problem, kernel: Kernel, step: float) -> Callable[[], Array]:
+    """Whole runs, with the preparation of their images: adams has its start-up there."""
     steps, never_settles = np.full(problem.size, step), np.full((6, problem.size), np.nan)
-    start = kernel.images(problem.columns, steps, T_END, never_settles, rattle_period(problem.columns))
-    cells = np.arange(problem.size)
+    cells, period = np.arange(problem.size), rattle_period(problem.columns)
     blocks = problem.size * (math.ceil(T_END / step / BLOCK) + 1)
 
     def run() -> Array:
-        images = start.copy()
+        images = kernel.images(problem.columns, steps, T_END, never_settles, period)
         kernel.advance(images, cells, blocks, False)
         finished = images[:, kernel.row("status")] == TIME_LIMIT
-        return np.where(finished, images[:, : len(MODEL.states)].T, np.nan)
+        return np.where(finished, slip_states(kernel, images), np.nan)
 
     return run
+
+
+def slip_states(kernel: Kernel, images: Array) -> Array:
+    """States (u1, u2, ω1, ω2, ω3, v1, v2), whatever the method's own."""
+    states, constants = images[:, :7].T, images[:, 7 : kernel.row("step")].T
+    if isinstance(kernel, AdamsKernel):
+        _, geometry = slip_split.slow(*states, constants)
+        return np.stack([*states[:2], *geometry[7:10], *states[5:]])
+    return states
 
 
 # --- heyoka.py --------------------------------------------------------------------------------
