@@ -84,6 +84,7 @@ def run(
             files.discard()
         if finished := files.load_dataset(identify(config)):
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
+            draw(finished, files, reporter)
             return finished
 
     if config.model in MODELS:
@@ -94,10 +95,22 @@ def run(
         result = evaluate(config)
     if files:
         files.save_dataset(result)
-        from sweep import plots  # matplotlib: a third of the time that `import sweep` would take
-
-        plots.draw(result).savefig(files.folder / f"{config.name}.png")
+        draw(result, files, reporter)
     return result
+
+
+def draw(result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
+    """The maps of a run, beside its dataset, unless they are there."""
+    from sweep import plots  # matplotlib: a third of the time that `import sweep` would take
+
+    if files.picture.exists():
+        return
+    try:
+        figure = plots.draw(result)
+    except ValueError as error:
+        reporter.note(f"no picture: {error}")
+        return
+    files.save_picture(figure)
 
 
 def predict(config: Config | str | Path, **overrides: Any) -> xr.Dataset:

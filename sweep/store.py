@@ -59,6 +59,10 @@ class RunFiles:
         return self.folder / f"{self.name}.nc"
 
     @property
+    def picture(self) -> Path:
+        return self.folder / f"{self.name}.png"
+
+    @property
     def checkpoint(self) -> Path:
         return self.folder / f"{self.name}.checkpoint"
 
@@ -116,11 +120,14 @@ class RunFiles:
         """Write a dataset that no run resumes from, and its picture."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self.save_dataset(dataset)
-        with replacing(self.dataset.with_suffix(".png")) as temporary:
+        self.save_picture(figure)
+
+    def save_picture(self, figure: Figure) -> None:
+        with replacing(self.picture) as temporary:
             figure.savefig(temporary, format="png")
 
     def discard(self) -> None:
-        for path in (self.dataset, self.checkpoint):
+        for path in (self.dataset, self.picture, self.checkpoint):
             path.unlink(missing_ok=True)
 
     def _refuse_other(self, path: Path, found: Identity, wanted: Identity) -> None:

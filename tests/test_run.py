@@ -124,6 +124,22 @@ def test_command_writes_dataset_and_maps(write: Write, tmp_path: Path, small: xr
     assert again.exit_code == 0
 
 
+def test_a_missing_picture_is_drawn_again(write: Write, tmp_path: Path) -> None:
+    sweep.run(write(), tmp_path / "out", mu=40.0)
+    (tmp_path / "out" / "small.png").unlink()
+    sweep.run(write(), tmp_path / "out", mu=40.0)
+    assert (tmp_path / "out" / "small.png").exists()
+
+
+def test_too_many_panels_for_a_picture_are_no_failure(write: Write, tmp_path: Path) -> None:
+    many = ("b=[2,2.1,2.2,2.3,2.4]", "mu=[40,41,42,43,44]", "n0=[0.01,0.02,0.03]", "delta=[0.01,0.02,0.03]", "t_end=5")
+    settings = [part for setting in many for part in ("--set", setting)]
+    result = invoke("run", write(), "--output", tmp_path / "out", *settings)
+    assert result.exit_code == 0
+    assert "no picture: 9 panels" in result.stderr
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["small.nc"]
+
+
 def test_python_writes_nothing_by_itself(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     file = write()
