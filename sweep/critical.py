@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from sweep import dataset, executor
-from sweep.config import Config, Values
+from sweep.config import Config, ConfigError, Fault, Values
 from sweep.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
 from sweep.grid import Array, Grid
 from sweep.kernels import methods
@@ -20,7 +20,9 @@ from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
 from sweep.models.linear import growth_rate
 from sweep.models.model import stack
+from sweep.parameters import START
 from sweep.prediction import Prediction, predict
+from sweep.run import simulated, with_dopri5
 
 WIDTH = 1e-3
 """Relative width to which simulation brackets a critical spin."""
@@ -60,8 +62,11 @@ def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] =
     Dataset over the axes without n0; `*_simulated` with its bracket `*_inner`, `*_outer`, and
     `critical_reason`, which says why a spin is NaN.
     """
+    model = simulated(config)
+    if beyond := sorted((START - {"n0"}) & set(config.axes)):
+        raise ConfigError([Fault("critical", None, None, ("start", beyond[0]), "an axis; allowed: a number")])
+    config = with_dopri5(config)
     grid = Grid.of(_without_n0(config))
-    model = MODELS[config.model]
     prediction = predict(model, grid)
     arrays: dict[str, Array] = dict(dataset.predicted(prediction))
     arrays.pop("reversals_predicted", None)
@@ -129,7 +134,9 @@ def _reverses(config: Config, columns: dict[str, Array]) -> Array:
     """Whether trajectories reverse at least once."""
     kernel, images = _images(config, columns, ("reversals",), config.integrator.t_end)
     executor.execute(kernel, images, stop_when_settled=True)
-    return np.asarray(images[:, kernel.row("reversals")] > 0)
+    reverses = images[:, kernel.row("reversals")] > 0
+    # A body that leaves the plane is not one that stays below its critical spin.
+    return np.asarray(reverses | np.isin(images[:, kernel.row("status")], executor.FAILURES))
 
 
 def _rattle_grows(config: Config, columns: dict[str, Array]) -> Array:
@@ -173,7 +180,7 @@ def _images(config: Config, columns: dict[str, Array], measure: Any, t_end: floa
     assert stability is not None  # it is a model
     kernel = Kernel(model, DOPRI5, measure)
     if config.integrator.step == "auto":
-        step = methods.automatic_step("dopri5", model, columns)[0]
+        step = methods.automatic_step("dopri5", model, columns, config.integrator.tolerance)[0]
     else:
         step = np.full(grid.size, config.integrator.step)
     return kernel, kernel.images(columns, step, t_end, stability.ranges, rattle_period(columns))

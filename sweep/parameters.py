@@ -43,15 +43,15 @@ class Parameter:
 PARAMETERS: dict[str, Parameter] = {
     p.name: p
     for p in (
-        Parameter("a", "body", "1", "semi-axis of the ellipsoid along x (long axis), in c", 10.0, above=0),
-        Parameter("b", "body", "1", "semi-axis of the ellipsoid along y (short axis), in c", 3.0, above=0),
-        Parameter("c", "body", "1", "semi-axis of the ellipsoid along z, the unit of length", 1.0, above=0),
+        Parameter("a", "body", "1", "semi-axis of the ellipsoid along x (long axis), in c", 10.0, above=0, below=1e6),
+        Parameter("b", "body", "1", "semi-axis of the ellipsoid along y (short axis), in c", 3.0, above=0, below=1e6),
+        Parameter("c", "body", "1", "semi-axis of the ellipsoid along z, the unit of length", 1.0, above=0, below=1e6),
         Parameter(
             "delta", "body", "radian", "angle from the ellipsoid's axes to the axes of inertia",
             0.03, above=-pi / 2, below=pi / 2,
         ),
-        Parameter("mu", "friction", "1", "viscous friction coefficient, in 1/sqrt(g c)", None, at_least=0),
-        Parameter("n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05),
+        Parameter("mu", "friction", "1", "viscous friction coefficient, in 1/sqrt(g c)", None, at_least=0, below=1e12),
+        Parameter("n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05, above=-1e3, below=1e3),
         Parameter("x0", "start", "1", "start contact point along x, in c", 0.01),
         Parameter("y0", "start", "1", "start contact point along y, in c", 0.01),
     )

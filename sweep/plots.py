@@ -23,6 +23,9 @@ SYMBOLS = {"mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀", 
 # An axis of more values than this is drawn as an axis; a shorter one gets a panel for each value.
 _PANEL_VALUES = 4
 _MAX_ROWS = 8
+
+# What a trajectory that failed has no value of.
+_SIMULATED = {"reversals", "t_first_reversal", "t_last_reversal", "spin_mean", "spin_final", "energy_error"}
 _MAX_COLOURS = 40
 
 
@@ -139,16 +142,22 @@ def _words(name: str) -> str:
 def _without_result(chosen: xr.Dataset, name: str, dims: tuple[str, str]) -> Array:
     values = chosen[name]
     empty = np.isnan(values.transpose(*dims).values.astype(float))
-    if name in ("reversals", "t_last_reversal", "spin_mean", "spin_final", "energy_error"):
+    if name in _SIMULATED:
         empty |= np.isin(chosen["status"].transpose(*dims).values, (0, *FAILURES))
     return np.asarray(empty)
 
 
-def _mark_best_shape(axes: Axes, dataset: xr.Dataset, right: str) -> None:
-    if right != "b" or dataset["a"].ndim or dataset["c"].ndim:
-        return
+def _best_shape(dataset: xr.Dataset) -> float | None:
+    """b of the largest form factor, where there is one for the whole dataset."""
+    if any(name not in dataset or dataset[name].ndim for name in ("a", "c")):
+        return None
     b = best_b(float(dataset["a"]), float(dataset["c"]))
-    if dataset["b"].min() <= b <= dataset["b"].max():
+    return b if np.isfinite(b) else None
+
+
+def _mark_best_shape(axes: Axes, dataset: xr.Dataset, right: str) -> None:
+    b = _best_shape(dataset)
+    if right == "b" and b and dataset["b"].min() <= b <= dataset["b"].max():
         axes.axvline(b, color="white", linestyle="--", linewidth=1.2)
         axes.annotate(f"max L(f)\nb = {b:.2f}", (b, 0.99), xycoords=("data", "axes fraction"), color="white",
                       fontsize=7, va="top", xytext=(3, 0), textcoords="offset points")  # fmt: skip
@@ -201,7 +210,7 @@ def _curves(dataset: xr.Dataset, names: list[str], across: list[str], panels: li
             chosen = dataset.isel(panel)
             values = np.atleast_1d(chosen[name].values).astype(float)
             at = np.atleast_1d(dataset[x].values) if x else np.zeros(1)
-            if name != "reversals_predicted" and "status" in chosen:
+            if name in _SIMULATED and "status" in chosen:
                 failed = np.isin(np.atleast_1d(chosen["status"].values), (0, *FAILURES))
                 values = np.where(failed, np.nan, values)
                 if failed.any():
@@ -226,5 +235,5 @@ def _add_form_factor(axes: Axes, dataset: xr.Dataset, panel: dict[str, int]) -> 
     twin.set_ylabel("L(f)", color="0.4")
     twin.set_ylim(bottom=0)
     axes.set_ylim(bottom=0)
-    if not dataset["a"].ndim:
-        axes.axvline(best_b(float(dataset["a"]), float(dataset["c"])), color="0.5", linestyle="--", linewidth=1)
+    if b := _best_shape(dataset):
+        axes.axvline(b, color="0.5", linestyle="--", linewidth=1)

@@ -36,7 +36,7 @@ class Terminal(Reporter):
         self.note("compiling the kernel for this model and machine; the next run finds it in the cache")
 
     def note(self, message: str) -> None:
-        self.console.print(message, soft_wrap=True)
+        self.console.print(message, soft_wrap=True, markup=False)
 
     def chunk(self, progress: executor.Progress) -> None:
         self.last = progress

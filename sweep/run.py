@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from sweep import dataset, executor
-from sweep.config import Config, load_config
+from sweep.config import Config, ConfigError, Fault, load_config
 from sweep.executor import Progress
 from sweep.grid import Array, Grid
 from sweep.jit import fingerprint
@@ -18,9 +18,13 @@ from sweep.kernels import methods
 from sweep.kernels.lanes import SETTLED, Kernel
 from sweep.models import MODELS, TIERS
 from sweep.models.coefficients import rattle_period
+from sweep.models.model import Model
 from sweep.prediction import Prediction
 from sweep.prediction import predict as predict_grid
 from sweep.store import Identity, RunFiles
+
+# Beside the numeric sources: they fill the images, and turn them into results.
+_DECISIVE = tuple(str(Path(__file__).parent / name) for name in ("prediction.py", "grid.py", "dataset.py", "run.py"))
 
 
 @dataclass(frozen=True)
@@ -128,8 +132,26 @@ def as_config(config: Config | str | Path, overrides: dict[str, Any]) -> Config:
     return load_config(config, overrides)
 
 
+def simulated(config: Config) -> Model:
+    """The model of `config`; `ConfigError` where its tier is a formula."""
+    if config.model not in MODELS:
+        message = f"the {config.model} model is not simulated; allowed: {', '.join(MODELS)}"
+        raise ConfigError([Fault("config", None, None, ("model",), message)])
+    return MODELS[config.model]
+
+
+def with_dopri5(config: Config) -> Config:
+    """`config` with the plain method: what stops between the steps needs one without a history.
+
+    A step fixed for another method would be no step for this one.
+    """
+    if config.integrator.method == "dopri5":
+        return config
+    return replace(config, integrator=config.integrator.model_copy(update={"method": "dopri5", "step": "auto"}))
+
+
 def identify(config: Config) -> Identity:
-    return Identity(config.to_yaml(), config.fingerprint(), fingerprint())
+    return Identity(config.to_yaml(), config.fingerprint(), fingerprint(*_DECISIVE))
 
 
 def evaluate(config: Config) -> xr.Dataset:
@@ -139,7 +161,7 @@ def evaluate(config: Config) -> xr.Dataset:
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:
         arrays["reversals"] = arrays["reversals_predicted"]
-    attributes = {"source_hash": fingerprint(), **dataset.provenance(config, 0.0, grid.size)}
+    attributes = {"source_hash": fingerprint(*_DECISIVE), **dataset.provenance(config, 0.0, grid.size)}
     return dataset.label(config, grid, arrays, attributes)
 
 
@@ -202,5 +224,5 @@ def collect(job: Plan, seconds: float) -> xr.Dataset:
         "step_rule": job.step_rule,
         **dataset.predicted(job.prediction),
     }
-    attributes = {"source_hash": fingerprint(), **dataset.provenance(job.config, seconds, job.grid.size)}
+    attributes = {"source_hash": fingerprint(*_DECISIVE), **dataset.provenance(job.config, seconds, job.grid.size)}
     return dataset.label(job.config, job.grid, arrays, attributes)

@@ -41,7 +41,7 @@ class Identity:
             old, new = (c.config.splitlines() for c in (self, other))
             changed = [f"- {line.strip()}" for line in old if line not in new]
             changed += [f"+ {line.strip()}" for line in new if line not in old]
-            return "another configuration:\n  " + "\n  ".join(changed)
+            return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs"])
         if self.source_hash != other.source_hash:
             return "other sources of the model or kernel, or other versions of numpy or numba"
         return ""
@@ -113,7 +113,10 @@ class RunFiles:
         filled = {name for name, variable in dataset.data_vars.items() if variable.dtype.kind == "f"}
         encoding = {name: {"_FillValue": None} for name in set(dataset.variables) - filled}
         with replacing(self.dataset) as temporary:
-            dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
+            try:
+                dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
+            except RuntimeError as error:  # netCDF's own, of a full disk for one
+                raise StoreError(f"{self.dataset}: cannot be written: {error}") from None
         self.checkpoint.unlink(missing_ok=True)
 
     def save_result(self, dataset: xr.Dataset, figure: Figure) -> None:
@@ -151,6 +154,8 @@ def open_dataset(path: Path) -> xr.Dataset:
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path that becomes `path`, all at once, if the block succeeds."""
+    if path.is_dir() or not path.parent.is_dir():
+        raise StoreError(f"{path}: cannot be written: {'a folder' if path.is_dir() else f'no folder {path.parent}'}")
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield temporary

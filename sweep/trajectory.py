@@ -15,11 +15,10 @@ from sweep import executor
 from sweep.config import Config, ConfigError, Fault
 from sweep.grid import Array, off_the_body
 from sweep.kernels.lanes import RUNNING, Kernel
-from sweep.models import MODELS, TIERS
+from sweep.models import TIERS
 from sweep.models.linear import fastest_motion
-from sweep.models.model import Model
 from sweep.parameters import PARAMETERS
-from sweep.run import Plan, as_config, collect, plan
+from sweep.run import Plan, as_config, collect, plan, simulated, with_dopri5
 
 SAMPLES_A_RADIAN = 3
 """Samples in a radian of the fastest motion: nearly twenty a period."""
@@ -62,15 +61,13 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     end of a trajectory; over (trajectory): all that a sweep gives for the cell, from the same run,
     whose steps the sampling does not touch.
     """
-    job = plan(
-        _choose(
-            as_config(config, {}), {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}
-        )
-    )
+    config = as_config(config, {})
+    simulated(config)
+    job = plan(_choose(config, {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}))
     start = job.images.copy()
     executor.execute(job.kernel, job.images, stop_when_settled=job.config.integrator.stop_when_settled)
     summary = collect(job, 0.0).reset_coords(drop=False)
-    series = [_sample(job, start[[i]], job.images[i], every) for i in range(len(start))]
+    series = [_sample(job, i, start[[i]], every) for i in range(len(start))]
     length = max(len(s["time"]) for s in series)
     variables: dict[str, Any] = {}
     for name in series[0]:
@@ -101,9 +98,7 @@ def _choose(config: Config, at: dict[str, list[float]]) -> Config:
         name: tuple(dict(zip(at, values, strict=True)).get(name, constant) for values in combinations)
         for name, constant in constants.items()
     }
-    # Looks between the steps need a method without a history.
-    integrator = config.integrator.model_copy(update={"method": "dopri5"})
-    chosen = replace(config, parameters={}, cases=cases, integrator=integrator)
+    chosen = replace(with_dopri5(config), parameters={}, cases=cases)
     if beyond := off_the_body(chosen):
         raise ConfigError([Fault("--at", None, None, (), beyond)])
     return chosen
@@ -112,25 +107,22 @@ def _choose(config: Config, at: dict[str, list[float]]) -> Config:
 def _wrong(config: Config, name: str, values: list[float]) -> str:
     """What is wrong with values asked for a parameter; "" if nothing is."""
     model = TIERS[config.model]
-    if not isinstance(model, Model):
-        return f"the {model.name} model has no trajectories; allowed: {', '.join(MODELS)}"
     if name not in model.parameters:
         return f"no parameter of the {model.name} model; allowed: {', '.join(model.parameters)}"
     wrong = [v for v in values if not (np.isfinite(v) and PARAMETERS[name].allows(v))]
     return f"{wrong[0]:g}; allowed: {PARAMETERS[name].allowed}" if wrong else ""
 
 
-def _sample(job: Plan, start: Array, end: Array, every: float | None) -> dict[str, Array]:
-    """Step the trajectory again to its end, looking at it on the way.
+def _sample(job: Plan, cell: int, start: Array, every: float | None) -> dict[str, Array]:
+    """Step the trajectory again to its end, moving its goal from sample to sample.
 
-    Moving the goal from sample to sample runs the very instructions of the sweep, where a kernel
-    of its own could round differently.
+    The steps are the sweep's own code, so they are the same to the last bit.
     """
-    model = job.kernel.model
+    model, end = job.kernel.model, job.images[cell]
     # Blocks of one step: a look costs what it shows, not a hundred steps of idle lanes.
     kernel = Kernel(model, job.kernel.tableau, job.kernel.measure, block=1)
     step, steps = float(end[kernel.row("step")]), int(end[kernel.row("done")])
-    stride = max(1, round(_interval(job) / step if every is None else every / step))
+    stride = max(1, round(_interval(job, cell) / step if every is None else every / step))
     goals = np.unique([*range(0, steps, stride), steps])
     images, snapshots = start.copy(), [start[0].copy()]
     for goal in goals[1:]:
@@ -149,6 +141,6 @@ def _sample(job: Plan, start: Array, end: Array, every: float | None) -> dict[st
     return {name: np.broadcast_to(values, goals.shape) for name, values in series.items()}
 
 
-def _interval(job: Plan) -> float:
-    columns = {name: values[:1] for name, values in job.grid.columns().items()}
+def _interval(job: Plan, cell: int) -> float:
+    columns = {name: values[[cell]] for name, values in job.grid.columns().items()}
     return float(1 / (SAMPLES_A_RADIAN * max(fastest_motion(job.kernel.model, columns)[0], 0.1)))

@@ -204,7 +204,7 @@ def test_refuses_another_configuration(write: Write, interrupted: Path) -> None:
 
 
 def test_refuses_other_sources(write: Write, interrupted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["sweep.run"], "fingerprint", lambda: "0" * 16)
+    monkeypatch.setattr(sys.modules["sweep.run"], "fingerprint", lambda *_: "0" * 16)
     with pytest.raises(StoreError, match="other sources"):
         sweep.run(write(), interrupted)
 

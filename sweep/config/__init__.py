@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from sweep.config import cases, document, schema
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.schema import Config, Integrator, Values
-from sweep.grid import off_the_body
+from sweep.grid import Grid, off_the_body
 from sweep.kernels import methods
-from sweep.models import TIERS
+from sweep.models import MODELS, TIERS
+from sweep.models.coefficients import rattle_period
 from sweep.models.model import Model, Tier
 from sweep.parameters import PARAMETERS
 
@@ -40,7 +43,8 @@ def load_config(path: str | Path, overrides: Mapping[str, Any] | None = None) ->
     """
     source = document.read(Path(path))
     for key, value in (overrides or {}).items():
-        source.set(_full_path(key), value, f"--set {key}")
+        plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+        source.set(_full_path(key), plain, f"--set {key}")
     source.values.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "_", Path(path).stem))
     try:
         checked = schema.Schema.model_validate(source.values)
@@ -92,9 +96,30 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         cases=columns,
         cases_file=checked.cases,
     )
+    if reason := _too_large(config):
+        raise ConfigError([source.fault((), reason)])
     if beyond := off_the_body(config):
         raise ConfigError([source.fault(("start", "x0"), beyond)])
+    if reason := _unusable_step(config):
+        raise ConfigError([source.fault(("integrator", "step"), reason)])
     return config
+
+
+def _too_large(config: Config) -> str:
+    cells = math.prod(map(len, config.axes.values()))
+    return f"{cells} cells; allowed: at most {schema.MAX_CELLS}" if cells > schema.MAX_CELLS else ""
+
+
+def _unusable_step(config: Config) -> str:
+    """What is wrong with a step that the configuration fixes; "" if nothing is."""
+    step = config.integrator.step
+    if step == "auto" or config.model not in MODELS:
+        return ""
+    if config.integrator.t_end / step > schema.MAX_STEPS:
+        return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
+    # A window of the period-averaged spin closes at most once a step.
+    longest = float(rattle_period(Grid.of(config).columns()).min() / 2)
+    return f"{step:g}; allowed: auto, or at most {longest:.3g}, half a rattle's period" if step > longest else ""
 
 
 def _measures(asked: list[str] | None, model: Tier) -> tuple[str, ...]:

@@ -21,7 +21,8 @@ from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
 DEFAULT_MEASURES = ("reversals", "energy_error")
 
-MAX_AXIS = 10_000_000
+MAX_CELLS = 10_000_000
+MAX_STEPS = 1e15
 
 
 class _Strict(BaseModel):
@@ -31,7 +32,7 @@ class _Strict(BaseModel):
 class Range(_Strict):
     start: float
     stop: float
-    num: int = Field(ge=1, le=MAX_AXIS)
+    num: int = Field(ge=1, le=MAX_CELLS)
     spacing: Literal["linear", "log"] = "linear"
 
     def values(self) -> list[float]:

@@ -54,6 +54,9 @@ SETTLE_MARGIN = 4.0
 # of failures below) caught each spin that was off by more than 1e-4 and none that was right to 1e-6.
 ENERGY_GAIN = 1e-5
 
+# Beyond this an energy is no number any more.
+MAX_ENERGY = 1e300
+
 # Rattle energies (amplitude squared) below this end as exact zeros, where they can only decay: the
 # products of such numbers are denormal, and cost up to a hundred times a normal operation.
 NEGLIGIBLE = 1e-120
@@ -322,7 +325,10 @@ def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...]) 
             failed = (status == LIFT_OFF) | (status == PARADOX)
             # A step beyond the stability limit shows as energy from nowhere, or lets the slip swing
             # up until it feigns one of these ends.
-            false = (conserved & (total > before * allowed)) | (failed & (group[STABLE_STEP + lane] == 0.0))
+            finite = abs(total) <= MAX_ENERGY
+            false = (
+                (not finite) | (conserved & (total > before * allowed)) | (failed & (group[STABLE_STEP + lane] == 0.0))
+            )
             group[STATUS + lane] = DIVERGED if (running | failed) & false else status
             store_states(group, lane, bounded & (rattle < NEGLIGIBLE), rest(y), y)
 
