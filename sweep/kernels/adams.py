@@ -83,8 +83,6 @@ class AdamsKernel(Kernel):
         goal = np.maximum(np.ceil(t_end / step - lead), 1)
         step = t_end / (goal + lead)
         images = self._start(columns, step, goal, np.ones(len(step)), stable, period)
-        if "energy_error" in self.measure:
-            images[:, self.row("violation")] = 0.0
         self._fill(images, columns, step, levels, lead)
         return images
 
