@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,16 +12,14 @@ from sweep import dataset, executor
 from sweep.config import Config, ConfigError, Fault, Values
 from sweep.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
 from sweep.grid import Array, Grid
-from sweep.kernels import methods
 from sweep.kernels.lanes import RUNNING, Kernel
-from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
 from sweep.models.linear import growth_rate
 from sweep.models.model import stack
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
-from sweep.run import simulated, with_dopri5
+from sweep.run import plan, provenance, simulated, with_dopri5
 
 WIDTH = 1e-3
 """Relative width to which simulation brackets a critical spin."""
@@ -81,7 +78,7 @@ def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] =
             for suffix, values in (("", bracket.middle), ("_inner", bracket.inner), ("_outer", bracket.outer)):
                 arrays[f"{name}_{side}_simulated{suffix}"] = values
             reason[search[np.isnan(bracket.middle[search])]] = NOT_FOUND
-    attributes = {"relative_width": width, **dataset.provenance(config, 0.0, grid.size)}
+    attributes = {"relative_width": width, **provenance(config, 0.0, grid.size)}
     return dataset.label(config, grid, arrays, attributes).drop_vars("n0")
 
 
@@ -167,20 +164,13 @@ def _carry_on(kernel: Kernel, images: Array, steps: Array) -> None:
 
 
 def _rattle(kernel: Kernel, images: Array) -> Array:
-    n = len(kernel.model.states)
-    states, constants = images[:, :n].T, images[:, n : kernel.row("step")].T
-    _, rattle, _ = kernel.model.energy(states, constants)
+    _, rattle, _ = kernel.model.energy(*kernel.unpack(images))
     return np.asarray(np.broadcast_to(rattle, len(images)))
 
 
-def _images(config: Config, columns: dict[str, Array], measure: Any, t_end: float) -> tuple[Kernel, Array]:
-    model = MODELS[config.model]
-    grid = Grid({}, {}, columns)
-    stability = predict(model, grid).stability
-    assert stability is not None  # it is a model
-    kernel = Kernel(model, DOPRI5, measure)
-    if config.integrator.step == "auto":
-        step = methods.automatic_step("dopri5", model, columns, config.integrator.tolerance)[0]
-    else:
-        step = np.full(grid.size, config.integrator.step)
-    return kernel, kernel.images(columns, step, t_end, stability.ranges, rattle_period(columns))
+def _images(config: Config, columns: dict[str, Array], measure: tuple[str, ...], t_end: float) -> tuple[Kernel, Array]:
+    """Kernel and images of the cells `columns`, laid out as a sweep of them would be."""
+    integrator = config.integrator.model_copy(update={"t_end": t_end})
+    cases = {name: tuple(values.tolist()) for name, values in columns.items()}
+    job = plan(replace(config, parameters={}, cases=cases, measure=measure, integrator=integrator))
+    return job.kernel, job.images

@@ -94,13 +94,11 @@ VARIABLES: dict[str, Variable] = {
 
 def measured(kernel: Kernel, images: Array, t_end: float) -> dict[str, Array]:
     """The simulated variables, each of shape (cells,), from images at their ends."""
-    model = kernel.model
-    states, constants = images[:, : len(model.states)].T, images[:, len(model.states) : kernel.row("step")].T
 
     def row(name: str) -> Array:
         return np.asarray(images[:, kernel.row(name)])
 
-    spin, _, _ = model.energy(states, constants)
+    spin, _, _ = kernel.model.energy(*kernel.unpack(images))
     result = {
         "status": row("status"),
         "spin_final": spin,

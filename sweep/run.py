@@ -161,8 +161,12 @@ def evaluate(config: Config) -> xr.Dataset:
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:
         arrays["reversals"] = arrays["reversals_predicted"]
-    attributes = {"source_hash": fingerprint(*_DECISIVE), **dataset.provenance(config, 0.0, grid.size)}
-    return dataset.label(config, grid, arrays, attributes)
+    return dataset.label(config, grid, arrays, provenance(config, 0.0, grid.size))
+
+
+def provenance(config: Config, seconds: float, cells: int) -> dict[str, Any]:
+    """Where the numbers of a dataset come from, as its attributes."""
+    return {"source_hash": identify(config).source_hash, **dataset.provenance(config, seconds, cells)}
 
 
 def plan(config: Config, reporter: Reporter | None = None) -> Plan:
@@ -224,5 +228,4 @@ def collect(job: Plan, seconds: float) -> xr.Dataset:
         "step_rule": job.step_rule,
         **dataset.predicted(job.prediction),
     }
-    attributes = {"source_hash": fingerprint(*_DECISIVE), **dataset.provenance(job.config, seconds, job.grid.size)}
-    return dataset.label(job.config, job.grid, arrays, attributes)
+    return dataset.label(job.config, job.grid, arrays, provenance(job.config, seconds, job.grid.size))

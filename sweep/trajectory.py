@@ -67,7 +67,9 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     start = job.images.copy()
     executor.execute(job.kernel, job.images, stop_when_settled=job.config.integrator.stop_when_settled)
     summary = collect(job, 0.0).reset_coords(drop=False)
-    series = [_sample(job, i, start[[i]], every) for i in range(len(start))]
+    # Blocks of one step: a look costs what it shows, not a hundred steps of idle lanes.
+    kernel = Kernel(job.kernel.model, job.kernel.tableau, job.kernel.measure, block=1)
+    series = [_sample(job, kernel, i, start[[i]], every) for i in range(len(start))]
     length = max(len(s["time"]) for s in series)
     variables: dict[str, Any] = {}
     for name in series[0]:
@@ -113,14 +115,12 @@ def _wrong(config: Config, name: str, values: list[float]) -> str:
     return f"{wrong[0]:g}; allowed: {PARAMETERS[name].allowed}" if wrong else ""
 
 
-def _sample(job: Plan, cell: int, start: Array, every: float | None) -> dict[str, Array]:
+def _sample(job: Plan, kernel: Kernel, cell: int, start: Array, every: float | None) -> dict[str, Array]:
     """Step the trajectory again to its end, moving its goal from sample to sample.
 
     The steps are the sweep's own code, so they are the same to the last bit.
     """
-    model, end = job.kernel.model, job.images[cell]
-    # Blocks of one step: a look costs what it shows, not a hundred steps of idle lanes.
-    kernel = Kernel(model, job.kernel.tableau, job.kernel.measure, block=1)
+    model, end = kernel.model, job.images[cell]
     step, steps = float(end[kernel.row("step")]), int(end[kernel.row("done")])
     stride = max(1, round(_interval(job, cell) / step if every is None else every / step))
     goals = np.unique([*range(0, steps, stride), steps])
@@ -131,8 +131,7 @@ def _sample(job: Plan, cell: int, start: Array, every: float | None) -> dict[str
         kernel.advance(images, np.zeros(1, dtype=np.int64), int(goal - images[0, kernel.row("done")]), False)
         snapshots.append(images[0].copy())
     table = np.array(snapshots)
-    n = len(model.states)
-    states, constants = table[:, :n].T, table[0, n : kernel.row("step"), None]
+    states, constants = kernel.unpack(table)
     spin, rattle, inertia = model.energy(states, constants)
     series = {"time": goals * step, "spin": spin, **model.observe(states, constants)}
     if "energy_error" in kernel.measure:

@@ -134,6 +134,11 @@ class Kernel:
         """
         self._advance(images, cells, blocks, stop_when_settled, numba.get_num_threads())
 
+    def unpack(self, images: Array) -> tuple[Array, Array]:
+        """States and constants of images, of shapes (states, cells) and (constants, cells)."""
+        n = len(self.model.states)
+        return images[:, :n].T, images[:, n : self.row("step")].T
+
     def times(self, images: Array, t_end: float) -> Array:
         """Times that the images have reached, shape (cells,)."""
         return np.asarray(images[:, self.row("done")] / images[:, self.row("goal")] * t_end)

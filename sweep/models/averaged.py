@@ -32,10 +32,6 @@ def start(columns: Columns) -> tuple[Array, ...]:
     return np.sqrt(k.nu1**2 + 1) * X, np.sqrt(k.nu2**2 + 1) * Y, columns["n0"]
 
 
-def fastest_decay(columns: Columns) -> Array:
-    return np.zeros_like(columns["a"])
-
-
 @inline
 def upright(n: Any) -> Any:
     return (0.0, 0.0, n)
@@ -69,7 +65,6 @@ MODEL = Model(
     measures=("reversals", "energy_error", "first_reversal"),
     constants=constants,
     start=start,
-    fastest_decay=fastest_decay,
     upright=upright,
     rhs=rhs,
     energy=energy,

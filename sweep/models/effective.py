@@ -38,10 +38,6 @@ def start(columns: Columns) -> tuple[Array, ...]:
     return X, Y, rest, rest, columns["n0"]
 
 
-def fastest_decay(columns: Columns) -> Array:
-    return np.zeros_like(columns["a"])
-
-
 @inline
 def upright(n: Any) -> Any:
     return (0.0, 0.0, 0.0, 0.0, n)
@@ -81,7 +77,6 @@ MODEL = Model(
     measures=("reversals", "first_reversal"),
     constants=constants,
     start=start,
-    fastest_decay=fastest_decay,
     upright=upright,
     rhs=rhs,
     energy=energy,

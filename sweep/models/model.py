@@ -18,6 +18,11 @@ Columns = Mapping[str, Array]
 """Physical parameters by name: arrays of one common shape (cells,)."""
 
 
+def nothing_decays(columns: Columns) -> Array:
+    """No mode is stiff."""
+    return np.zeros_like(columns["a"])
+
+
 @dataclass(frozen=True)
 class Tier:
     """One rung of the ladder of models, be it equations of motion or a formula."""
@@ -46,9 +51,6 @@ class Model(Tier):
     """Coefficients of the right-hand side, each of shape (cells,)."""
     start: Callable[[Columns], tuple[Array, ...]]
     """States at t = 0, each of shape (cells,)."""
-    fastest_decay: Callable[[Columns], Array]
-    """Bound on |λ| of the fastest damped mode anywhere on the trajectory, shape (cells,); it
-    limits the step of an explicit method.  Zeros where nothing is stiff."""
     upright: Callable[..., tuple[Any, ...]]
     """Inline, spin -> states: steady upright spin without rattle."""
     rhs: Callable[..., tuple[Any, ...]]
@@ -58,6 +60,9 @@ class Model(Tier):
     """Inline, (states, constants) -> (spin, energy of the rattle, inertia J of the spin):
     rattle + J n²/2 is the energy above rest, which friction alone changes.  Each term must keep
     its relative precision however small the rattle is."""
+    fastest_decay: Callable[[Columns], Array] = nothing_decays
+    """Bound on |λ| of the fastest damped mode anywhere on the trajectory, shape (cells,); it
+    limits the step of an explicit method.  By default nothing is stiff."""
     radians_a_step: float = 0.07
     """Phase of the fastest motion in one step of a fifth-order method.  On the slip model 0.07 gives
     spin errors at t = 400 (a = 10, b = 3, n0 = 0.05 and 0.1, μ = 20, where accuracy decides) of 3e-9

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.ellipsoid import contact
@@ -30,10 +28,6 @@ def start(columns: Columns) -> tuple[Array, ...]:
     u1, u2, u3 = ellipsoid.start(columns)
     n0 = columns["n0"]
     return u1, u2, n0 * u1, n0 * u2, n0 * u3
-
-
-def fastest_decay(columns: Columns) -> Array:
-    return np.zeros_like(columns["a"])
 
 
 @inline
@@ -91,7 +85,6 @@ MODEL = Model(
     measures=("reversals", "energy_error", "first_reversal"),
     constants=constants,
     start=start,
-    fastest_decay=fastest_decay,
     upright=upright,
     rhs=rhs,
     energy=energy,

@@ -33,10 +33,11 @@ def simulate(name: str, columns: Columns, t_end: float, step: float | None = Non
     steps = automatic_step("dopri5", model, columns)[0] if step is None else np.full(len(columns["a"]), step)
     images = kernel.images(columns, steps, t_end, np.full((6, len(steps)), np.nan), rattle_period(columns))
     execute(kernel, images, stop_when_settled=False)
-    n = len(model.states)
-    states, constants = images[:, :n].T, images[:, n : kernel.row("step")].T
+    states, constants = kernel.unpack(images)
     spin = model.energy(states, constants)[0]
-    violation = images[:, kernel.row("violation")] / images[:, kernel.row("energy_start")] if measure else np.zeros(n)
+    violation = (
+        images[:, kernel.row("violation")] / images[:, kernel.row("energy_start")] if measure else np.zeros(len(images))
+    )
     return states, spin, violation
 
 
