@@ -58,6 +58,7 @@ def execute(
         pending = pending[np.argsort(steps[pending] == 0, kind="stable")]
         chunk_began = time.perf_counter()
         kernel.advance(images, pending, blocks, stop_when_settled)
+        kernel.carry(images)
         if chunk_blocks is None:
             blocks = _rescale(blocks, time.perf_counter() - chunk_began)
         if after_chunk:

@@ -174,7 +174,7 @@ def plan(config: Config, reporter: Reporter | None = None) -> Plan:
     grid, model = Grid.of(config), MODELS[config.model]
     columns = grid.columns()
     method = config.integrator.method
-    kernel = methods.make_kernel(method, model, config.measure)
+    kernel = methods.make_kernel(method, model, config.measure, config.integrator.tolerance)
     if reporter and not kernel.is_compiled():
         reporter.compiling()
     prediction = predict_grid(model, grid)

@@ -14,8 +14,8 @@ from pydantic_core import PydanticCustomError
 from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
-from sweep.kernels.lanes import MEASURES
-from sweep.kernels.methods import METHODS, TOLERANCE
+from sweep.kernels.lanes import MEASURES, TOLERANCE
+from sweep.kernels.methods import METHODS
 from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 

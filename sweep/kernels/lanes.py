@@ -35,6 +35,12 @@ BLOCK = 128
 # Ends of a trajectory; `dataset` gives them their meanings for the user.
 RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX = range(6)
 
+# Not an end: the rattle is so small that the kernel's `carry` may have a shorter way than steps.
+QUIET = 6
+
+TOLERANCE = 1e-8
+"""Default error in spin, at t = 400."""
+
 MEASURES = ("reversals", "energy_error", "first_reversal")
 
 # Ranges of spin in which the rattle decays: about zero, and the next to either side.
@@ -133,6 +139,9 @@ class Kernel:
         Returns after `blocks` blocks of steps in every lane, or when all cells have ended.
         """
         self._advance(images, cells, blocks, stop_when_settled, numba.get_num_threads())
+
+    def carry(self, images: Array) -> None:
+        """Carry the images that are `QUIET` to where steps are needed again; this method's never are."""
 
     def unpack(self, images: Array) -> tuple[Array, Array]:
         """States and constants of images, of shapes (states, cells) and (constants, cells)."""
@@ -308,6 +317,8 @@ def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...]) 
         rows.index(name) * LANES for name in ("goal", "done", "status", "energy_start", "energy", "stable_step")
     )
     lanes, allowed, conserved = LANES, 1.0 + ENERGY_GAIN, "energy_error" in model.measures
+    pauses = "quiet_energy" in rows
+    QUIET_ENERGY, QUIET_AFTER = (rows.index(f"quiet_{name}") * LANES if pauses else 0 for name in ("energy", "after"))
 
     @numba.njit(error_model="numpy")
     def inspect(group: Any, stop_when_settled: bool) -> None:
@@ -323,9 +334,13 @@ def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...]) 
                 worst = group[VIOLATION + lane]
                 group[VIOLATION + lane] = violation if violation > worst else worst
 
-            bounded, settled = will_settle(group, lane, spin, 2.0 * rattle / inertia)
+            energy_ratio = 2.0 * rattle / inertia
+            bounded, settled = will_settle(group, lane, spin, energy_ratio)
             ends = SETTLED if settled & stop_when_settled else RUNNING
-            ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends == RUNNING) else ends
+            if pauses:
+                small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])
+                ends = QUIET if small & (not (bounded & stop_when_settled)) else ends
+            ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends != SETTLED) else ends
             status = ends if running else status
             failed = (status == LIFT_OFF) | (status == PARADOX)
             # A step beyond the stability limit shows as energy from nowhere, or lets the slip swing

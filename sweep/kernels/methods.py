@@ -8,7 +8,7 @@ import numpy as np
 
 from sweep.kernels import adams
 from sweep.kernels.adams import AdamsKernel
-from sweep.kernels.lanes import Kernel
+from sweep.kernels.lanes import TOLERANCE, Kernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import linear
 from sweep.models.coefficients import rattle_period
@@ -16,9 +16,6 @@ from sweep.models.model import Array, Columns, Model
 from sweep.models.slip_split import SPLIT
 
 METHODS = ("dopri5", "adams")
-
-TOLERANCE = 1e-8
-"""Default error in spin, at t = 400."""
 
 STABILITY_SHARE = 0.9
 """Share of the stability interval of dopri5 used along the fastest decay."""
@@ -31,8 +28,8 @@ def allowed(model: Model) -> tuple[str, ...]:
     return METHODS if model.name == SPLIT.name else ("dopri5",)
 
 
-def make_kernel(method: str, model: Model, measure: Iterable[str]) -> Kernel:
-    return AdamsKernel(measure) if method == "adams" else Kernel(model, DOPRI5, measure)
+def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:
+    return AdamsKernel(measure, tolerance) if method == "adams" else Kernel(model, DOPRI5, measure)
 
 
 def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:

@@ -156,11 +156,20 @@ def rocking(columns: Columns) -> Array:
     return np.moveaxis(np.stack(columns_, axis=-1), 0, 1)
 
 
+def velocities(y: Array, p: Array) -> Array:
+    """The slip model's states of these, shape (7, cells): undoes `momentum`."""
+    _, geometry = slow(*y, p)
+    return np.stack(np.broadcast_arrays(y[0], y[1], *geometry[7:10], y[5], y[6]))
+
+
+def slip_constants(p: Array) -> Array:
+    """The slip model's constants, of these."""
+    return np.concatenate([p[:4], p[7:]])
+
+
 def observe(y: Array, p: Array) -> dict[str, Array]:
     """What the slip model shows."""
-    _, geometry = slow(*y, p)
-    inverse = np.concatenate([p[:4], p[7:]])
-    return slip.observe(np.stack([y[0], y[1], *geometry[7:10], y[5], y[6]]), inverse)
+    return slip.observe(velocities(y, p), slip_constants(p))
 
 
 SPLIT = replace(
