@@ -14,7 +14,7 @@ from sweep.parameters import PARAMETERS
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.run import Plan
+    from sweep.plan import Plan
 
 DONE, WRONG_INPUT, TOO_MANY_FAILED, INTERRUPTED = 0, 2, 3, 130
 
@@ -58,7 +58,7 @@ def run(config: Path, output: Path | None, settings: tuple[str, ...], dry_run: b
         checked = load_config(config, _parse_settings(settings))
         folder = output or Path("runs") / checked.name
         if dry_run:
-            from sweep.run import plan
+            from sweep.plan import plan
 
             click.echo(_estimate(plan(checked)))
             return
@@ -245,15 +245,15 @@ def _parse_pair(text: str, option: str) -> tuple[str, float]:
 def _estimate(job: Plan) -> str:
     from sweep.executor import nominal_seconds
 
-    kernel, images = job.kernel, job.images
-    steps = images[:, kernel.row("goal")].sum()
-    seconds = nominal_seconds(images, kernel)
+    steps = sum(part.images[:, part.kernel.row("goal")].sum() for part in job.parts)
+    seconds = sum(nominal_seconds(part.images, part.kernel) for part in job.parts)
+    memory = sum(part.images.nbytes for part in job.parts)
     axes = " × ".join(f"{d} {n}" for d, n in zip(job.grid.dims, job.grid.shape, strict=True)) or "one cell"
     return "\n".join(
         [
             f"cells:  {job.grid.size} ({axes})",
             f"steps:  at most {steps:.3g}, {steps / job.grid.size:.3g} a cell",
-            f"memory: {images.nbytes / 2**20:.3g} MiB of trajectories, as much on disk for the checkpoint",
+            f"memory: {memory / 2**20:.3g} MiB of trajectories, as much on disk for the checkpoint",
             f"time:   at most about {seconds:.3g} s, had every cell to go to t_end; cells that settle stop earlier",
         ]
     )
@@ -291,6 +291,11 @@ def _summary(dataset: xr.Dataset) -> str:
         rule, step = np.ravel(dataset["step_rule"].values), np.ravel(dataset["step"].values)
         who = ", ".join(f"{name} in {(rule == code).sum()}" for code, name in STEP_RULES.items() if code in rule)
         lines.append(f"step: {step.min():.3g} to {step.max():.3g}, set by {who} cells")
+    if "verified_cell" in dataset:
+        changed = dataset.attrs.get("verified_counts_changed")
+        counts = f"{changed} counts changed, " if changed is not None else ""
+        spin = f"the largest difference in spin is {dataset.attrs['verified_largest_spin_difference']:.1e}"
+        lines.append(f"verified: {dataset.sizes['verified']} cells run again with finer steps: {counts}{spin}")
     if "wall_time" in dataset.attrs:
         lines.append(
             f"cost: {dataset.attrs['wall_time']:.3g} s, {dataset.attrs['trajectories_per_second']:.3g} trajectories/s"

@@ -18,8 +18,9 @@ from sweep.models.coefficients import rattle_period
 from sweep.models.linear import growth_rate
 from sweep.models.model import stack
 from sweep.parameters import START
+from sweep.plan import plan
 from sweep.prediction import Prediction, predict
-from sweep.run import plan, provenance, simulated, with_dopri5
+from sweep.run import provenance, simulated, with_dopri5
 
 WIDTH = 1e-3
 """Relative width to which simulation brackets a critical spin."""
@@ -172,5 +173,5 @@ def _images(config: Config, columns: dict[str, Array], measure: tuple[str, ...],
     """Kernel and images of the cells `columns`, laid out as a sweep of them would be."""
     integrator = config.integrator.model_copy(update={"t_end": t_end})
     cases = {name: tuple(values.tolist()) for name, values in columns.items()}
-    job = plan(replace(config, parameters={}, cases=cases, measure=measure, integrator=integrator))
-    return job.kernel, job.images
+    (part,) = plan(replace(config, parameters={}, cases=cases, measure=measure, integrator=integrator)).parts
+    return part.kernel, part.images

@@ -49,6 +49,9 @@ class Variable:
     """Without the parameters of the start."""
 
 
+_VERIFIED = ("reversals", "t_last_reversal", "spin_final", "status", "energy_error", "step")
+
+
 def _critical(sign: str, event: str, source: str) -> Variable:
     where = "positive spin above" if sign == "+" else "negative spin below"
     return Variable("float64", "1", f"{where} which {event}, by {source}, in sqrt(g/c)", per_body=True)
@@ -70,6 +73,7 @@ VARIABLES: dict[str, Variable] = {
         f"largest violation of the energy balance, looked at every {lanes.BLOCK} steps, "
         "relative to the start energy above rest",
     ),
+    "method": Variable("int8", "1", "integration method of the trajectory", dict(enumerate(methods.METHODS))),
     "step": Variable("float64", "1", "integration step, in sqrt(c/g)"),
     "step_rule": Variable("int8", "1", "what set the integration step", STEP_RULES),
     "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),
@@ -92,7 +96,7 @@ VARIABLES: dict[str, Variable] = {
 }
 
 
-def measured(kernel: Kernel, images: Array, t_end: float) -> dict[str, Array]:
+def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
     """The simulated variables, each of shape (cells,), from images at their ends."""
 
     def row(name: str) -> Array:
@@ -154,6 +158,23 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     return xr.Dataset(variables, coordinates, {**head, **attributes})
 
 
+def beside(result: xr.Dataset, cells: Array, found: Mapping[str, Array]) -> xr.Dataset:
+    """`result` with what a second run `found` for some of its `cells`, along the dimension `verified`."""
+    size = {"long_name": "index of the cell run again, rows of the arrays written one behind the other", "units": "1"}
+    again: dict[str, Any] = {"verified_cell": ("verified", cells, size)}
+    for name in _VERIFIED:
+        if name in found:
+            spec = VARIABLES[name]
+            attributes = _attributes(spec) | {"long_name": f"{spec.long_name}, run again with finer steps"}
+            again[f"verified_{name}"] = ("verified", np.asarray(found[name]).astype(spec.dtype), attributes)
+    spin = np.abs(found["spin_final"] - result["spin_final"].values.ravel()[cells])
+    result = result.assign(again).assign_attrs(verified_largest_spin_difference=float(spin.max(initial=0.0)))
+    if "reversals" in found:
+        changed = found["reversals"] != result["reversals"].values.ravel()[cells]
+        result = result.assign_attrs(verified_counts_changed=int(changed.sum()))
+    return result
+
+
 def _attributes(spec: Variable) -> dict[str, Any]:
     attributes: dict[str, Any] = {"long_name": spec.long_name, "units": spec.units}
     if spec.flags:
@@ -189,10 +210,11 @@ def _integrator_words(config: Config) -> str:
         return "none"
     if config.integrator.step != "auto":
         return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"
-    rule = f"a spin error of {config.integrator.tolerance:g} at t = 400"
-    if config.integrator.method == "dopri5":
+    rule, method = f"a spin error of {config.integrator.tolerance:g} at t = 400", config.integrator.method
+    if method == "dopri5":
         rule = f"the shorter of {methods.STABILITY_SHARE:g} of the stability limit and {rule}"
-    return f"{config.integrator.method}, fixed step, per trajectory by {rule}"
+    name = "the cheapest method" if method == "auto" else method
+    return f"{name}, fixed step, per trajectory by {rule}"
 
 
 def _git_commit() -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -18,22 +17,12 @@ CHUNK_SECONDS = 0.7
 FAILURES = (LIFT_OFF, DIVERGED, PARADOX)
 
 
-@dataclass(frozen=True)
-class Progress:
-    cells: int
-    done: int
-    failed: int
-    done_before: int
-    """Of `done`, those that an earlier run left."""
-    seconds: float
-
-
 def execute(
     kernel: Kernel,
     images: Array,
     *,
     stop_when_settled: bool,
-    after_chunk: Callable[[Progress], None] | None = None,
+    after_chunk: Callable[[], None] | None = None,
     chunk_blocks: int | None = None,
 ) -> None:
     """Advance all unfinished `images`, in place, until every trajectory has ended.
@@ -53,7 +42,7 @@ def execute(
     status = images[:, kernel.row("status")]
     steps = images[:, kernel.row("done")]
     order = np.random.default_rng(0).permutation(len(images))
-    blocks, began, done_before = chunk_blocks or 1, time.perf_counter(), int((status != RUNNING).sum())
+    blocks = chunk_blocks or 1
     while len(pending := order[status[order] == RUNNING]):
         pending = pending[np.argsort(steps[pending] == 0, kind="stable")]
         chunk_began = time.perf_counter()
@@ -62,8 +51,7 @@ def execute(
         if chunk_blocks is None:
             blocks = _rescale(blocks, time.perf_counter() - chunk_began)
         if after_chunk:
-            done, failed = int((status != RUNNING).sum()), int(np.isin(status, FAILURES).sum())
-            after_chunk(Progress(len(images), done, failed, done_before, time.perf_counter() - began))
+            after_chunk()
 
 
 def _rescale(blocks: int, seconds: float) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from sweep import executor
+from sweep.run import Progress as Done
 from sweep.run import Reporter
 
 
@@ -14,7 +14,7 @@ class Terminal(Reporter):
 
     def __init__(self, quiet: bool = False) -> None:
         self.console = Console(stderr=True, quiet=quiet, highlight=False)
-        self.last: executor.Progress | None = None
+        self.last: Done | None = None
         self._bar = Progress(
             TextColumn("{task.completed:.0f}/{task.total:.0f} cells"),
             BarColumn(),
@@ -38,7 +38,7 @@ class Terminal(Reporter):
     def note(self, message: str) -> None:
         self.console.print(message, soft_wrap=True, markup=False)
 
-    def chunk(self, progress: executor.Progress) -> None:
+    def chunk(self, progress: Done) -> None:
         self.last = progress
         rate = (progress.done - progress.done_before) / progress.seconds
         if self._task is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,32 +12,31 @@ import xarray as xr
 
 from sweep import dataset, executor
 from sweep.config import Config, ConfigError, Fault, load_config
-from sweep.executor import Progress
 from sweep.grid import Array, Grid
 from sweep.jit import fingerprint
 from sweep.kernels import methods
-from sweep.kernels.lanes import SETTLED, Kernel
+from sweep.kernels.lanes import RUNNING, SETTLED
 from sweep.models import MODELS, TIERS
-from sweep.models.coefficients import rattle_period
 from sweep.models.model import Model
-from sweep.prediction import Prediction
+from sweep.plan import Plan, plan
 from sweep.prediction import predict as predict_grid
 from sweep.store import Identity, RunFiles
+from sweep.verification import verify
 
 # Beside the numeric sources: they fill the images, and turn them into results.
-_DECISIVE = tuple(str(Path(__file__).parent / name) for name in ("prediction.py", "grid.py", "dataset.py", "run.py"))
+_DECISIVE = tuple(
+    str(Path(__file__).parent / name) for name in ("plan.py", "prediction.py", "grid.py", "dataset.py", "run.py")
+)
 
 
 @dataclass(frozen=True)
-class Plan:
-    """Everything a simulation needs, before the first step is taken."""
-
-    config: Config
-    grid: Grid
-    prediction: Prediction
-    kernel: Kernel
-    step_rule: Array
-    images: Array
+class Progress:
+    cells: int
+    done: int
+    failed: int
+    done_before: int
+    """Of `done`, those that an earlier run left."""
+    seconds: float
 
 
 class Reporter:
@@ -92,9 +92,11 @@ def run(
             return finished
 
     if config.model in MODELS:
-        job = plan(config, reporter)
+        job = plan(config, reporter.compiling)
         seconds = simulate(job, files, reporter)
         result = collect(job, seconds)
+        if config.verify:
+            result = dataset.beside(result, *verify(job))
     else:
         result = evaluate(config)
     if files:
@@ -169,63 +171,50 @@ def provenance(config: Config, seconds: float, cells: int) -> dict[str, Any]:
     return {"source_hash": identify(config).source_hash, **dataset.provenance(config, seconds, cells)}
 
 
-def plan(config: Config, reporter: Reporter | None = None) -> Plan:
-    """Lay out the cells of `config` with their steps, limits and starts."""
-    grid, model = Grid.of(config), MODELS[config.model]
-    columns = grid.columns()
-    method = config.integrator.method
-    kernel = methods.make_kernel(method, model, config.measure, config.integrator.tolerance)
-    if reporter and not kernel.is_compiled():
-        reporter.compiling()
-    prediction = predict_grid(model, grid)
-    assert prediction.stability is not None  # it is a model
-    if config.integrator.step == "auto":
-        step, rule = methods.automatic_step(method, model, columns, config.integrator.tolerance)
-    else:
-        step, rule = np.full(grid.size, config.integrator.step), np.full(grid.size, methods.FIXED)
-    body = grid.bodies()[1]
-    images = kernel.images(
-        columns, step, config.integrator.t_end, prediction.stability.ranges[:, body], rattle_period(columns)
-    )
-    return Plan(config, grid, prediction, kernel, rule, images)
-
-
 def simulate(job: Plan, files: RunFiles | None, reporter: Reporter) -> float:
     """Carry the images of `job` to their ends; returns the seconds it took, earlier runs included."""
-    identity, before, spent = identify(job.config), 0.0, 0.0
-    if files and (left := files.load_checkpoint(identity, job.images.shape)):
-        job.images[:], before = left
+    identity, before = identify(job.config), 0.0
+    tables = {part.method: part.images for part in job.parts}
+    if files and (left := files.load_checkpoint(identity, tables)) is not None:
+        before = left
         reporter.note(f"{files.checkpoint}: going on from there")
+    for part in job.parts:
+        part.kernel.compile()
+    began, done_before = time.perf_counter(), int((job.status() != RUNNING).sum())
 
     def save() -> None:
         if files:
-            files.save_checkpoint(job.images, identity, before + spent)
+            files.save_checkpoint(tables, identity, before + time.perf_counter() - began)
 
-    def after_chunk(progress: Progress) -> None:
-        nonlocal spent
-        spent = progress.seconds
-        reporter.chunk(progress)
+    def after_chunk() -> None:
+        status, seconds = job.status(), time.perf_counter() - began
+        done, failed = int((status != RUNNING).sum()), int(np.isin(status, executor.FAILURES).sum())
+        reporter.chunk(Progress(job.grid.size, done, failed, done_before, seconds))
         save()
 
-    job.kernel.compile()
     try:
-        executor.execute(
-            job.kernel,
-            job.images,
-            stop_when_settled=job.config.integrator.stop_when_settled,
-            after_chunk=after_chunk,
-        )
+        for part in job.parts:
+            executor.execute(
+                part.kernel,
+                part.images,
+                stop_when_settled=job.config.integrator.stop_when_settled,
+                after_chunk=after_chunk,
+            )
     except KeyboardInterrupt:
         save()
         raise
-    return before + spent
+    return before + time.perf_counter() - began
 
 
 def collect(job: Plan, seconds: float) -> xr.Dataset:
     """The labelled dataset of a finished job."""
-    arrays = {
-        **dataset.measured(job.kernel, job.images, job.config.integrator.t_end),
-        "step_rule": job.step_rule,
-        **dataset.predicted(job.prediction),
-    }
+    arrays: dict[str, Array] = {}
+    for part in job.parts:
+        found = dataset.measured(part.kernel, part.images, job.config.integrator.t_end)
+        found["step_rule"] = part.step_rule
+        if job.config.integrator.method == "auto":
+            found["method"] = np.full(len(part.cells), methods.METHODS.index(part.method))
+        for name, values in found.items():
+            arrays.setdefault(name, np.empty(job.grid.size))[part.cells] = values
+    arrays |= dataset.predicted(job.prediction)
     return dataset.label(job.config, job.grid, arrays, provenance(job.config, seconds, job.grid.size))

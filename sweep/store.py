@@ -9,10 +9,11 @@ from __future__ import annotations
 import json
 import os
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -66,14 +67,15 @@ class RunFiles:
     def checkpoint(self) -> Path:
         return self.folder / f"{self.name}.checkpoint"
 
-    def save_checkpoint(self, images: Array, identity: Identity, seconds: float) -> None:
-        """Write the whole state of an unfinished run."""
+    def save_checkpoint(self, tables: Mapping[str, Array], identity: Identity, seconds: float) -> None:
+        """Write the whole state of an unfinished run: its tables of images by method."""
         note = json.dumps(identity.__dict__ | {"seconds": seconds})
+        named: dict[str, Any] = {"note": np.array(note), **tables}
         with replacing(self.checkpoint) as temporary, temporary.open("wb") as stream:
-            np.savez(stream, images=images, note=np.array(note))
+            np.savez(stream, **named)
 
-    def load_checkpoint(self, identity: Identity, shape: tuple[int, ...]) -> tuple[Array, float] | None:
-        """Images and seconds spent of an unfinished run of `identity`; None where there is none.
+    def load_checkpoint(self, identity: Identity, tables: Mapping[str, Array]) -> float | None:
+        """Fill `tables` with what an unfinished run of `identity` left; the seconds it spent, None without one.
 
         Raises
         ------
@@ -82,16 +84,19 @@ class RunFiles:
         """
         try:
             with self.checkpoint.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-                images, note = archive["images"], json.loads(str(archive["note"]))
+                note = json.loads(str(archive["note"]))
+                found = {name: archive[name] for name in archive.files if name != "note"}
         except FileNotFoundError:
             return None
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise StoreError(f"{self.checkpoint}: damaged checkpoint ({error}); start again with --fresh") from None
         seconds = note.pop("seconds")
         self._refuse_other(self.checkpoint, Identity(**note), identity)
-        if images.shape != shape:
-            raise StoreError(f"{self.checkpoint}: damaged checkpoint (shape {images.shape}); start again with --fresh")
-        return images, seconds
+        if {name: images.shape for name, images in found.items()} != {name: t.shape for name, t in tables.items()}:
+            raise StoreError(f"{self.checkpoint}: damaged checkpoint (other tables); start again with --fresh")
+        for name, table in tables.items():
+            table[:] = found[name]
+        return float(seconds)
 
     def load_dataset(self, identity: Identity) -> xr.Dataset | None:
         """The finished dataset of `identity`; None where there is none.

@@ -17,8 +17,10 @@ from sweep.grid import Array, off_the_body
 from sweep.kernels.lanes import RUNNING, Kernel
 from sweep.models import TIERS
 from sweep.models.linear import fastest_motion
+from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
-from sweep.run import Plan, as_config, collect, plan, simulated, with_dopri5
+from sweep.plan import plan
+from sweep.run import as_config, collect, simulated, with_dopri5
 
 SAMPLES_A_RADIAN = 3
 """Samples in a radian of the fastest motion: nearly twenty a period."""
@@ -64,12 +66,17 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     config = as_config(config, {})
     simulated(config)
     job = plan(_choose(config, {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}))
-    start = job.images.copy()
-    executor.execute(job.kernel, job.images, stop_when_settled=job.config.integrator.stop_when_settled)
+    (part,) = job.parts
+    start = part.images.copy()
+    executor.execute(part.kernel, part.images, stop_when_settled=job.config.integrator.stop_when_settled)
     summary = collect(job, 0.0).reset_coords(drop=False)
     # Blocks of one step: a look costs what it shows, not a hundred steps of idle lanes.
-    kernel = Kernel(job.kernel.model, job.kernel.tableau, job.kernel.measure, block=1)
-    series = [_sample(job, kernel, i, start[[i]], every) for i in range(len(start))]
+    kernel = Kernel(part.kernel.model, part.kernel.tableau, part.kernel.measure, block=1)
+    columns = job.grid.columns()
+    series = []
+    for i in range(len(start)):
+        interval = every or _interval(part.kernel.model, {name: values[[i]] for name, values in columns.items()})
+        series.append(_sample(kernel, start[[i]], part.images[i], interval))
     length = max(len(s["time"]) for s in series)
     variables: dict[str, Any] = {}
     for name in series[0]:
@@ -115,14 +122,14 @@ def _wrong(config: Config, name: str, values: list[float]) -> str:
     return f"{wrong[0]:g}; allowed: {PARAMETERS[name].allowed}" if wrong else ""
 
 
-def _sample(job: Plan, kernel: Kernel, cell: int, start: Array, every: float | None) -> dict[str, Array]:
+def _sample(kernel: Kernel, start: Array, end: Array, every: float) -> dict[str, Array]:
     """Step the trajectory again to its end, moving its goal from sample to sample.
 
     The steps are the sweep's own code, so they are the same to the last bit.
     """
-    model, end = kernel.model, job.images[cell]
+    model = kernel.model
     step, steps = float(end[kernel.row("step")]), int(end[kernel.row("done")])
-    stride = max(1, round(_interval(job, cell) / step if every is None else every / step))
+    stride = max(1, round(every / step))
     goals = np.unique([*range(0, steps, stride), steps])
     images, snapshots = start.copy(), [start[0].copy()]
     for goal in goals[1:]:
@@ -140,6 +147,5 @@ def _sample(job: Plan, kernel: Kernel, cell: int, start: Array, every: float | N
     return {name: np.broadcast_to(values, goals.shape) for name, values in series.items()}
 
 
-def _interval(job: Plan, cell: int) -> float:
-    columns = {name: values[[cell]] for name, values in job.grid.columns().items()}
-    return float(1 / (SAMPLES_A_RADIAN * max(fastest_motion(job.kernel.model, columns)[0], 0.1)))
+def _interval(model: Model, columns: Columns) -> float:
+    return float(1 / (SAMPLES_A_RADIAN * max(fastest_motion(model, columns)[0], 0.1)))

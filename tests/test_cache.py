@@ -13,9 +13,9 @@ from conftest import ROOT
 
 SCRIPT = """
 import sweep
-from sweep.run import plan
+from sweep.plan import plan
 job = plan(sweep.load_config("c.yaml"))
-print(job.kernel.is_compiled())
+print(job.parts[0].kernel.is_compiled())
 print(repr(float(sweep.run("c.yaml").spin_final)))
 """
 

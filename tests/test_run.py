@@ -20,7 +20,8 @@ import sweep
 from sweep import executor, plots
 from sweep.cli import main
 from sweep.dataset import STATUSES, VARIABLES
-from sweep.run import Reporter, plan
+from sweep.plan import plan
+from sweep.run import Progress, Reporter
 from sweep.store import StoreError, open_dataset, replacing
 
 Write = Callable[..., Path]
@@ -51,6 +52,7 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
     assert small["delta"].attrs["units"] == "radian"
     assert set(small.data_vars) == {n for n in VARIABLES if "simulated" not in n} - {
         "critical_reason",
+        "method",
         "t_first_reversal",
     }
     assert {name: str(small[name].dtype) for name in ("reversals", "status", "spin_final", "reversals_predicted")} == {
@@ -153,7 +155,7 @@ class Stop(Reporter):
     def __init__(self, chunks: int) -> None:
         self.left, self.notes = chunks, list[str]()
 
-    def chunk(self, progress: executor.Progress) -> None:  # noqa: ARG002
+    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
         self.left -= 1
         if self.left < 0:
             raise KeyboardInterrupt
@@ -178,7 +180,8 @@ def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.
             interruptions += 1
             assert [path.name for path in out.iterdir()] == ["small.checkpoint"]
             with np.load(out / "small.checkpoint") as archive:
-                steps.append(archive["images"][:, plan(sweep.load_config(write())).kernel.row("done")].sum())
+                (part,) = plan(sweep.load_config(write())).parts
+                steps.append(archive["dopri5"][:, part.kernel.row("done")].sum())
     assert interruptions > 2
     assert steps == sorted(set(steps))
     same_numbers(dataset, small)
@@ -263,7 +266,7 @@ def test_interrupt_stops_within_two_seconds_and_the_same_command_goes_on(write: 
     assert "the same command goes on" in messages
     assert [path.name for path in out.iterdir()] == ["small.checkpoint"]
     with np.load(out / "small.checkpoint") as archive:
-        assert archive["images"].shape[0] == 240
+        assert archive["dopri5"].shape[0] == 240
     with pytest.raises(KeyboardInterrupt):
         sweep.run(file, out, reporter=(reporter := Stop(0)))
     assert "going on from there" in reporter.notes[0]

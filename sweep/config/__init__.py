@@ -93,6 +93,7 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         integrator=checked.integrator,
         measure=_measures(checked.measure, model),
         max_failed_fraction=checked.max_failed_fraction,
+        verify=checked.verify,
         cases=columns,
         cases_file=checked.cases,
     )
@@ -148,9 +149,13 @@ def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document
     for name in columns or {}:
         if name not in model.parameters:
             yield source.fault(("cases",), f"column {name}: the {model.name} model has no {name}")
-    if isinstance(model, Model) and checked.integrator.method not in methods.allowed(model):
-        names = ", ".join(methods.allowed(model))
+    if isinstance(model, Model) and checked.integrator.method not in (*methods.allowed(model), "auto"):
+        names = ", ".join((*methods.allowed(model), "auto"))
         yield source.fault(("integrator", "method"), f"cannot run the {model.name} model; allowed: {names}")
+    if checked.integrator.method == "auto" and checked.integrator.step != "auto":
+        yield source.fault(("integrator", "step"), "a number beside method: auto; allowed: auto")
+    if checked.verify and not isinstance(model, Model):
+        yield source.fault(("verify",), f"the {model.name} model takes no steps; allowed: 0")
     for i, name in enumerate(checked.measure or ()):
         if name not in model.measures:
             yield source.fault(

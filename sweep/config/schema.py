@@ -109,7 +109,8 @@ def _distinct(names: list[str]) -> list[str]:
 
 
 class Integrator(_Strict):
-    method: Literal[METHODS] = "dopri5"  # type: ignore[valid-type]
+    method: Literal[(*METHODS, "auto")] = "dopri5"  # type: ignore[valid-type]
+    """`auto` is for each cell the one that reaches `t_end` to `tolerance` in the least time."""
     step: Annotated[float | Literal["auto"], BeforeValidator(_step)] = "auto"
     tolerance: float = Field(default=TOLERANCE, gt=0, lt=1)
     """Error in spin that an automatic step keeps to, at t = 400."""
@@ -143,6 +144,8 @@ class _Top(_Strict):
         | None
     ) = None
     """By default `DEFAULT_MEASURES`, as far as the model has them."""
+    verify: float = Field(default=0.0, ge=0, le=1)
+    """Share of the cells to run again with finer steps."""
     max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
 
 
@@ -160,6 +163,7 @@ class Config:
     integrator: Integrator
     measure: tuple[str, ...]
     max_failed_fraction: float
+    verify: float = 0.0
     cases: dict[str, tuple[float, ...]] | None = None
     """Columns of the table of cases, where there is one."""
     cases_file: str | None = None
@@ -180,6 +184,7 @@ class Config:
             **{section: sections[section] for section in SECTIONS if section in sections},
             "integrator": self.integrator.model_dump(),
             "measure": list(self.measure),
+            "verify": self.verify,
             "max_failed_fraction": self.max_failed_fraction,
         }
 

@@ -89,7 +89,7 @@ class AdamsKernel(Kernel):
         self._lay_out(SPLIT, measure, more)
         self._advance = self._make_advance(_make_run_block(self.rows, self.measure), "adams")
 
-    def images(self, columns: Columns, step: Array, t_end: float, stable: Array, period: Array) -> Array:
+    def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array, period: Array) -> Array:
         """As `Kernel.images`; the images have gone through start-up, to the time in their row `begin`."""
         levels = _levels(columns["mu"], step)
         lead = _lead(levels)
@@ -99,7 +99,7 @@ class AdamsKernel(Kernel):
         self._fill(images, columns, step, levels, lead)
         return images
 
-    def times(self, images: Array, t_end: float) -> Array:
+    def times(self, images: Array, t_end: float | Array) -> Array:
         done = images[:, self.row("done")]
         reached = images[:, self.row("begin")] + done * images[:, self.row("step")]
         return np.where(done == images[:, self.row("goal")], t_end, reached)
@@ -183,7 +183,7 @@ class AdamsKernel(Kernel):
         """Of the spin from the next critical one; from zero where there is none."""
         first = self.row("stable_from")
         ends = np.abs(images[:, first : first + 6] - images[:, [self.row("spin")]])
-        return np.where(np.isfinite(ends), ends, np.abs(images[:, [self.row("spin")]])).min(axis=1)
+        return np.asarray(np.where(np.isfinite(ends), ends, np.abs(images[:, [self.row("spin")]])).min(axis=1))
 
     def _move(self, images: Array, rattle: Rattle, steps: Array) -> None:
         """Write to images what `steps` steps of a linear rattle leave; the spin stays as it is."""

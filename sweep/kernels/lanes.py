@@ -92,14 +92,14 @@ class Kernel:
     def row(self, name: str) -> int:
         return self.rows.index(name)
 
-    def images(self, columns: Columns, step: Array, t_end: float, stable: Array, period: Array) -> Array:
+    def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array, period: Array) -> Array:
         """Images of trajectories at t = 0, shape (cells, rows).
 
         Parameters
         ----------
         columns : physical parameters by name, each of shape (cells,)
         step : the longest step wanted, shape (cells,), in sqrt(c/g); the step taken divides `t_end`
-        t_end : time limit in sqrt(c/g)
+        t_end : time limit in sqrt(c/g), one for all or of shape (cells,)
         stable : ranges of spin in which a rattle decays, as rows from, to: about zero, the next
             below and the next above, shape (6, cells); NaN where there is none
         period : length of the window over which the spin is averaged, shape (cells,)
@@ -148,7 +148,7 @@ class Kernel:
         n = len(self.model.states)
         return images[:, :n].T, images[:, n : self.row("step")].T
 
-    def times(self, images: Array, t_end: float) -> Array:
+    def times(self, images: Array, t_end: float | Array) -> Array:
         """Times that the images have reached, shape (cells,)."""
         return np.asarray(images[:, self.row("done")] / images[:, self.row("goal")] * t_end)
 

@@ -22,10 +22,23 @@ STABILITY_SHARE = 0.9
 
 FIXED, ACCURACY, STABILITY = range(3)
 
+# Time of a step and lane, and of start-up in steps, relative to dopri5's step (scripts/methods.py).
+_COST = {"dopri5": (1.0, 0.0), "adams": (0.64, 2500.0)}
+
 
 def allowed(model: Model) -> tuple[str, ...]:
     """Methods that can run a model: adams has the slip model's equations built in."""
     return METHODS if model.name == SPLIT.name else ("dopri5",)
+
+
+def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> Array:
+    """Index in `METHODS` of the method that reaches `t_end` to `tolerance` in the least time, shape (cells,)."""
+    costs = []
+    for method in allowed(model):
+        per_step, start_up = _COST[method]
+        step, _ = automatic_step(method, model, columns, tolerance)
+        costs.append(per_step * (t_end / step + start_up))
+    return np.asarray(np.argmin(costs, axis=0))
 
 
 def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:
