@@ -14,7 +14,10 @@ from sweep.parameters import PARAMETERS
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.plan import Plan
+    from sweep.config import Config
+
+# Cells from which --dry-run infers the rest, and what a cell's results take on disk.
+_SAMPLE, _BYTES_A_CELL = 4096, 130
 
 DONE, WRONG_INPUT, TOO_MANY_FAILED, INTERRUPTED = 0, 2, 3, 130
 
@@ -45,8 +48,13 @@ def _parameter_help() -> str:
               help="Replace a value of the configuration, e.g. friction.mu=60 (repeatable).")  # fmt: skip
 @click.option("--dry-run", is_flag=True, help="Print cells, steps, memory, estimated time; compute nothing.")
 @click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of going on from it.")
+@click.option("--workers", type=click.IntRange(1, 4096), help="Run in so many processes of one thread each.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 @click.option("--quiet", is_flag=True, help="Print errors alone.")
-def run(config: Path, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool, quiet: bool) -> None:
+def run(
+    config: Path, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool,
+    workers: int | None, scheduler: str | None, quiet: bool,
+) -> None:  # fmt: skip
     """Run the sweep that CONFIG describes.
 
     Writes NAME.nc (the dataset) and NAME.png (its maps).  Interrupted, it keeps what is finished,
@@ -58,16 +66,18 @@ def run(config: Path, output: Path | None, settings: tuple[str, ...], dry_run: b
         checked = load_config(config, _parse_settings(settings))
         folder = output or Path("runs") / checked.name
         if dry_run:
-            from sweep.plan import plan
-
-            click.echo(_estimate(plan(checked)))
+            click.echo(_estimate(checked))
             return
+        if workers and scheduler:
+            raise ConfigError([Fault("--workers", None, None, (), "beside --scheduler; allowed: one of the two")])
+        from sweep.cluster import connected
         from sweep.progress import Terminal
         from sweep.run import run as run_sweep
 
         with Terminal(quiet) as terminal:
             try:
-                result = run_sweep(checked, folder, fresh=fresh, reporter=terminal)
+                with connected(workers, scheduler) as cluster:
+                    result = run_sweep(checked, folder, fresh=fresh, reporter=terminal, cluster=cluster)
             except KeyboardInterrupt:
                 done = f"{terminal.last.done} of {terminal.last.cells} cells" if terminal.last else "no cell"
                 terminal.note(f"interrupted: {done} finished and kept; the same command goes on")
@@ -242,18 +252,30 @@ def _parse_pair(text: str, option: str) -> tuple[str, float]:
         raise ConfigError([Fault(f"{option} {text}", None, None, (), "allowed: NAME=NUMBER")]) from None
 
 
-def _estimate(job: Plan) -> str:
+def _estimate(config: Config) -> str:
+    """What a run would take, from a sample of its cells."""
     from sweep.executor import nominal_seconds
+    from sweep.grid import Grid
+    from sweep.local import GROUP
+    from sweep.models import MODELS
+    from sweep.plan import plan
 
-    steps = sum(part.images[:, part.kernel.row("goal")].sum() for part in job.parts)
-    seconds = sum(nominal_seconds(part.images, part.kernel) for part in job.parts)
-    memory = sum(part.images.nbytes for part in job.parts)
-    axes = " × ".join(f"{d} {n}" for d, n in zip(job.grid.dims, job.grid.shape, strict=True)) or "one cell"
+    grid = Grid.of(config)
+    axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one cell"
+    lines = [f"cells:  {grid.size} ({axes})"]
+    if config.model not in MODELS:
+        return lines[0]
+    sample = plan(config, grid.sample(_SAMPLE))
+    share = grid.size / sample.grid.size
+    steps = sum(part.images[:, part.kernel.row("goal")].sum() for part in sample.parts) * share
+    seconds = sum(nominal_seconds(part.images, part.kernel) for part in sample.parts) * share
+    bytes_a_cell = sum(part.images.nbytes for part in sample.parts) / sample.grid.size
+    memory, disk = min(grid.size, GROUP) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
     return "\n".join(
         [
-            f"cells:  {job.grid.size} ({axes})",
-            f"steps:  at most {steps:.3g}, {steps / job.grid.size:.3g} a cell",
-            f"memory: {memory / 2**20:.3g} MiB of trajectories, as much on disk for the checkpoint",
+            *lines,
+            f"steps:  at most {steps:.3g}, {steps / grid.size:.3g} a cell",
+            f"memory: {memory:.3g} MiB of trajectories, as much on disk beside {disk:.3g} MiB of results",
             f"time:   at most about {seconds:.3g} s, had every cell to go to t_end; cells that settle stop earlier",
         ]
     )

@@ -20,7 +20,8 @@ from sweep.models.model import stack
 from sweep.parameters import START
 from sweep.plan import plan
 from sweep.prediction import Prediction, predict
-from sweep.run import provenance, simulated, with_dopri5
+from sweep.provenance import provenance
+from sweep.run import simulated, with_dopri5
 
 WIDTH = 1e-3
 """Relative width to which simulation brackets a critical spin."""

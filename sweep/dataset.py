@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-import datetime
-import platform
-import subprocess
-from collections.abc import Mapping
-from dataclasses import dataclass
-from importlib import metadata
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
-import llvmlite.binding
-import numba
 import numpy as np
 import xarray as xr
 
@@ -20,7 +13,6 @@ from sweep.config import Config
 from sweep.grid import Array, Grid
 from sweep.kernels import lanes, methods
 from sweep.kernels.lanes import Kernel
-from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
 from sweep.prediction import Prediction
 
@@ -47,9 +39,6 @@ class Variable:
     flags: Mapping[int, str] | None = None
     per_body: bool = False
     """Without the parameters of the start."""
-
-
-_VERIFIED = ("reversals", "t_last_reversal", "spin_final", "status", "energy_error", "step")
 
 
 def _critical(sign: str, event: str, source: str) -> Variable:
@@ -96,6 +85,18 @@ VARIABLES: dict[str, Variable] = {
 }
 
 
+def _again(name: str) -> Variable:
+    return replace(VARIABLES[name], long_name=f"{VARIABLES[name].long_name}; second run, with finer steps")
+
+
+_VERIFIED_CELL = Variable("int64", "1", "cell run again: its index in the C order of the axes")
+VERIFIED: dict[str, Variable] = {
+    **{name: _again(name) for name in ("reversals", "t_last_reversal", "spin_final", "status", "energy_error", "step")},
+    "spin_difference": Variable("float64", "1", "difference in spin between the two runs at t_stop, in sqrt(g/c)"),
+    "count_changed": Variable("int8", "1", "whether the two runs count other reversals", {0: "no", 1: "yes"}),
+}
+
+
 def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
     """The simulated variables, each of shape (cells,), from images at their ends."""
 
@@ -136,14 +137,13 @@ def predicted(prediction: Prediction) -> dict[str, Array]:
 
 
 def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: Mapping[str, Any]) -> xr.Dataset:
-    """A dataset of flat arrays over the cells of `grid` (or over its bodies, where they are per body)."""
-    bodies, _ = grid.bodies()
-    variables = {}
-    for name, spec in VARIABLES.items():
-        if name in arrays:
-            over = bodies if spec.per_body else grid
-            values = np.asarray(arrays[name]).astype(spec.dtype).reshape(over.shape)
-            variables[name] = xr.Variable(over.dims, values, _attributes(spec))
+    """A dataset of arrays over the cells of `grid` (or over its bodies, where they are per body), flat or shaped."""
+    variables = {
+        name: xr.Variable(
+            over.dims, np.asarray(arrays[name]).astype(spec.dtype, copy=False).reshape(over.shape), described(spec)
+        )
+        for name, (over, spec) in layout(grid, arrays).items()
+    }
     coordinates = {
         name: xr.Variable((name,), values, _parameter_attributes(name)) for name, values in grid.axes.items()
     }
@@ -158,72 +158,56 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     return xr.Dataset(variables, coordinates, {**head, **attributes})
 
 
-def beside(result: xr.Dataset, cells: Array, found: Mapping[str, Array]) -> xr.Dataset:
-    """`result` with what a second run `found` for some of its `cells`, along the dimension `verified`."""
-    size = {"long_name": "index of the cell run again, rows of the arrays written one behind the other", "units": "1"}
-    again: dict[str, Any] = {"verified_cell": ("verified", cells, size)}
-    for name in _VERIFIED:
-        if name in found:
-            spec = VARIABLES[name]
-            attributes = _attributes(spec) | {"long_name": f"{spec.long_name}, run again with finer steps"}
-            again[f"verified_{name}"] = ("verified", np.asarray(found[name]).astype(spec.dtype), attributes)
-    spin = np.abs(found["spin_final"] - result["spin_final"].values.ravel()[cells])
-    result = result.assign(again).assign_attrs(verified_largest_spin_difference=float(spin.max(initial=0.0)))
-    if "reversals" in found:
-        changed = found["reversals"] != result["reversals"].values.ravel()[cells]
-        result = result.assign_attrs(verified_counts_changed=int(changed.sum()))
+def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]:
+    """Of the variables `names` those over cells or bodies, each with the grid that it is an array over."""
+    bodies, _ = grid.bodies()
+    return {name: (bodies if spec.per_body else grid, spec) for name, spec in VARIABLES.items() if name in names}
+
+
+def blocks(grid: Grid, tile: tuple[slice, ...], arrays: Mapping[str, Array]) -> Iterator[tuple[str, Any, Array]]:
+    """Name, place in the whole array, and values of each variable of a tile's flat `arrays`."""
+    at = dict(zip(grid.dims, tile, strict=True))
+    for name, (over, spec) in layout(grid.part(tile), arrays).items():
+        values = np.asarray(arrays[name]).astype(spec.dtype).reshape(over.shape)
+        yield name, tuple(at[dim] for dim in over.dims), values
+
+
+def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, Array]]]) -> dict[str, Array]:
+    """Arrays over all cells or bodies from those of the tiles."""
+    whole: dict[str, Array] = {}
+    for tile, arrays in tiles:
+        for name, (over, spec) in layout(grid, set(arrays) - set(whole)).items():
+            whole[name] = np.empty(over.shape, spec.dtype)
+        for name, place, values in blocks(grid, tile, arrays):
+            whole[name][place] = values
+    return whole
+
+
+def beside(result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
+    """`result` with what a second run of some cells found, along the dimension `verified`."""
+    variables = {
+        f"verified_{name}": xr.Variable(
+            "verified", np.asarray(again[f"verified_{name}"]).astype(spec.dtype), described(spec)
+        )
+        for name, spec in {"cell": _VERIFIED_CELL, **VERIFIED}.items()
+        if f"verified_{name}" in again
+    }
+    result = result.assign(variables)
+    if "verified_count_changed" in again:
+        result.attrs["verified_counts_changed"] = int(again["verified_count_changed"].sum())
+    if "verified_spin_difference" in again:
+        result.attrs["verified_largest_spin_difference"] = float(again["verified_spin_difference"].max())
     return result
 
 
-def _attributes(spec: Variable) -> dict[str, Any]:
-    attributes: dict[str, Any] = {"long_name": spec.long_name, "units": spec.units}
+def described(spec: Variable) -> dict[str, Any]:
+    """The attributes of a variable."""
+    words: dict[str, Any] = {"long_name": spec.long_name, "units": spec.units}
     if spec.flags:
-        attributes["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
-        attributes["flag_meanings"] = " ".join(spec.flags.values())
-    return attributes
+        words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
+        words["flag_meanings"] = " ".join(spec.flags.values())
+    return words
 
 
 def _parameter_attributes(name: str) -> dict[str, str]:
     return {"long_name": PARAMETERS[name].long_name, "units": PARAMETERS[name].units}
-
-
-def provenance(config: Config, seconds: float, cells: int) -> dict[str, Any]:
-    """Where the numbers come from: configuration, versions, machine, cost."""
-    return {
-        "config": config.to_yaml(),
-        "config_hash": config.fingerprint(),
-        "integrator": _integrator_words(config),
-        "sweep_version": metadata.version("rattleback-sweep"),
-        "git_commit": _git_commit(),
-        **{f"{name}_version": metadata.version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
-        "python_version": platform.python_version(),
-        "cpu": llvmlite.binding.get_host_cpu_name(),
-        "threads": numba.get_num_threads(),
-        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "wall_time": seconds,
-        "trajectories_per_second": cells / seconds if seconds else 0.0,
-    }
-
-
-def _integrator_words(config: Config) -> str:
-    if config.model not in MODELS:
-        return "none"
-    if config.integrator.step != "auto":
-        return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"
-    rule, method = f"a spin error of {config.integrator.tolerance:g} at t = 400", config.integrator.method
-    if method == "dopri5":
-        rule = f"the shorter of {methods.STABILITY_SHARE:g} of the stability limit and {rule}"
-    name = "the cheapest method" if method == "auto" else method
-    return f"{name}, fixed step, per trajectory by {rule}"
-
-
-def _git_commit() -> str:
-    """The commit of the checkout that the package runs from; "unknown" for an installed one."""
-    root = Path(__file__).parent.parent
-    if not (root / ".git").exists():
-        return "unknown"
-    try:
-        command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
-        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from math import prod
 from typing import Any, Protocol
 
@@ -13,6 +14,9 @@ from numpy.typing import NDArray
 from sweep.parameters import START
 
 Array = NDArray[Any]
+
+Tile = tuple[slice, ...]
+"""A block of the cells of a grid: a range of each of its dimensions."""
 
 
 class Sweepable(Protocol):
@@ -65,6 +69,45 @@ class Grid:
             varying = {name: values.ravel() for name, values in zip(self.axes, mesh, strict=True)}
         return varying | {name: np.full(self.size, value) for name, value in self.constants.items()}
 
+    def tiles(self, cells: int) -> list[Tile]:
+        """Blocks of about `cells` cells that cover the grid, each contiguous in C order."""
+        block, inner = [1] * len(self.shape), self.size
+        for position, length in enumerate(self.shape):
+            inner //= length
+            if inner <= cells:
+                pieces = -(-length // max(1, cells // inner))
+                block[position:] = [-(-length // pieces), *self.shape[position + 1 :]]
+                break
+        ranges = [range(0, length, step) for length, step in zip(self.shape, block, strict=True)]
+        return [
+            tuple(slice(i, min(i + step, n)) for i, step, n in zip(corner, block, self.shape, strict=True))
+            for corner in product(*ranges)
+        ]
+
+    def part(self, tile: Tile) -> Grid:
+        """The grid of a block of the cells."""
+        if self.cases is not None:
+            return Grid({}, self.constants, {name: values[tile[0]] for name, values in self.cases.items()})
+        return Grid({n: v[at] for (n, v), at in zip(self.axes.items(), tile, strict=True)}, self.constants)
+
+    def sample(self, cells: int) -> Grid:
+        """About `cells` of the cells, evenly over each axis, its ends included; all if there are no more."""
+        if self.size <= cells:
+            return self
+        each = max(2, int(cells ** (1 / sum(n > 1 for n in self.shape))))
+
+        def thin(values: Array) -> Array:
+            kept = np.linspace(0, len(values) - 1, min(each, len(values))).round().astype(int)
+            return np.asarray(values[np.unique(kept)])
+
+        if self.cases is not None:
+            return Grid({}, self.constants, {name: thin(values) for name, values in self.cases.items()})
+        return Grid({name: thin(values) for name, values in self.axes.items()}, self.constants)
+
+    def first_cell(self, tile: Tile) -> int:
+        """Index of the first cell of a tile, in the C order of the grid."""
+        return int(np.ravel_multi_index([at.start for at in tile], self.shape)) if tile else 0
+
     def bodies(self) -> tuple[Grid, Array]:
         """The grid without the parameters of the start, and for each cell its place in that."""
         if self.cases is not None:
@@ -78,9 +121,25 @@ class Grid:
         return Grid(kept, constants), place.ravel()
 
 
+_TILE = 1 << 18
+"""Cells looked at together where something is asked of all."""
+
+BODY = ("a", "b", "c", "delta")
+_PLACE = (*BODY, "x0", "y0")
+
+
 def off_the_body(config: Sweepable) -> str:
     """What is wrong with the first cell whose start point lies off the ellipsoid; "" if none does."""
-    p = Grid.of(config).columns()
+    return next(filter(None, map(_off_the_body, distinct(Grid.of(config), _PLACE))), "")
+
+
+def distinct(grid: Grid, names: tuple[str, ...]) -> Iterator[dict[str, Array]]:
+    """Columns in which each combination of the parameters `names` occurs, a bounded number of cells at a time."""
+    grid = Grid({n: v if n in names else v[:1] for n, v in grid.axes.items()}, grid.constants, grid.cases)
+    return (grid.part(tile).columns() for tile in grid.tiles(_TILE))
+
+
+def _off_the_body(p: Mapping[str, Array]) -> str:
     if "x0" not in p:
         return ""
     cos, sin = np.cos(p["delta"]), np.sin(p["delta"])

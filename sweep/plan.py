@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
+from sweep import dataset
 from sweep.config import Config
 from sweep.grid import Array, Grid
 from sweep.kernels import methods
@@ -14,6 +16,9 @@ from sweep.kernels.lanes import Kernel
 from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
 from sweep.prediction import Prediction, predict
+
+# One of each in a process: its machine code takes a second to load.
+_kernel = cache(methods.make_kernel)
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,10 @@ class Part:
     step_rule: Array
     images: Array
 
+    @property
+    def status(self) -> Array:
+        return np.asarray(self.images[:, self.kernel.row("status")])
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -38,16 +47,26 @@ class Plan:
     parts: tuple[Part, ...]
     """One unless the configuration leaves the choice of the method to each cell."""
 
-    def status(self) -> Array:
-        return np.concatenate([part.images[:, part.kernel.row("status")] for part in self.parts])
+    def results(self) -> dict[str, Array]:
+        """What the dataset says of the cells and of their bodies, once the images are at their ends."""
+        arrays: dict[str, Array] = {}
+        for part in self.parts:
+            found = dataset.measured(part.kernel, part.images, self.config.integrator.t_end)
+            found["step_rule"] = part.step_rule
+            if self.config.integrator.method == "auto":
+                found["method"] = np.full(len(part.cells), methods.METHODS.index(part.method))
+            for name, values in found.items():
+                arrays.setdefault(name, np.empty(self.grid.size))[part.cells] = values
+        return arrays | dataset.predicted(self.prediction)
 
 
-def plan(config: Config, compiling: Callable[[], None] = lambda: None) -> Plan:
-    """Lay out the cells of `config` with their methods, steps, limits and starts.
+def plan(config: Config, grid: Grid | None = None, compiling: Callable[[], None] = lambda: None) -> Plan:
+    """Lay out the cells of `grid`, by default all of `config`, with their methods, steps, limits and starts.
 
     `compiling` is called for each kernel that no cache holds.
     """
-    grid, model, integrator = Grid.of(config), MODELS[config.model], config.integrator
+    grid = grid or Grid.of(config)
+    model, integrator = MODELS[config.model], config.integrator
     columns = grid.columns()
     prediction = predict(model, grid)
     assert prediction.stability is not None  # it is a model
@@ -59,7 +78,7 @@ def plan(config: Config, compiling: Callable[[], None] = lambda: None) -> Plan:
     parts = []
     for i in np.unique(chosen):
         method, cells = methods.METHODS[i], np.flatnonzero(chosen == i)
-        kernel = methods.make_kernel(method, model, config.measure, integrator.tolerance)
+        kernel = _kernel(method, model, config.measure, integrator.tolerance)
         if not kernel.is_compiled():
             compiling()
         theirs = {name: values[cells] for name, values in columns.items()}
@@ -70,3 +89,23 @@ def plan(config: Config, compiling: Callable[[], None] = lambda: None) -> Plan:
         images = kernel.images(theirs, step, integrator.t_end, stable[:, cells], rattle_period(theirs))
         parts.append(Part(method, cells, kernel, rule, images))
     return Plan(config, grid, prediction, tuple(parts))
+
+
+def pool(plans: Iterable[Plan]) -> tuple[list[Plan], dict[str, tuple[Kernel, Array]]]:
+    """The same plans with their images as views into one table a method, and these tables."""
+    plans = list(plans)
+    tables: dict[str, tuple[Kernel, Array]] = {}
+    for method in methods.METHODS:
+        found = [part for each in plans for part in each.parts if part.method == method]
+        if found:
+            tables[method] = found[0].kernel, np.concatenate([part.images for part in found])
+    reached = dict.fromkeys(tables, 0)
+    pooled = []
+    for each in plans:
+        parts = []
+        for part in each.parts:
+            begin = reached[part.method]
+            reached[part.method] = end = begin + len(part.cells)
+            parts.append(replace(part, images=tables[part.method][1][begin:end]))
+        pooled.append(replace(each, parts=tuple(parts)))
+    return pooled, tables

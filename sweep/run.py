@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,23 +11,26 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep import dataset, executor
+from sweep import dataset, executor, local
+from sweep.cluster import Cluster
 from sweep.config import Config, ConfigError, Fault, load_config
-from sweep.grid import Array, Grid
-from sweep.jit import fingerprint
-from sweep.kernels import methods
-from sweep.kernels.lanes import RUNNING, SETTLED
+from sweep.grid import Array, Grid, Tile
+from sweep.kernels.lanes import RUNNING
+from sweep.local import Done
 from sweep.models import MODELS, TIERS
 from sweep.models.model import Model
-from sweep.plan import Plan, plan
 from sweep.prediction import predict as predict_grid
-from sweep.store import Identity, RunFiles
-from sweep.verification import verify
+from sweep.provenance import identify
+from sweep.store import Checkpoint, Memory, RunFiles, open_dataset
+from sweep.whole import Whole
 
-# Beside the numeric sources: they fill the images, and turn them into results.
-_DECISIVE = tuple(
-    str(Path(__file__).parent / name) for name in ("plan.py", "prediction.py", "grid.py", "dataset.py", "run.py")
-)
+LARGE = 2_000_000
+"""Cells of a dataset that is not loaded into memory by itself."""
+
+
+def tile_size(cells: int) -> int:
+    """Cells a tile: what a worker that dies costs, and a chunk of the dataset."""
+    return int(np.clip(cells // 32, 1024, 8192))
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ def run(
     *,
     fresh: bool = False,
     reporter: Reporter | None = None,
+    cluster: Cluster | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Run a sweep.
@@ -68,11 +73,13 @@ def run(
     output : folder for the dataset, its maps and, until they are finished, a checkpoint from which
         the same call goes on; by default nothing is written
     fresh : discard what an earlier run left in `output`
+    cluster : processes to run the cells in; by default the threads of this one
     overrides : values that replace the file's, such as ``mu=60`` or ``t_end=1000``
 
     Returns
     -------
     Dataset over the axes of the configuration; every variable carries its meaning as `long_name`.
+    One of more than `LARGE` cells with an `output` is not loaded into memory but read when asked.
 
     Raises
     ------
@@ -81,28 +88,68 @@ def run(
     """
     config = as_config(config, overrides)
     reporter = reporter or Reporter()
-    files = RunFiles(Path(output), config.name) if output is not None else None
-    if files:
-        files.folder.mkdir(parents=True, exist_ok=True)
+    if output is None:
+        return _compute(config, Memory(), reporter, cluster).dataset()
+    files = RunFiles(Path(output), config.name)
+    with files.locked():
         if fresh:
             files.discard()
-        if finished := files.load_dataset(identify(config)):
+        if files.has_dataset(identify(config)):
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
-            draw(finished, files, reporter)
-            return finished
-
-    if config.model in MODELS:
-        job = plan(config, reporter.compiling)
-        seconds = simulate(job, files, reporter)
-        result = collect(job, seconds)
-        if config.verify:
-            result = dataset.beside(result, *verify(job))
-    else:
-        result = evaluate(config)
-    if files:
-        files.save_dataset(result)
+        else:
+            checkpoint = Checkpoint(files.checkpoint, identify(config), reporter.note)
+            _compute(config, checkpoint, reporter, cluster).save(files)
+            checkpoint.remove()
+        result = open_dataset(files.dataset, load=Grid.of(config).size <= LARGE)
         draw(result, files, reporter)
     return result
+
+
+def _compute(config: Config, checkpoint: Checkpoint | Memory, reporter: Reporter, cluster: Cluster | None) -> Whole:
+    """Run all tiles that `checkpoint` does not have."""
+    grid = Grid.of(config)
+    tiles = grid.tiles(tile_size(grid.size))
+    todo = [i for i in range(len(tiles)) if i not in checkpoint.done]
+    if len(todo) < len(tiles) or checkpoint.load_running():
+        reporter.note(f"{len(tiles) - len(todo)} of {len(tiles)} tiles are there from an earlier run: going on")
+    count = _Count(reporter, grid.size, grid.size - sum(grid.part(tiles[i]).size for i in todo))
+    for done in (
+        cluster.run(config, tiles, todo) if cluster else _here(config, tiles, todo, checkpoint, reporter, count)
+    ):
+        checkpoint.save(done.tile, done.arrays | {"seconds": np.array(done.seconds), "cpu": np.array(done.cpu)})
+        count.tile(done.arrays["status"])
+    return Whole(config, grid, tiles, checkpoint)
+
+
+def _here(
+    config: Config, tiles: Sequence[Tile], todo: Sequence[int], checkpoint: Checkpoint | Memory,
+    reporter: Reporter, count: _Count,
+) -> Iterator[Done]:  # fmt: skip
+    for group in local.groups(Grid.of(config), tiles, todo, checkpoint):
+        yield from local.run_group(
+            config, tiles, group, checkpoint=checkpoint, compiling=reporter.compiling, after_chunk=count.chunk
+        )
+
+
+class _Count:
+    """Adds up finished tiles and the chunks of the running ones for the reporter."""
+
+    def __init__(self, reporter: Reporter, cells: int, before: int) -> None:
+        self.reporter, self.cells, self.before = reporter, cells, before
+        self.done, self.failed, self.began = before, 0, time.perf_counter()
+
+    def chunk(self, status: Array) -> None:
+        done, failed = int((status != RUNNING).sum()), int(np.isin(status, executor.FAILURES).sum())
+        self._tell(self.done + done, self.failed + failed)
+
+    def tile(self, status: Array) -> None:
+        self.done += len(status)
+        self.failed += int(np.isin(status, executor.FAILURES).sum())
+        self._tell(self.done, self.failed)
+
+    def _tell(self, done: int, failed: int) -> None:
+        seconds = time.perf_counter() - self.began
+        self.reporter.chunk(Progress(self.cells, done, failed, self.before, seconds))
 
 
 def draw(result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
@@ -150,71 +197,3 @@ def with_dopri5(config: Config) -> Config:
     if config.integrator.method == "dopri5":
         return config
     return replace(config, integrator=config.integrator.model_copy(update={"method": "dopri5", "step": "auto"}))
-
-
-def identify(config: Config) -> Identity:
-    return Identity(config.to_yaml(), config.fingerprint(), fingerprint(*_DECISIVE))
-
-
-def evaluate(config: Config) -> xr.Dataset:
-    """The dataset of a tier that is a formula."""
-    grid = Grid.of(config)
-    arrays = dataset.predicted(predict_grid(TIERS[config.model], grid))
-    arrays["status"] = np.full(grid.size, SETTLED)
-    if "reversals" in config.measure:
-        arrays["reversals"] = arrays["reversals_predicted"]
-    return dataset.label(config, grid, arrays, provenance(config, 0.0, grid.size))
-
-
-def provenance(config: Config, seconds: float, cells: int) -> dict[str, Any]:
-    """Where the numbers of a dataset come from, as its attributes."""
-    return {"source_hash": identify(config).source_hash, **dataset.provenance(config, seconds, cells)}
-
-
-def simulate(job: Plan, files: RunFiles | None, reporter: Reporter) -> float:
-    """Carry the images of `job` to their ends; returns the seconds it took, earlier runs included."""
-    identity, before = identify(job.config), 0.0
-    tables = {part.method: part.images for part in job.parts}
-    if files and (left := files.load_checkpoint(identity, tables)) is not None:
-        before = left
-        reporter.note(f"{files.checkpoint}: going on from there")
-    for part in job.parts:
-        part.kernel.compile()
-    began, done_before = time.perf_counter(), int((job.status() != RUNNING).sum())
-
-    def save() -> None:
-        if files:
-            files.save_checkpoint(tables, identity, before + time.perf_counter() - began)
-
-    def after_chunk() -> None:
-        status, seconds = job.status(), time.perf_counter() - began
-        done, failed = int((status != RUNNING).sum()), int(np.isin(status, executor.FAILURES).sum())
-        reporter.chunk(Progress(job.grid.size, done, failed, done_before, seconds))
-        save()
-
-    try:
-        for part in job.parts:
-            executor.execute(
-                part.kernel,
-                part.images,
-                stop_when_settled=job.config.integrator.stop_when_settled,
-                after_chunk=after_chunk,
-            )
-    except KeyboardInterrupt:
-        save()
-        raise
-    return before + time.perf_counter() - began
-
-
-def collect(job: Plan, seconds: float) -> xr.Dataset:
-    """The labelled dataset of a finished job."""
-    arrays: dict[str, Array] = {}
-    for part in job.parts:
-        found = dataset.measured(part.kernel, part.images, job.config.integrator.t_end)
-        found["step_rule"] = part.step_rule
-        if job.config.integrator.method == "auto":
-            found["method"] = np.full(len(part.cells), methods.METHODS.index(part.method))
-        for name, values in found.items():
-            arrays.setdefault(name, np.empty(job.grid.size))[part.cells] = values
-    arrays |= dataset.predicted(job.prediction)
-    return dataset.label(job.config, job.grid, arrays, provenance(job.config, seconds, job.grid.size))

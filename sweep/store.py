@@ -1,20 +1,27 @@
 """Files of a run: the checkpoint it resumes from and the dataset it ends with.
 
+The dataset is netCDF4 with one chunk a tile, written at the end from the tiles that the checkpoint
+keeps as files of their own.  An HDF5 file that a killed process was writing can be lost as a whole,
+a folder of finished files cannot; and the user gets one file that opens without this program, which
+a zarr folder written in place would not be before it is complete.
+
 One writer, one way to write: a temporary file in the same folder, flushed to the disk, then renamed
 over the old one.  A file with its final name is complete.
 """
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
-import zipfile
-from collections.abc import Iterator, Mapping
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
@@ -48,6 +55,98 @@ class Identity:
         return ""
 
 
+class Checkpoint:
+    """What a run keeps until it is finished: a folder of finished tiles and the images of unfinished ones.
+
+    A file that cannot be read is as good as none: its cells are computed again.
+    """
+
+    def __init__(self, folder: Path, identity: Identity, note: Callable[[str], None]) -> None:
+        """Go on from what is in `folder`; `StoreError` if that is of another run."""
+        self.folder, self.note = folder, note
+        head = folder / "identity.json"
+        if head.exists():
+            try:
+                found = Identity(**json.loads(head.read_text(encoding="utf-8")))
+            except (OSError, ValueError, TypeError) as error:
+                raise StoreError(f"{head}: damaged ({error}); start again with --fresh") from None
+            _refuse_other(folder, found, identity)
+        else:
+            folder.mkdir(exist_ok=True)
+            with replacing(head) as temporary:
+                temporary.write_text(json.dumps(identity.__dict__), encoding="utf-8")
+        for left in folder.glob(".*.part"):
+            left.unlink()
+        self.done = {
+            int(path.stem) for path in folder.glob("[0-9]*.npz") if self._read(path) is not None
+        }  # fmt: skip
+
+    def save(self, tile: int, arrays: Mapping[str, Array]) -> None:
+        """Keep the results of a tile."""
+        self._write(self.folder / f"{tile:06d}.npz", arrays)
+        self.done.add(tile)
+
+    def load(self, tile: int) -> dict[str, Array]:
+        path = self.folder / f"{tile:06d}.npz"
+        arrays = self._read(path)
+        if arrays is None:
+            raise StoreError(f"{path}: damaged while the run went on; the same command computes it again")
+        return arrays
+
+    def save_running(self, tiles: list[int], tables: Mapping[str, Array], seconds: float) -> None:
+        """Keep the tables of images of the `tiles` that are being computed."""
+        head = {"tiles": np.array(tiles), "seconds": np.array(seconds)}
+        self._write(self.folder / "running.npz", {**head, **tables})
+
+    def load_running(self) -> tuple[list[int], dict[str, Array], float] | None:
+        """Tiles, tables and seconds spent of the last `save_running`, unless these tiles are done."""
+        tables = self._read(self.folder / "running.npz")
+        if tables is None or not {"tiles", "seconds"} <= set(tables):
+            return None
+        tiles, seconds = tables.pop("tiles").tolist(), float(tables.pop("seconds"))
+        return None if self.done & set(tiles) else (tiles, tables, seconds)
+
+    def remove(self) -> None:
+        shutil.rmtree(self.folder)
+
+    def _write(self, path: Path, arrays: Mapping[str, Array]) -> None:
+        named: dict[str, Any] = dict(arrays)
+        with replacing(path) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, **named)
+
+    def _read(self, path: Path) -> dict[str, Array] | None:
+        """The arrays in a file, whose checksums have been looked at; None where it cannot be read."""
+        try:
+            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+                return {name: archive[name] for name in archive.files}
+        except FileNotFoundError:
+            return None
+        except Exception as error:  # what a damaged archive makes zipfile and numpy raise is not listed anywhere
+            self.note(f"{path}: damaged ({error}); its cells are computed again")
+            path.unlink()
+            return None
+
+
+class Memory:
+    """In the place of a `Checkpoint` where nothing is to be written."""
+
+    def __init__(self) -> None:
+        self.done: set[int] = set()
+        self._tiles: dict[int, dict[str, Array]] = {}
+
+    def save(self, tile: int, arrays: Mapping[str, Array]) -> None:
+        self._tiles[tile] = dict(arrays)
+
+    def load(self, tile: int) -> dict[str, Array]:
+        return self._tiles[tile]
+
+    def save_running(self, tiles: list[int], tables: Mapping[str, Array], seconds: float) -> None:
+        """Nothing outlives this process."""
+
+    def load_running(self) -> None:
+        return None
+
+
 @dataclass(frozen=True)
 class RunFiles:
     """The files of the run `name` in `folder`."""
@@ -67,39 +166,34 @@ class RunFiles:
     def checkpoint(self) -> Path:
         return self.folder / f"{self.name}.checkpoint"
 
-    def save_checkpoint(self, tables: Mapping[str, Array], identity: Identity, seconds: float) -> None:
-        """Write the whole state of an unfinished run: its tables of images by method."""
-        note = json.dumps(identity.__dict__ | {"seconds": seconds})
-        named: dict[str, Any] = {"note": np.array(note), **tables}
-        with replacing(self.checkpoint) as temporary, temporary.open("wb") as stream:
-            np.savez(stream, **named)
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs of this name out of the folder; `StoreError` if one is in it.
 
-    def load_checkpoint(self, identity: Identity, tables: Mapping[str, Array]) -> float | None:
-        """Fill `tables` with what an unfinished run of `identity` left; the seconds it spent, None without one.
-
-        Raises
-        ------
-        StoreError
-            where the checkpoint is of another run, or damaged.
+        The lock is the kernel's and ends with the process, however it ends.
         """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f".{self.name}.lock"
+        while True:
+            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):
+                    break
+            except BlockingIOError:
+                os.close(handle)
+                raise StoreError(
+                    f"{self.folder / self.name}: another run is at work there; allowed: wait, or another --output"
+                ) from None
+            os.close(handle)  # of a file that the run before has just removed
         try:
-            with self.checkpoint.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-                note = json.loads(str(archive["note"]))
-                found = {name: archive[name] for name in archive.files if name != "note"}
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise StoreError(f"{self.checkpoint}: damaged checkpoint ({error}); start again with --fresh") from None
-        seconds = note.pop("seconds")
-        self._refuse_other(self.checkpoint, Identity(**note), identity)
-        if {name: images.shape for name, images in found.items()} != {name: t.shape for name, t in tables.items()}:
-            raise StoreError(f"{self.checkpoint}: damaged checkpoint (other tables); start again with --fresh")
-        for name, table in tables.items():
-            table[:] = found[name]
-        return float(seconds)
+            yield
+        finally:
+            path.unlink(missing_ok=True)
+            os.close(handle)
 
-    def load_dataset(self, identity: Identity) -> xr.Dataset | None:
-        """The finished dataset of `identity`; None where there is none.
+    def has_dataset(self, identity: Identity) -> bool:
+        """Whether the finished dataset of `identity` is there.
 
         Raises
         ------
@@ -107,27 +201,50 @@ class RunFiles:
             where the file is of another run, or not a dataset of this program.
         """
         if not self.dataset.exists():
-            return None
-        dataset = open_dataset(self.dataset)
-        found = Identity(*(str(dataset.attrs.get(key, "")) for key in ("config", "config_hash", "source_hash")))
-        self._refuse_other(self.dataset, found, identity)
-        return dataset
+            return False
+        with open_dataset(self.dataset, load=False) as dataset:
+            found = Identity(*(str(dataset.attrs.get(key, "")) for key in ("config", "config_hash", "source_hash")))
+        _refuse_other(self.dataset, found, identity)
+        return True
 
-    def save_dataset(self, dataset: xr.Dataset) -> None:
-        """Write the finished dataset; the checkpoint has then served."""
-        filled = {name for name, variable in dataset.data_vars.items() if variable.dtype.kind == "f"}
-        encoding = {name: {"_FillValue": None} for name in set(dataset.variables) - filled}
+    def save_tiles(
+        self,
+        frame: xr.Dataset,
+        variables: Mapping[str, tuple[xr.Variable, tuple[int, ...]]],
+        blocks: Iterable[tuple[str, Any, Array]],
+    ) -> None:
+        """Write the finished dataset, block by block: it need not fit into memory.
+
+        Parameters
+        ----------
+        frame : coordinates, attributes and small variables
+        variables : what is filled from `blocks`: empty variables with their attributes, and the
+            chunks in which they are stored
+        blocks : name, place in the array, values
+        """
         with replacing(self.dataset) as temporary:
             try:
-                dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
+                write_frame(frame, temporary)
+                with netCDF4.Dataset(temporary, "a") as file:
+                    for name, (variable, chunks) in variables.items():
+                        fill = np.nan if variable.dtype.kind == "f" else None
+                        target = file.createVariable(
+                            name,
+                            variable.dtype,
+                            tuple(map(str, variable.dims)),
+                            fill_value=fill,
+                            chunksizes=chunks or None,
+                        )
+                        target.setncatts(variable.attrs)
+                    for name, place, values in blocks:
+                        file[name][place] = values
             except RuntimeError as error:  # netCDF's own, of a full disk for one
                 raise StoreError(f"{self.dataset}: cannot be written: {error}") from None
-        self.checkpoint.unlink(missing_ok=True)
 
     def save_result(self, dataset: xr.Dataset, figure: Figure) -> None:
         """Write a dataset that no run resumes from, and its picture."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        self.save_dataset(dataset)
+        self.save_tiles(dataset, {}, [])
         self.save_picture(figure)
 
     def save_picture(self, figure: Figure) -> None:
@@ -135,22 +252,33 @@ class RunFiles:
             figure.savefig(temporary, format="png")
 
     def discard(self) -> None:
-        for path in (self.dataset, self.picture, self.checkpoint):
+        for path in (self.dataset, self.picture):
             path.unlink(missing_ok=True)
-
-    def _refuse_other(self, path: Path, found: Identity, wanted: Identity) -> None:
-        if reason := found.difference(wanted):
-            raise StoreError(
-                f"{path}: not resumed, it comes from {reason}\n"
-                "  allowed: the same configuration, another --output, or --fresh to discard that run"
-            )
+        shutil.rmtree(self.checkpoint, ignore_errors=True)
 
 
-def open_dataset(path: Path) -> xr.Dataset:
-    """Read a dataset into memory; `StoreError` if it is none."""
+def write_frame(frame: xr.Dataset, path: Path) -> None:
+    filled = {name for name, variable in frame.data_vars.items() if variable.dtype.kind == "f"}
+    encoding = {name: {"_FillValue": None} for name in set(frame.variables) - filled}
+    frame.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
+
+
+def _refuse_other(path: Path, found: Identity, wanted: Identity) -> None:
+    if reason := found.difference(wanted):
+        raise StoreError(
+            f"{path}: not resumed, it comes from {reason}\n"
+            "  allowed: the same configuration, another --output, or --fresh to discard that run"
+        )
+
+
+def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
+    """Read a dataset, into memory or as it is asked for; `StoreError` if it is none."""
     try:
-        with xr.open_dataset(path, engine="netcdf4") as dataset:
-            return dataset.load()
+        dataset = xr.open_dataset(path, engine="netcdf4")
+        if load:
+            with dataset:
+                dataset.load()
+        return dataset
     except (OSError, ValueError, RuntimeError) as error:
         reason = "no such file" if not path.exists() else f"not a netCDF dataset: {error}"
         raise StoreError(f"{path}: {reason}") from None

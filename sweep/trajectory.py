@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep import executor
+from sweep import dataset, executor
 from sweep.config import Config, ConfigError, Fault
 from sweep.grid import Array, off_the_body
 from sweep.kernels.lanes import RUNNING, Kernel
@@ -20,7 +20,8 @@ from sweep.models.linear import fastest_motion
 from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
 from sweep.plan import plan
-from sweep.run import as_config, collect, simulated, with_dopri5
+from sweep.provenance import provenance
+from sweep.run import as_config, simulated, with_dopri5
 
 SAMPLES_A_RADIAN = 3
 """Samples in a radian of the fastest motion: nearly twenty a period."""
@@ -69,7 +70,8 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     (part,) = job.parts
     start = part.images.copy()
     executor.execute(part.kernel, part.images, stop_when_settled=job.config.integrator.stop_when_settled)
-    summary = collect(job, 0.0).reset_coords(drop=False)
+    labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
+    summary = labelled.reset_coords(drop=False)
     # Blocks of one step: a look costs what it shows, not a hundred steps of idle lanes.
     kernel = Kernel(part.kernel.model, part.kernel.tableau, part.kernel.measure, block=1)
     columns = job.grid.columns()

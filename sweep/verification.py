@@ -17,29 +17,31 @@ FINER = 100.0
 """By what the tolerance is divided; the step is halved at least."""
 
 
-def verify(job: Plan) -> tuple[Array, dict[str, Array]]:
-    """Draw the share `verify` of the cells that did not fail, and run them again, to where they ended.
+def draw(cells: int, share: float) -> Array:
+    """Indices of the cells to run again, ascending."""
+    return np.sort(np.random.default_rng(0).choice(cells, math.ceil(share * cells), replace=False, shuffle=False))
+
+
+def verify(job: Plan, drawn: Array) -> dict[str, Array]:
+    """Run those of the cells `drawn` that did not fail again, to where they ended.
 
     Returns
     -------
-    Indices of the cells in the grid, ascending, and what the second run found for them, by the
-    names of the dataset's variables.
+    By name: `verified_cell`, indices in the grid of `job`, ascending; what the second run found for
+    them, and how it differs from the first.
     """
-    rng = np.random.default_rng(0)
     status = np.empty(job.grid.size)
     for part in job.parts:
-        status[part.cells] = part.images[:, part.kernel.row("status")]
-    sound = np.flatnonzero(np.isin(status, (SETTLED, TIME_LIMIT)))
-    count = min(len(sound), math.ceil(job.config.verify * job.grid.size))
-    drawn = np.sort(rng.choice(sound, count, replace=False))
-    arrays: dict[str, Array] = {}
+        status[part.cells] = part.status
+    drawn = drawn[np.isin(status[drawn], (SETTLED, TIME_LIMIT))]
+    again: dict[str, Array] = {}
     for part in job.parts:
         where = np.flatnonzero(np.isin(part.cells, drawn))
         if len(where):
             at = np.searchsorted(drawn, part.cells[where])
             for name, values in _again(job, part, where).items():
-                arrays.setdefault(name, np.empty(count))[at] = values
-    return drawn, arrays
+                again.setdefault(f"verified_{name}", np.empty(len(drawn)))[at] = values
+    return {"verified_cell": drawn, **again}
 
 
 def _again(job: Plan, part: Part, where: Array) -> dict[str, Array]:
@@ -54,4 +56,8 @@ def _again(job: Plan, part: Part, where: Array) -> dict[str, Array]:
     never = np.full((6, len(where)), np.nan)
     images = kernel.images(columns, step, t_stop, never, rattle_period(columns))
     executor.execute(kernel, images, stop_when_settled=False)
-    return dataset.measured(kernel, images, t_stop)
+    before, after = (dataset.measured(part.kernel, first, t_stop), dataset.measured(kernel, images, t_stop))
+    after["spin_difference"] = np.abs(after["spin_final"] - before["spin_final"])
+    if "reversals" in after:
+        after["count_changed"] = after["reversals"] != before["reversals"]
+    return {name: after[name] for name in dataset.VERIFIED if name in after}

@@ -22,7 +22,7 @@ from sweep.cli import main
 from sweep.dataset import STATUSES, VARIABLES
 from sweep.plan import plan
 from sweep.run import Progress, Reporter
-from sweep.store import StoreError, open_dataset, replacing
+from sweep.store import RunFiles, StoreError, open_dataset, replacing
 
 Write = Callable[..., Path]
 
@@ -179,7 +179,7 @@ def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.
         except KeyboardInterrupt:
             interruptions += 1
             assert [path.name for path in out.iterdir()] == ["small.checkpoint"]
-            with np.load(out / "small.checkpoint") as archive:
+            with np.load(out / "small.checkpoint" / "running.npz") as archive:
                 (part,) = plan(sweep.load_config(write())).parts
                 steps.append(archive["dopri5"][:, part.kernel.row("done")].sum())
     assert interruptions > 2
@@ -207,21 +207,75 @@ def test_refuses_another_configuration(write: Write, interrupted: Path) -> None:
 
 
 def test_refuses_other_sources(write: Write, interrupted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["sweep.run"], "fingerprint", lambda *_: "0" * 16)
+    monkeypatch.setattr(sys.modules["sweep.provenance"], "fingerprint", lambda *_: "0" * 16)
     with pytest.raises(StoreError, match="other sources"):
         sweep.run(write(), interrupted)
 
 
-@pytest.mark.parametrize(
-    "damage", [lambda b: b[: len(b) // 2], lambda _: b"", lambda b: b[:1000] + b"\x00" * 50 + b[1050:]]
-)
-def test_refuses_a_damaged_checkpoint(write: Write, interrupted: Path, damage: Callable[[bytes], bytes]) -> None:
-    file = interrupted / "small.checkpoint"
+def spoil(file: Path, how: str) -> None:
     whole = file.read_bytes()
-    file.write_bytes(damage(whole))
-    assert file.read_bytes() != whole
+    half = len(whole) // 2
+    damaged = {"cut": whole[:half], "empty": b"", "flipped": whole[:half] + bytes(b ^ 255 for b in whole[half:])}[how]
+    assert damaged != whole
+    file.write_bytes(damaged)
+
+
+@pytest.mark.parametrize("how", ["cut", "empty", "flipped"])
+def test_a_damaged_checkpoint_is_computed_again(write: Write, interrupted: Path, small: xr.Dataset, how: str) -> None:
+    spoil(interrupted / "small.checkpoint" / "running.npz", how)
     result = invoke("run", write(), "--output", interrupted)
-    assert (result.exit_code, "damaged checkpoint" in result.stderr) == (2, True)
+    assert (result.exit_code, "running.npz: damaged" in result.stderr) == (0, True)
+    same_numbers(open_dataset(interrupted / "small.nc"), small)
+
+
+@pytest.mark.parametrize("how", ["cut", "empty", "flipped"])
+def test_a_damaged_tile_is_computed_again(
+    write: Write, tmp_path: Path, small: xr.Dataset, how: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(RunFiles, "save_tiles", _interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(write(), tmp_path / "out")
+    monkeypatch.undo()
+    spoil(tmp_path / "out" / "small.checkpoint" / "000000.npz", how)
+    result = invoke("run", write(), "--output", tmp_path / "out")
+    assert (result.exit_code, "000000.npz: damaged" in result.stderr) == (0, True)
+    same_numbers(open_dataset(tmp_path / "out" / "small.nc"), small)
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_a_damaged_identity_is_refused(write: Write, interrupted: Path) -> None:
+    spoil(interrupted / "small.checkpoint" / "identity.json", "cut")
+    result = invoke("run", write(), "--output", interrupted)
+    assert (result.exit_code, "identity.json: damaged" in result.stderr) == (2, True)
+    assert invoke("run", write(), "--output", interrupted, "--fresh").exit_code == 0
+
+
+@pytest.mark.parametrize("size", [1, 5, 7])
+def test_tiles_do_not_touch_the_numbers(
+    write: Write, tmp_path: Path, small: xr.Dataset, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.modules["sweep.run"], "tile_size", lambda cells: size)  # noqa: ARG005
+    monkeypatch.setattr(sys.modules["sweep.local"], "GROUP", 2)
+    same_numbers(sweep.run(write()), small)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(write(), tmp_path / "out", reporter=Stop(3))
+    same_numbers(sweep.run(write(), tmp_path / "out"), small)
+    checked = sweep.run(write(SMALL + "verify: 0.5\n"))
+    monkeypatch.undo()
+    xr.testing.assert_equal(checked, sweep.run(write(SMALL + "verify: 0.5\n")))
+
+
+def test_two_runs_at_once(write: Write, tmp_path: Path) -> None:
+    files = RunFiles(tmp_path / "out", "small")
+    with files.locked():
+        result = invoke("run", write(), "--output", tmp_path / "out")
+        assert (result.exit_code, "another run is at work there" in result.stderr) == (2, True)
+        assert invoke("run", write(), "--output", tmp_path / "out", "--set", "name=other").exit_code == 0
+    assert invoke("run", write(), "--output", tmp_path / "out").exit_code == 0
+    assert not list((tmp_path / "out").glob(".*"))
 
 
 def test_another_name_is_another_run(write: Write, interrupted: Path) -> None:
@@ -255,7 +309,7 @@ def test_interrupt_stops_within_two_seconds_and_the_same_command_goes_on(write: 
     command = [sys.executable, "-m", "sweep", "run", str(file), "--output", str(out)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT)
     deadline = time.monotonic() + 120
-    while not (out / "small.checkpoint").exists() and time.monotonic() < deadline:
+    while not (out / "small.checkpoint" / "running.npz").exists() and time.monotonic() < deadline:
         time.sleep(0.05)
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
@@ -265,11 +319,11 @@ def test_interrupt_stops_within_two_seconds_and_the_same_command_goes_on(write: 
     assert time.monotonic() - began < 2 + 8 * (os.getloadavg()[0] > 3)
     assert "the same command goes on" in messages
     assert [path.name for path in out.iterdir()] == ["small.checkpoint"]
-    with np.load(out / "small.checkpoint") as archive:
+    with np.load(out / "small.checkpoint" / "running.npz") as archive:
         assert archive["dopri5"].shape[0] == 240
     with pytest.raises(KeyboardInterrupt):
         sweep.run(file, out, reporter=(reporter := Stop(0)))
-    assert "going on from there" in reporter.notes[0]
+    assert "0 of 1 tiles are there from an earlier run: going on" in reporter.notes[0]
 
 
 def test_info_and_plot(write: Write, tmp_path: Path) -> None:

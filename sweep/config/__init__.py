@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from sweep.config import cases, document, schema
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.schema import Config, Integrator, Values
-from sweep.grid import Grid, off_the_body
+from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.kernels import methods
 from sweep.models import MODELS, TIERS
 from sweep.models.coefficients import rattle_period
@@ -119,7 +119,7 @@ def _unusable_step(config: Config) -> str:
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
     # A window of the period-averaged spin closes at most once a step.
-    longest = float(rattle_period(Grid.of(config).columns()).min() / 2)
+    longest = min(float(rattle_period(columns).min()) / 2 for columns in distinct(Grid.of(config), BODY))
     return f"{step:g}; allowed: auto, or at most {longest:.3g}, half a rattle's period" if step > longest else ""
 
 

@@ -21,7 +21,7 @@ from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
 DEFAULT_MEASURES = ("reversals", "energy_error")
 
-MAX_CELLS = 10_000_000
+MAX_CELLS = 1_000_000_000
 MAX_STEPS = 1e15
 
 

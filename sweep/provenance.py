@@ -1,0 +1,79 @@
+"""Where the numbers of a dataset come from: what they depend on, and what made them."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+import subprocess
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import numba
+
+from sweep.config import Config
+from sweep.jit import fingerprint
+from sweep.kernels import methods
+from sweep.models import MODELS
+from sweep.store import Identity
+
+# Beside the numeric sources: they fill the images, and turn them into results.
+_DECISIVE = tuple(
+    str(Path(__file__).parent / name)
+    for name in ("grid.py", "prediction.py", "plan.py", "dataset.py", "verification.py", "local.py", "run.py")
+)
+
+
+def identify(config: Config) -> Identity:
+    return Identity(config.to_yaml(), config.fingerprint(), fingerprint(*_DECISIVE))
+
+
+def this_cpu() -> str:
+    """The type of CPU that kernels are compiled for here."""
+    return str(llvmlite.binding.get_host_cpu_name())
+
+
+def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] = ()) -> dict[str, Any]:
+    """Attributes of a dataset: configuration, versions, machines (`cpus`, by default this one's), cost."""
+    identity = identify(config)
+    return {
+        "config": identity.config,
+        "config_hash": identity.config_hash,
+        "source_hash": identity.source_hash,
+        "integrator": _integrator_words(config),
+        "sweep_version": metadata.version("rattleback-sweep"),
+        "git_commit": _git_commit(),
+        **{f"{name}_version": metadata.version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
+        "python_version": platform.python_version(),
+        "cpu": ", ".join(sorted(set(cpus) or {this_cpu()})),
+        "threads": numba.get_num_threads(),
+        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "wall_time": seconds,
+        "trajectories_per_second": cells / seconds if seconds else 0.0,
+    }
+
+
+def _integrator_words(config: Config) -> str:
+    if config.model not in MODELS:
+        return "none"
+    if config.integrator.step != "auto":
+        return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"
+    rule, method = f"a spin error of {config.integrator.tolerance:g} at t = 400", config.integrator.method
+    if method == "dopri5":
+        rule = f"the shorter of {methods.STABILITY_SHARE:g} of the stability limit and {rule}"
+    name = "the cheapest method" if method == "auto" else method
+    return f"{name}, fixed step, per trajectory by {rule}"
+
+
+def _git_commit() -> str:
+    """The commit of the checkout that the package runs from; "unknown" for an installed one."""
+    root = Path(__file__).parent.parent
+    if not (root / ".git").exists():
+        return "unknown"
+    try:
+        command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
