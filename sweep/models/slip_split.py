@@ -156,11 +156,15 @@ def rocking(columns: Columns) -> Array:
     return np.moveaxis(np.stack(columns_, axis=-1), 0, 1)
 
 
+def velocities(y: Array, p: Array) -> Array:
+    """The slip model's states (u1, u2, ω1, ω2, ω3, v1, v2), shape (7, cells)."""
+    _, geometry = slow(*y, p)
+    return np.stack([y[0], y[1], *geometry[7:10], y[5], y[6]])
+
+
 def observe(y: Array, p: Array) -> dict[str, Array]:
     """What the slip model shows."""
-    _, geometry = slow(*y, p)
-    inverse = np.concatenate([p[:4], p[7:]])
-    return slip.observe(np.stack([y[0], y[1], *geometry[7:10], y[5], y[6]]), inverse)
+    return slip.observe(velocities(y, p), np.concatenate([p[:4], p[7:]]))
 
 
 SPLIT = replace(

@@ -25,8 +25,8 @@ def text(section: Section) -> str:
     """A section for the terminal."""
     lines = [f"\n{section.title}"]
     for row in section.rows:
-        expected = f"(expected: {row.expected})"
-        lines.append(f"  {'ok  ' if row.holds else 'FAIL'} {row.what}: {row.found} {expected} {row.remark}".rstrip())
+        verdict, expected = "ok  " if row.holds else "FAIL", f"(expected: {row.expected})"
+        lines.append(f"  {verdict} {row.what} [{row.source}]: {row.found} {expected} {row.remark}".rstrip())
     for caption, table in section.tables:
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
         lines.append(f"  {caption}")
