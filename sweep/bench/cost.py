@@ -10,8 +10,19 @@ import numba
 import numpy as np
 from matplotlib.axes import Axes
 
-from sweep.bench.precision import MARKERS
-from sweep.bench.timing import STEEPEST, T_END, Effort, Measurement, Part, Spread, Work, in_turn, spread_out
+from sweep.bench.timing import (
+    COLOURS,
+    MARKERS,
+    STEEPEST,
+    T_END,
+    Effort,
+    Measurement,
+    Part,
+    Spread,
+    Work,
+    in_turn,
+    spread_out,
+)
 from sweep.kernels import methods
 from sweep.models import MODELS
 from sweep.report.cells import make_kernel, standard
@@ -91,9 +102,10 @@ def _draw(runs: list[Run], spreads: list[Spread], setting: str) -> Callable[[Axe
             chosen = [
                 (r.at, s) for r, s in zip(runs, spreads, strict=True) if (r.setting, r.method) == (setting, method)
             ]
-            at, median = [x for x, _ in chosen], np.array([s.median for _, s in chosen])
-            reach = np.array([[s.median - min(s.values), max(s.values) - s.median] for _, s in chosen]).T
-            axes.errorbar(at, median, reach, fmt=f"{MARKERS[method]}-", capsize=2, label=method)
+            at, several = zip(*chosen, strict=True)
+            reach = np.transpose([s.reach for s in several])
+            axes.errorbar(at, [s.median for s in several], reach, fmt=f"{MARKERS[method]}-", capsize=2,
+                          color=COLOURS[method], label=method)  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel=AXES[setting], ylabel="ms a trajectory",
                  title=f"Cost against {AXES[setting]}")  # fmt: skip
         axes.legend(fontsize=7)

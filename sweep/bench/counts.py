@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from sweep.bench.precision import MARKERS
 from sweep.bench.reference import Counts, read_counts
-from sweep.bench.timing import Effort, Measurement, Part, Spread
+from sweep.bench.timing import COLOURS, MARKERS, Effort, Measurement, Part, Spread
 from sweep.grid import Array
 from sweep.kernels import methods
 from sweep.models import MODELS
@@ -59,9 +58,10 @@ def counts(method: str, reference: Counts, sample: Array, asked: tuple[float, ..
 
 def _draw(axes: Axes, shares: dict[tuple[str, str], list[float]], asked: tuple[float, ...]) -> None:
     for (method, group), share in shares.items():
-        face = "none" if group == "all" else None
-        axes.semilogx(asked, np.array(share) * 100, MARKERS[method], linestyle="-", markerfacecolor=face,
-                      label=f"{method}, {group}")  # fmt: skip
+        colour = COLOURS[method]
+        face, line = ("white", "--") if group == "all" else (colour, "-")
+        axes.semilogx(asked, np.array(share) * 100, MARKERS[method], linestyle=line, color=colour,
+                      markerfacecolor=face, label=f"{method}, {group}")  # fmt: skip
     axes.set(title="Wrong counts", xlabel="tolerance", ylabel="cells with another count, %")
     axes.set_ylim(bottom=0)
     axes.legend(fontsize=7)

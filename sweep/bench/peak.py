@@ -15,12 +15,13 @@ from typing import Any
 
 import numba
 import numpy as np
+from matplotlib.axes import Axes
 
-from sweep.bench.timing import Effort, Measurement, Part, Spread, in_turn
+from sweep.bench.timing import COLOURS, Effort, Measurement, Part, Spread, in_turn
 from sweep.grid import Array
 from sweep.jit import OPTIONS
-from sweep.kernels.adams import step_lines
-from sweep.kernels.lanes import BLOCK, LANES, Kernel, watch_nothing
+from sweep.kernels.adams import BDF, PREDICTOR
+from sweep.kernels.lanes import BLOCK, LANES, Kernel
 from sweep.kernels.methods import METHODS
 from sweep.kernels.stepper import step_source
 from sweep.kernels.tableau import DOPRI5
@@ -92,12 +93,6 @@ class Counting:
     def __neg__(self) -> Counting:  # folded into the operation it feeds
         return Counting(-self.value)
 
-    def __eq__(self, other: object) -> bool:
-        return bool(self.value == plain(other))
-
-    def __lt__(self, other: Any) -> bool:
-        return bool(self.value < plain(other))
-
     def __gt__(self, other: Any) -> bool:
         return bool(self.value > plain(other))
 
@@ -108,7 +103,6 @@ class Counting:
         return self._operate(self.value**0.5)
 
     __radd__, __rmul__ = __add__, __mul__
-    __hash__ = None  # type: ignore[assignment]
 
 
 def plain(x: Any) -> Any:
@@ -127,52 +121,71 @@ def flops_of_dopri5(image: list[Counting]) -> int:
 
 
 def flops_of_adams(image: list[Counting]) -> int:
-    """Of one step without measurements."""
-    group = [Counting(0.0)] * (len(image) * LANES)
-    group[::LANES] = image
-    source = "\n".join(["lane = 0", *step_lines(make_kernel("adams", MODELS["slip"], ()).rows, 0)])
+    """Of one step without measurements: two evaluations, a Newton step, and sums over the history."""
+    p, (u1, u2, M1, M2, M3, v1, v2) = image[7:21], image[:7]
     Counting.flops = 0
-    exec(
-        source, {"slow": slow, "newton": newton, "watch_spin": watch_nothing, "add_work": watch_nothing, "group": group}
-    )
-    measuring = 3 + 3 + 2 + 1  # a window's share, the time, μ R; the count of steps
-    return Counting.flops - measuring
+    _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
+    once = Counting.flops
+    newton(u1, u2, v1, v2, geometry, p, Counting(0.02), v1, v2)
+    weighted = 2 * 2 * (5 * PREDICTOR + 2 * len(BDF))  # two sums each for slopes and slips, a product and a sum a term
+    corrections = 2 * (4 * 3 + 4 * 7 + 4 + 2) + 4 * 3  # residual, P r, new states; slopes as corrected
+    return once + Counting.flops + weighted + corrections
 
 
 FLOPS: dict[str, Callable[[list[Counting]], int]] = {"dopri5": flops_of_dopri5, "adams": flops_of_adams}
 
 
+HEAD = ["method", "measuring", "ns a step and trajectory", "flops a step", "GFLOP/s", "share, %", "fastest of both, %"]
+
+
 def peak(effort: Effort) -> Part:
     threads = numba.get_num_threads()
     cells = LANES * threads
-    cases = {(method, measure): _images(method, measure, cells) for method in METHODS for measure in ((), MEASURE)}
-    works: dict[Any, Callable[[], Any]] = {"peak": lambda: fma_peak(ROUNDS, threads)}
-    for case, (kernel, images) in cases.items():
-        works[case] = partial(kernel.advance, images, np.arange(cells), BLOCKS, False)
-    for work in works.values():
-        work()
-    # Short works, repeated the more: what else the machine does spoils some and spares others.
-    times = in_turn(works, replace(effort, repeats=5 * effort.repeats))
-
-    part = Part(Section("Share of the FMA peak"))
-    speed = [2 * FMAS * WIDTH * ROUNDS * threads / t / 1e9 for t in times["peak"].values]
-    lines = [["method", "measuring", "ns a step and trajectory", "flops a step", "GFLOP/s", "share of the peak, %"]]
+    measures: tuple[tuple[str, ...], ...] = ((), MEASURE)
+    cases = {(method, measure): _images(method, measure, cells) for method in METHODS for measure in measures}
+    times = _times(cases, effort, threads)
+    speed = times["peak"].inverse(2 * FMAS * WIDTH * ROUNDS * threads / 1e9)
+    part, lines, shares = Part(Section("Share of the FMA peak")), [HEAD], {}
+    part.measurements.append(Measurement("peak", "", "", "", "threads", threads, "peak_gflops", speed))
     for (method, measure), (_, images) in cases.items():
         flops = FLOPS[method]([Counting(float(value)) for value in images[0]])
         each = times[method, measure].times(1e9 / (BLOCKS * BLOCK * cells))
-        rate = Spread(tuple(flops / t for t in each.values))
-        share = Spread(tuple(100 * r / p for r, p in zip(rate.values, speed, strict=False)))
+        rate = each.inverse(flops)
+        share = Spread(tuple(100 * r / p for r, p in zip(rate.values, speed.values, strict=False)))
         what = " and ".join(measure) or "nothing"
-        lines.append([method, what, f"{each:.2f}", str(flops), f"{rate:.1f}", f"{share:.0f}"])
+        shares[method, what] = share
+        fastest = 100 * max(rate.values) / max(speed.values)
+        lines.append([method, what, f"{each:.2f}", str(flops), f"{rate:.1f}", f"{share:.0f}", f"{fastest:.0f}"])
         for quantity, spread in (("ns_a_step", each), ("percent_of_peak", share)):
             part.measurements.append(Measurement("peak", "slip", method, what, "threads", threads, quantity, spread))
-    part.measurements.append(Measurement("peak", "", "", "", "threads", threads, "peak_gflops", Spread(tuple(speed))))
     caption = (
-        f"{threads} threads, the slip model; peak measured in the same turns: {Spread(tuple(speed)):.1f} GFLOP/s. "
-        "Flops of the step alone are counted; measurements take time without counting."
+        f"{threads} threads, the slip model; peak measured in the same turns: {speed:.1f} GFLOP/s. "
+        "Flops of the step alone are counted; measurements take time without counting. "
+        "Where other work disturbs the turns, the fastest turn of the kernel over that of the peak tells more."
     )
     part.section.tables.append((caption, lines))
+    part.panels.append(lambda axes: _draw(axes, shares))
     return part
+
+
+def _times(cases: dict[tuple[str, tuple[str, ...]], tuple[Kernel, Array]], effort: Effort, threads: int) -> Any:
+    """Seconds of the peak's loop and of each kernel, by name."""
+    works: dict[Any, Callable[[], Any]] = {"peak": lambda: fma_peak(ROUNDS, threads)}
+    for case, (kernel, images) in cases.items():
+        works[case] = partial(kernel.advance, images, np.arange(len(images)), BLOCKS, False)
+    for work in works.values():
+        work()  # compiles
+    # Short works, repeated the more: what else the machine does spoils some and spares others.
+    return in_turn(works, replace(effort, repeats=5 * effort.repeats))
+
+
+def _draw(axes: Axes, shares: dict[tuple[str, str], Spread]) -> None:
+    for place, ((method, what), share) in enumerate(shares.items()):
+        reach = np.transpose([share.reach])
+        axes.barh(place, share.median, xerr=reach, color=COLOURS[method], height=0.6, capsize=2)
+        axes.text(1, place, f"{method}, measuring {what}", va="center", fontsize=8)
+    axes.set(title="Share of the FMA peak", xlabel="%", yticks=[])
+    axes.invert_yaxis()
 
 
 def _images(method: str, measure: tuple[str, ...], cells: int) -> tuple[Kernel, Array]:

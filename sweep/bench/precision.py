@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import compress
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from sweep.bench.reference import Spins, read_spins, spin_errors, whole_steps
-from sweep.bench.timing import STEEPEST, Effort, Measurement, Part, Spread, Work, in_turn, spread_out
+from sweep.bench.timing import MARKERS, STEEPEST, Effort, Measurement, Part, Spread, Work, in_turn, spread_out
 from sweep.grid import Array
 from sweep.kernels import methods
 from sweep.kernels.lanes import Kernel
@@ -27,8 +29,7 @@ FLOOR = 1e-11
 BOUND = 1e-6
 """Error at which the methods are put beside each other."""
 
-COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#bbbbbb")
-MARKERS = {"dopri5": "s", "adams": "o"}
+PALETTE = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#bbbbbb")
 
 
 @dataclass(frozen=True)
@@ -63,9 +64,13 @@ def work_precision(effort: Effort) -> Part:
     )
     medians = [spread.median for spread in cost]
     part.section.tables += [(caption, lines), _at_equal_error(points, medians)]
-    for slip, title in ((True, "slip"), (False, "reduced models")):
-        chosen = [(p, ms) for p, ms in zip(points, medians, strict=True) if (p.model == "slip") == slip]
-        part.panels.append(_draw_precision(chosen, title))
+    slip = [point.model == "slip" for point in points]
+    for chosen, title in ((slip, "slip"), ([not is_slip for is_slip in slip], "reduced models")):
+        curves: dict[tuple[str, str], list[tuple[float, Spread]]] = {}
+        for point, milliseconds in compress(zip(points, cost, strict=True), chosen):
+            case = point.case if point.model == "slip" else point.model
+            curves.setdefault((case, point.method), []).append((point.error, milliseconds))
+        part.panels.append(partial(_draw_precision, curves=curves, title=f"Work and precision, {title}"))
     return part
 
 
@@ -126,21 +131,19 @@ def _at_equal_error(points: list[Point], cost: list[float]) -> tuple[str, list[l
     return f"The slip model at equal error: the fastest step with an error up to {BOUND:g}", lines
 
 
-def _draw_precision(points: list[tuple[Point, float]], title: str) -> Callable[[Axes], None]:
-    def draw(axes: Axes) -> None:
-        cases = list(dict.fromkeys((p.case if title == "slip" else p.model) for p, _ in points))
-        for i, case in enumerate(cases):
-            for method, marker in MARKERS.items():
-                chosen = [(p.error, ms) for p, ms in points if p.method == method and case in (p.case, p.model)]
-                if chosen:
-                    label = f"{case}, {method}" if title == "slip" else case
-                    face = COLOURS[i % 7] if method == "adams" or title != "slip" else "none"
-                    axes.loglog(*zip(*chosen, strict=True), marker, linestyle="-", color=COLOURS[i % 7],
-                                markerfacecolor=face, label=label)  # fmt: skip
-        axes.set(title=f"Work and precision, {title}", xlabel="largest error in spin", ylabel="ms a trajectory")
-        axes.legend(fontsize=7)
-
-    return draw
+def _draw_precision(axes: Axes, curves: dict[tuple[str, str], list[tuple[float, Spread]]], title: str) -> None:
+    """A curve for each case (a colour) and method (a marker)."""
+    cases = list(dict.fromkeys(case for case, _ in curves))
+    for (case, method), points in curves.items():
+        errors, spreads = zip(*points, strict=True)
+        colour = PALETTE[cases.index(case) % len(PALETTE)]
+        axes.errorbar(
+            errors, [s.median for s in spreads], np.transpose([s.reach for s in spreads]), fmt=f"{MARKERS[method]}-",
+            color=colour, markerfacecolor=colour if method == "adams" else "white", label=f"{case}, {method}",
+            linewidth=1, elinewidth=0.6, markersize=4,
+        )  # fmt: skip
+    axes.set(xscale="log", yscale="log", title=title, xlabel="largest error in spin", ylabel="ms a trajectory")
+    axes.legend(fontsize=7)
 
 
 @dataclass(frozen=True)
@@ -232,7 +235,7 @@ def _draw_kept(axes: Axes, kept: list[Kept], asked: tuple[float, ...]) -> None:
         for j, errors in enumerate(one.error):
             label = f"{one.model}, {one.method}" if not j else None
             axes.loglog(asked, errors, MARKERS[one.method], linestyle="-", linewidth=0.6, markersize=3,
-                        color=COLOURS[i], label=label)  # fmt: skip
+                        color=PALETTE[i], label=label)  # fmt: skip
     axes.loglog(asked, asked, "k--", label="as asked")
     axes.set(title="Tolerance kept, a line a body", xlabel="tolerance", ylabel="largest error in spin")
     axes.legend(fontsize=7)
@@ -242,7 +245,7 @@ def _draw_predictor(axes: Axes, kept: list[Kept]) -> None:
     for i, one in enumerate(kept):
         error, violation = _above_floor(one)
         if len(error):
-            axes.loglog(violation, error, MARKERS[one.method], linestyle="", markersize=4, color=COLOURS[i],
+            axes.loglog(violation, error, MARKERS[one.method], linestyle="", markersize=4, color=PALETTE[i],
                         label=f"{one.model}, {one.method}")  # fmt: skip
     axes.set(title="Does the energy tell the error?", xlabel="energy_error", ylabel="largest error in spin")
     axes.legend(fontsize=7)

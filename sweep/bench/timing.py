@@ -21,6 +21,9 @@ from sweep.report.rows import Section
 
 Key = TypeVar("Key")
 
+MARKERS = {"dopri5": "s", "adams": "o"}
+COLOURS = {"dopri5": "#4477aa", "adams": "#ee6677"}
+
 T_END = 400.0
 """Time that `tolerance` is meant for, in sqrt(c/g)."""
 
@@ -56,6 +59,15 @@ class Spread:
 
     def times(self, factor: float) -> Spread:
         return Spread(tuple(value * factor for value in self.values))
+
+    def inverse(self, amount: float) -> Spread:
+        """Rates at which `amount` is done in these times."""
+        return Spread(tuple(amount / value for value in self.values))
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """How far the smallest and the largest are from the median, as error bars want it."""
+        return self.median - min(self.values), max(self.values) - self.median
 
     def __format__(self, form: str) -> str:
         return f"{self.median:{form}} ({min(self.values):{form}} … {max(self.values):{form}})"

@@ -262,11 +262,11 @@ def _make_run_block(rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
     lines = ["def run_block(group):", f"    for _ in range({BLOCK // HISTORY}):"]
     for phase in range(HISTORY):
         lines.append(f"        for lane in range({LANES}):")
-        lines += [f"            {line}" for line in step_lines(rows, phase)]
+        lines += [f"            {line}" for line in _step_lines(rows, phase)]
     return numba.njit(compile_inline("run_block", "\n".join(lines), names), **OPTIONS)
 
 
-def step_lines(rows: tuple[str, ...], phase: int) -> list[str]:
+def _step_lines(rows: tuple[str, ...], phase: int) -> list[str]:
     """One step as source, writing slot `phase` of the history.  The loop body itself: as a function of
     its own LLVM unrolls the lanes before it inlines, and nothing vectorises."""
 
