@@ -182,10 +182,10 @@ def _times(cases: dict[tuple[str, tuple[str, ...]], tuple[Kernel, Array]], effor
 def _draw(axes: Axes, shares: dict[tuple[str, str], Spread]) -> None:
     for place, ((method, what), share) in enumerate(shares.items()):
         reach = np.transpose([share.reach])
-        axes.barh(place, share.median, xerr=reach, color=COLOURS[method], height=0.6, capsize=2)
-        axes.text(1, place, f"{method}, measuring {what}", va="center", fontsize=8)
+        axes.barh(place, share.median, xerr=reach, color=COLOURS[method], height=0.4, capsize=2)
+        axes.text(0.5, place - 0.25, f"{method}, measuring {what}", va="bottom", fontsize=8)
     axes.set(title="Share of the FMA peak", xlabel="%", yticks=[])
-    axes.invert_yaxis()
+    axes.set_ylim(len(shares) - 0.5, -0.7)
 
 
 def _images(method: str, measure: tuple[str, ...], cells: int) -> tuple[Kernel, Array]:

@@ -1,11 +1,10 @@
-"""Error in spin against time, and how well `tolerance` is kept and `energy_error` tells the error."""
+"""Time of whole runs against error in spin."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import compress
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,10 +13,9 @@ from sweep.bench.reference import Spins, read_spins, spin_errors, whole_steps
 from sweep.bench.timing import MARKERS, STEEPEST, Effort, Measurement, Part, Spread, Work, in_turn, spread_out
 from sweep.grid import Array
 from sweep.kernels import methods
-from sweep.kernels.lanes import Kernel
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
-from sweep.report.cells import MEASURE, make_kernel
+from sweep.report.cells import make_kernel
 from sweep.report.rows import Section
 
 LOOSEST = 1e-3
@@ -60,17 +58,12 @@ def work_precision(effort: Effort) -> Part:
             part.measurements.append(Measurement(*measured))
     caption = (
         "Whole runs to t = 400, start-up included, compilation apart, nothing measured but the spin; median "
-        f"(smallest … largest) of up to {effort.repeats} runs, in turn. Error: the largest over t = 25, 50, … 400."
+        f"(smallest … largest) of up to {effort.repeats} runs, in turn. Error: the largest over t = 25, 50, … 400. "
+        "Steps at which a trajectory fails are left out."
     )
     medians = [spread.median for spread in cost]
     part.section.tables += [(caption, lines), _at_equal_error(points, medians)]
-    slip = [point.model == "slip" for point in points]
-    for chosen, title in ((slip, "slip"), ([not is_slip for is_slip in slip], "reduced models")):
-        curves: dict[tuple[str, str], list[tuple[float, Spread]]] = {}
-        for point, milliseconds in compress(zip(points, cost, strict=True), chosen):
-            case = point.case if point.model == "slip" else point.model
-            curves.setdefault((case, point.method), []).append((point.error, milliseconds))
-        part.panels.append(partial(_draw_precision, curves=curves, title=f"Work and precision, {title}"))
+    part.panels = [_panel(points, cost, slip) for slip in (True, False)]
     return part
 
 
@@ -112,26 +105,29 @@ def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort
 
 def _at_equal_error(points: list[Point], cost: list[float]) -> tuple[str, list[list[str]]]:
     """The cheapest setting of each method under `BOUND`, side by side."""
-    lines = [["μ", "dopri5, ms a trajectory", "adams, ms a trajectory", "times faster"]]
-    for case in dict.fromkeys(point.case for point in points if point.model == "slip"):
-        best = {
-            method: min(
-                (
-                    ms
-                    for p, ms in zip(points, cost, strict=True)
-                    if (p.case, p.method) == (case, method) and p.error <= BOUND
-                ),
-                default=np.nan,
-            )
-            for method in methods.METHODS
-        }
-        ratio = best["dopri5"] / best["adams"]
-        shown = [f"{value:.3g}" if np.isfinite(value) else "—" for value in (*best.values(), ratio)]
-        lines.append([case.removeprefix("μ = "), *shown])
+    best: dict[str, dict[str, float]] = {}
+    for point, milliseconds in zip(points, cost, strict=True):
+        if point.model == "slip" and point.error <= BOUND:
+            cheapest = best.setdefault(point.case, dict.fromkeys(methods.METHODS, np.inf))
+            cheapest[point.method] = min(cheapest[point.method], milliseconds)
+    lines = [["slip", *(f"{method}, ms a trajectory" for method in methods.METHODS), "times faster"]]
+    for case, found in best.items():
+        ratio = found["dopri5"] / found["adams"]
+        lines.append([case, *(f"{x:.3g}" if np.isfinite(x) else "—" for x in (*found.values(), ratio))])
     return f"The slip model at equal error: the fastest step with an error up to {BOUND:g}", lines
 
 
-def _draw_precision(axes: Axes, curves: dict[tuple[str, str], list[tuple[float, Spread]]], title: str) -> None:
+def _panel(points: list[Point], cost: list[Spread], slip: bool) -> Callable[[Axes], None]:
+    """Draws a curve for each friction (`slip`) or each other model, and method."""
+    curves: dict[tuple[str, str], list[tuple[float, Spread]]] = {}
+    for point, milliseconds in zip(points, cost, strict=True):
+        if (point.model == "slip") == slip:
+            case = point.case if slip else point.model
+            curves.setdefault((case, point.method), []).append((point.error, milliseconds))
+    return partial(_draw, curves=curves, title=f"Work and precision, {'slip' if slip else 'reduced models'}")
+
+
+def _draw(axes: Axes, curves: dict[tuple[str, str], list[tuple[float, Spread]]], title: str) -> None:
     """A curve for each case (a colour) and method (a marker)."""
     cases = list(dict.fromkeys(case for case, _ in curves))
     for (case, method), points in curves.items():
@@ -143,109 +139,4 @@ def _draw_precision(axes: Axes, curves: dict[tuple[str, str], list[tuple[float, 
             linewidth=1, elinewidth=0.6, markersize=4,
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", title=title, xlabel="largest error in spin", ylabel="ms a trajectory")
-    axes.legend(fontsize=7)
-
-
-@dataclass(frozen=True)
-class Kept:
-    """Errors at the automatic steps of one method: all of shape (bodies, tolerances)."""
-
-    model: str
-    method: str
-    reference: Spins
-    error: Array
-    violation: Array
-
-
-def tolerance(effort: Effort) -> Part:
-    """Whether the error at the automatic step is what was asked for, and whether the energy tells it."""
-    part = Part(Section("Is the tolerance kept, and does the energy tell the error?"))
-    asked = effort.tolerances
-    lines = [["model", "method", "body", *(f"{t:g}" for t in asked)]]
-    kept = [_errors(model, method, spins, asked) for model, method, spins in _all_bodies(read_spins())]
-    for one in kept:
-        for body, (errors, violations) in enumerate(zip(one.error, one.violation, strict=True)):
-            name = one.reference.name(body)
-            marked = [f"{e:.1e}{' !' if e > t else ''}" for e, t in zip(errors, asked, strict=True)]
-            lines.append([one.model, one.method, name, *marked])
-            for t, e, v in zip(asked, errors, violations, strict=True):
-                for quantity, value in (("spin_error", e), ("energy_error", v)):
-                    where = ("tolerance", one.model, one.method, name, "tolerance", t, quantity)
-                    part.measurements.append(Measurement(*where, Spread((float(value),))))
-    share = ", ".join(f"{one.model} {one.method} {(one.error <= asked).mean():.0%}" for one in kept)
-    caption = f"Largest error in spin, t <= 400, at the automatic step of each tolerance; ! is above it. Kept: {share}"
-    part.section.tables += [(caption, lines), _predictor(kept)]
-    part.panels += [lambda axes: _draw_kept(axes, kept, asked), lambda axes: _draw_predictor(axes, kept)]
-    return part
-
-
-def _all_bodies(spins: dict[str, Spins]) -> Iterator[tuple[str, str, Spins]]:
-    for model, reference in spins.items():
-        for method in methods.allowed(MODELS[model]):
-            bodies = reference
-            if method == "dopri5" and "mu" in reference.columns:
-                bodies = reference.select(reference.columns["mu"] <= STEEPEST)
-            yield model, method, bodies
-
-
-def _errors(model: str, method: str, reference: Spins, asked: tuple[float, ...]) -> Kept:
-    """All tolerances in one run; equal steps, where stability decides, are run once."""
-    steps = [methods.automatic_step(method, MODELS[model], reference.columns, t)[0] for t in asked]
-    bodies = np.tile(np.arange(len(reference.spins)), len(asked))
-    runs, place = np.unique(
-        np.stack([bodies, whole_steps(reference, np.concatenate(steps))]), axis=1, return_inverse=True
-    )
-    kernel: Kernel = make_kernel(method, MODELS[model], tuple(m for m in MEASURE if m in MODELS[model].measures))
-    found = spin_errors(kernel, reference.select(runs[0].astype(int)), runs[1])
-    error, violation = (values[place.ravel()].reshape(len(asked), -1).T for values in found)
-    return Kept(model, method, reference, error, violation)
-
-
-def _predictor(kept: list[Kept]) -> tuple[str, list[list[str]]]:
-    head = [
-        "model",
-        "method",
-        "runs",
-        "spin error / energy_error: median",
-        "quartiles",
-        "correlation of the logarithms",
-    ]
-    lines = [head]
-    for one in kept:
-        error, violation = _above_floor(one)
-        if len(error) < 3:
-            continue
-        ratio = error / violation
-        low, middle, high = np.quantile(ratio, (0.25, 0.5, 0.75))
-        likeness = np.corrcoef(np.log(error), np.log(violation))[0, 1]
-        where = [one.model, one.method, str(len(error))]
-        lines.append([*where, f"{middle:.2g}", f"{low:.2g} … {high:.2g}", f"{likeness:.2f}"])
-    return f"How energy_error tells the error in spin, over runs with errors above {FLOOR:g}", lines
-
-
-def _above_floor(one: Kept) -> tuple[Array, Array]:
-    """Distinct pairs of spin error and energy error that are more than round-off."""
-    pairs = np.unique(np.stack([one.error.ravel(), one.violation.ravel()]), axis=1)
-    told = np.isfinite(pairs).all(axis=0) & (pairs[0] > FLOOR) & (pairs[1] > 0)
-    return pairs[0, told], pairs[1, told]
-
-
-def _draw_kept(axes: Axes, kept: list[Kept], asked: tuple[float, ...]) -> None:
-    for i, one in enumerate(kept):
-        for j, errors in enumerate(one.error):
-            label = f"{one.model}, {one.method}" if not j else None
-            axes.loglog(asked, errors, MARKERS[one.method], linestyle="-", linewidth=0.6, markersize=3,
-                        color=PALETTE[i], label=label)  # fmt: skip
-    axes.loglog(asked, asked, "k--", label="as asked")
-    axes.set(title="Tolerance kept, a line a body", xlabel="tolerance", ylabel="largest error in spin")
-    axes.legend(fontsize=7)
-
-
-def _draw_predictor(axes: Axes, kept: list[Kept]) -> None:
-    for i, one in enumerate(kept):
-        error, violation = _above_floor(one)
-        if len(error):
-            axes.loglog(violation, error, MARKERS[one.method], linestyle="", markersize=4, color=PALETTE[i],
-                        label=f"{one.model}, {one.method}")  # fmt: skip
-    axes.set(title="Does the energy tell the error?", xlabel="energy_error", ylabel="largest error in spin")
     axes.legend(fontsize=7)

@@ -17,8 +17,9 @@ from sweep.bench.cost import cost
 from sweep.bench.counts import wrong_counts
 from sweep.bench.hard import hard_cases
 from sweep.bench.peak import peak
-from sweep.bench.precision import tolerance, work_precision
+from sweep.bench.precision import work_precision
 from sweep.bench.timing import Effort, Measurement, Part
+from sweep.bench.tolerance import tolerance
 from sweep.kernels import methods
 from sweep.models import MODELS
 from sweep.report import page
