@@ -23,7 +23,7 @@ from sweep.bench.timing import (
     in_turn,
     spread_out,
 )
-from sweep.kernels import methods
+from sweep.kernels import lanes, methods
 from sweep.models import MODELS
 from sweep.report.cells import make_kernel, standard
 from sweep.report.rows import Section
@@ -69,7 +69,7 @@ def cost(effort: Effort) -> Part:
         for run, s in zip(runs, spreads, strict=True)
     ]
     caption = (
-        f"The slip model at the automatic step of tolerance {methods.TOLERANCE:g}, start-up included; where not varied "
+        f"The slip model at the automatic step of tolerance {lanes.TOLERANCE:g}, start-up included; where not varied "
         f"{effort.trajectories} trajectories, {threads} threads, t_end = {T_END:g}, μ = {MU:g}"
     )
     part.section.tables.append((caption, lines))

@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from sweep.bench.timing import COLOURS, Effort, Measurement, Part, Spread, in_turn
 from sweep.grid import Array
 from sweep.jit import OPTIONS
-from sweep.kernels.adams import BDF, PREDICTOR
+from sweep.kernels.adams_step import BDF, PREDICTOR_NODES
 from sweep.kernels.lanes import BLOCK, LANES, Kernel
 from sweep.kernels.methods import METHODS
 from sweep.kernels.stepper import step_source
@@ -127,7 +127,9 @@ def flops_of_adams(image: list[Counting]) -> int:
     _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
     once = Counting.flops
     newton(u1, u2, v1, v2, geometry, p, Counting(0.02), v1, v2)
-    weighted = 2 * 2 * (5 * PREDICTOR + 2 * len(BDF))  # two sums each for slopes and slips, a product and a sum a term
+    weighted = (
+        2 * 2 * (5 * len(PREDICTOR_NODES) + 2 * len(BDF))
+    )  # two sums each for slopes and slips, a product and a sum a term
     corrections = 2 * (4 * 3 + 4 * 7 + 4 + 2) + 4 * 3  # residual, P r, new states; slopes as corrected
     return once + Counting.flops + weighted + corrections
 

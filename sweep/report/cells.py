@@ -12,7 +12,7 @@ import numpy as np
 from sweep.dataset import measured
 from sweep.executor import execute
 from sweep.grid import Array, Grid
-from sweep.kernels import methods
+from sweep.kernels import lanes, methods
 from sweep.kernels.lanes import Kernel
 from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
@@ -68,7 +68,7 @@ def simulate(
     model: str = "slip",
     method: str = "dopri5",
     step: float | Array | None = None,
-    tolerance: float = methods.TOLERANCE,
+    tolerance: float = lanes.TOLERANCE,
     measure: Iterable[str] = MEASURE,
     ranges: bool = True,
     settle: bool = False,
