@@ -175,11 +175,8 @@ def our_run(problem: Problem, kernel: Kernel, step: float) -> Callable[[], Array
 
 def slip_states(kernel: Kernel, images: Array) -> Array:
     """States (u1, u2, ω1, ω2, ω3, v1, v2), whatever the method's own."""
-    states, constants = images[:, :7].T, images[:, 7 : kernel.row("step")].T
-    if isinstance(kernel, AdamsKernel):
-        _, geometry = slip_split.slow(*states, constants)
-        return np.stack([*states[:2], *geometry[7:10], *states[5:]])
-    return states
+    states, constants = kernel.unpack(images)
+    return slip_split.velocities(states, constants) if isinstance(kernel, AdamsKernel) else states
 
 
 # --- heyoka.py --------------------------------------------------------------------------------

@@ -171,6 +171,29 @@ def reproduce(output: Path) -> None:
 
 
 @main.command()
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    default="runs/bench",
+    show_default=True,
+    help="Folder for the report.",
+)
+def bench(output: Path) -> None:
+    """Speed against error of each method and model, and cases that are hard to get right.
+
+    Takes about five minutes on two cores; writes bench.html, bench.png and bench.csv.
+
+    Exit code 1 if a hard case does not hold, else 0: no time, and no error at a tolerance, fails.
+    """
+    with _explained():
+        from sweep.bench import bench as measure
+
+        failed = measure(output, click.echo)
+        click.echo(f"\nwrote {output / 'bench.html'}, .png and .csv; {len(failed)} hard cases do not hold")
+        sys.exit(1 if failed else DONE)
+
+
+@main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--var", "variable", help="Variable to draw [default: reversals, simulated beside predicted].")
 @click.option("--output", type=click.Path(path_type=Path), help="PNG file [default: beside FILE].")

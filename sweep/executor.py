@@ -61,7 +61,7 @@ def _rescale(blocks: int, seconds: float) -> int:
 def nominal_seconds(images: Array, kernel: Kernel) -> float:
     """Rough upper estimate of the time for `images`: every one stepped to its time limit.
 
-    25 ns a step and lane on one thread, measured on the slip model with dopri5 (`scripts/peak.py`).
+    25 ns a step and lane on one thread, measured on the slip model with dopri5 (`sweep bench`).
     """
     goal = images[:, kernel.row("goal")] - images[:, kernel.row("done")]
     threads = numba.get_num_threads()

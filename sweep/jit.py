@@ -45,8 +45,16 @@ def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -
     carries a hash of every numeric source, of the `modules` (files of models from outside the
     package) and of the libraries that compile them.
     """
-    dispatcher = numba.njit(function, parallel=True, **OPTIONS)
-    dispatcher._cache = _SpecialisedCache(function, (specialisation, fingerprint(*modules)))
+    return _cached(numba.njit(function, parallel=True, **OPTIONS), specialisation, *modules)
+
+
+def serial(function: Callable[..., Any], specialisation: str) -> Any:
+    """As `parallel`, for work not worth sharing out: threads take their time to come in on a busy machine."""
+    return _cached(numba.njit(function, **OPTIONS), specialisation)
+
+
+def _cached(dispatcher: Any, specialisation: str, *modules: str) -> Any:
+    dispatcher._cache = _SpecialisedCache(dispatcher.py_func, (specialisation, fingerprint(*modules)))
     return dispatcher
 
 

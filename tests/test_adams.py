@@ -17,9 +17,11 @@ import sweep
 from sweep import ConfigError
 from sweep.executor import execute
 from sweep.kernels import adams
-from sweep.kernels.adams import AdamsKernel, accurate_step, fitted_weights
+from sweep.kernels.adams import AdamsKernel, accurate_step
+from sweep.kernels.adams_step import BDF, BDF_GAMMA, CORRECTOR_NODES, EXTRAPOLATE, HISTORY, PREDICTOR_NODES
 from sweep.kernels.lanes import DIVERGED, LANES, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT, Kernel
 from sweep.kernels.tableau import DOPRI5
+from sweep.kernels.weights import fitted_weights, plain_weights
 from sweep.models import MODELS, analytic, linear, slip, slip_split
 from sweep.models.coefficients import rattle_period
 from sweep.models.model import stack
@@ -94,26 +96,40 @@ def test_newton_solves_the_stiff_slip(v1: float, v2: float, mu: float, away1: fl
     assert np.abs(end - np.array([v1, v2])).max() <= 0.05 * np.abs(start - np.array([v1, v2])).max() + 1e-5 / mu
 
 
-@pytest.mark.parametrize("nodes", [-np.arange(8), 1 - np.arange(9)], ids=["predictor", "corrector"])
-def test_weights(nodes: np.ndarray) -> None:
-    plain = fitted_weights(nodes, np.zeros((2, 1)))[0]
+@pytest.mark.parametrize("formula", [PREDICTOR_NODES, CORRECTOR_NODES], ids=["predictor", "corrector"])
+def test_weights(formula: tuple[int, ...]) -> None:
+    nodes, plain = np.array(formula), plain_weights(formula)
     # Adams-Bashforth 8 and Adams-Moulton 9, Hairer, Norsett & Wanner (1993), III.1.
     assert plain[0] == pytest.approx(434241 / 120960 if len(nodes) == 8 else 1070017 / 3628800, rel=1e-12)
     for nu in (1e-3, 0.1, 0.3, 0.45):
-        w = fitted_weights(nodes, np.array([[nu], [3 * nu]]))[0]
+        w = fitted_weights(formula, np.array([nu]))[0]
         for k in range(len(nodes) - 4):
             assert w @ nodes.astype(float) ** k == pytest.approx(1 / (k + 1), rel=1e-10)
         for omega in (nu, 3 * nu):
             assert w @ np.cos(omega * nodes) == pytest.approx(np.sin(omega) / omega, rel=1e-11)
             assert w @ np.sin(omega * nodes) == pytest.approx((1 - np.cos(omega)) / omega, rel=1e-9)
-    assert fitted_weights(nodes, np.array([[1e-6], [3e-6]]))[0] == pytest.approx(plain, rel=1e-6)
+    np.testing.assert_allclose(fitted_weights(formula, np.array([0.0, 1e-6])), [plain, plain], rtol=1e-9)
+    many = np.linspace(0, 0.45, 37)
+    one_by_one = [fitted_weights(formula, many[i : i + 1])[0] for i in range(len(many))]
+    np.testing.assert_array_equal(fitted_weights(formula, many), one_by_one)
+
+
+@given(bodies, st.floats(0, 0.1))
+def test_rocking(body: dict[str, float], weight: float) -> None:
+    """Its frequency and the matrix of the corrector against the derivatives of `slow` by complex steps."""
+    p = stack(slip_split.constants(columns(**body)))[:, 0]
+    slopes = [slip_split.slow(*(1e-30j * np.eye(7)[i]), p)[0] for i in range(4)]
+    J = np.array(slopes).T[:4].imag / 1e-30
+    assert slip_split.fastest_rocking(p) == pytest.approx(np.abs(np.linalg.eigvals(J).imag).max(), rel=1e-6, abs=1e-6)
+    inverse = np.reshape(slip_split.implicit(weight, p), (4, 4))
+    np.testing.assert_allclose(inverse @ (np.eye(4) - weight * J), np.eye(4), atol=1e-12)
 
 
 def test_bdf_and_extrapolation_are_exact_for_quartics() -> None:
     at = -np.arange(5.0)
     for k in range(5):
-        assert np.dot(adams.EXTRAPOLATE, at**k) == pytest.approx(1)
-        assert np.dot(adams.BDF, at**k) + adams.BDF_GAMMA * k == pytest.approx(1)
+        assert np.dot(EXTRAPOLATE, at**k) == pytest.approx(1)
+        assert np.dot(BDF, at**k) + BDF_GAMMA * k == pytest.approx(1)
 
 
 @pytest.mark.parametrize(
@@ -232,7 +248,7 @@ def test_vectorised() -> None:
     block = adams._make_run_block(ADAMS.rows, ADAMS.measure)
     block(np.zeros(len(ADAMS.rows) * LANES))
     assembly = next(iter(block.inspect_asm().values()))
-    assert assembly.count("divpd") >= 3 * adams.HISTORY
+    assert assembly.count("divpd") >= 3 * HISTORY
     assert assembly.count("divsd") + assembly.count("sqrtsd") == 0
 
 

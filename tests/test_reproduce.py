@@ -13,8 +13,10 @@ from click.testing import CliRunner
 
 from sweep.cli import main
 from sweep.models import MODELS, analytic, coefficients
-from sweep.reproduce import report, rows, simulations, theory
-from sweep.reproduce.rows import Section
+from sweep.report import rows
+from sweep.report.rows import Section
+from sweep.reproduce import report, simulations, theory
+from sweep.reproduce.rows import published
 
 GROUPS: dict[str, Callable[[], list[Any]]] = {
     "slip": theory._slip_rows,
@@ -85,5 +87,5 @@ def test_every_published_number_is_in_a_row(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(simulations, "against_paper", lambda key, *_: asked.add(key))
     theory.formulas()
     source = Path(simulations.__file__).read_text(encoding="utf-8")
-    left = set(rows.published()) - asked
+    left = set(published()) - asked
     assert all(f'"{key}"' in source or f'"{key.rsplit("_", 1)[0]}_{{mu}}"' in source for key in left), left

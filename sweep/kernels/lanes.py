@@ -55,11 +55,6 @@ _MEASURED = {
 # A rattle settles when it could not carry the spin across a limit even with this many times its energy.
 SETTLE_MARGIN = 4.0
 
-# Friction only takes energy away, so a body that gains this share from one look to the next is an
-# integration gone wrong.  Over 40 bodies at 0.3 to 2 times the stability limit, 1e-5 (with the check
-# of failures below) caught each spin that was off by more than 1e-4 and none that was right to 1e-6.
-ENERGY_GAIN = 1e-5
-
 # Beyond this an energy is no number any more.
 MAX_ENERGY = 1e300
 
@@ -70,6 +65,11 @@ NEGLIGIBLE = 1e-120
 
 class Kernel:
     """`advance` for one model, method and choice of measurements, and the layout of its images."""
+
+    # Friction only takes energy away, so a body that gains this share from one look to the next is an
+    # integration gone wrong.  Over 40 bodies at 0.3 to 2 times the stability limit, 1e-5 (with the check
+    # of failures below) caught each spin that was off by more than 1e-4 and none that was right to 1e-6.
+    energy_gain = 1e-5
 
     def __init__(self, model: Model, tableau: Tableau, measure: Iterable[str], block: int = BLOCK) -> None:
         self.tableau = tableau
@@ -85,7 +85,9 @@ class Kernel:
         self.rows = (*model.states, *constants, *_BASE, *measured, *more)
 
     def _make_advance(self, run_block: Any, method: str) -> Any:
-        advance = make_advance(run_block, make_inspect(self.model, self.rows, self.measure), self.rows)
+        advance = make_advance(
+            run_block, make_inspect(self.model, self.rows, self.measure, self.energy_gain), self.rows
+        )
         name = f"{self.model.name}-{method}-{'+'.join(self.measure)}"
         return parallel(advance, name, getfile(self.model.rhs))
 
@@ -303,7 +305,7 @@ def make_watch_spin(rows: tuple[str, ...]) -> Any:
     return watch_spin
 
 
-def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...]) -> Any:
+def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...], energy_gain: float) -> Any:
     """Compiled (group, stop_when_settled): look at all lanes between two blocks, decide who ends."""
     n = len(model.states)
     load_states, load_constants = make_load(0, n, LANES), make_load(n, count_constants(model), LANES)
@@ -316,7 +318,7 @@ def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...]) 
     GOAL, DONE, STATUS, START, ENERGY, STABLE_STEP = (
         rows.index(name) * LANES for name in ("goal", "done", "status", "energy_start", "energy", "stable_step")
     )
-    lanes, allowed, conserved = LANES, 1.0 + ENERGY_GAIN, "energy_error" in model.measures
+    lanes, allowed, conserved = LANES, 1.0 + energy_gain, "energy_error" in model.measures
     pauses = "quiet_energy" in rows
     QUIET_ENERGY, QUIET_AFTER = (rows.index(f"quiet_{name}") * LANES if pauses else 0 for name in ("energy", "after"))
 

@@ -11,7 +11,9 @@ import linecache
 from collections.abc import Iterable
 from typing import Any
 
-from sweep.jit import inline
+import numba
+
+from sweep.jit import OPTIONS, inline
 from sweep.kernels.tableau import Tableau
 
 
@@ -68,6 +70,13 @@ def make_rest(n_states: int, spin_state: int) -> Any:
     """Compiled states -> states: the same spin without rattle."""
     rest = _tuple(f"y[{i}]" if i == spin_state else "0.0" for i in range(n_states))
     return compile_inline("rest", f"def rest(y):\n    return {rest}", {})
+
+
+def compile_lanes(name: str, arguments: str, lines: Iterable[str], lanes: int, names: dict[str, Any]) -> Any:
+    """Compiled (arguments) -> None: `lines` for each lane.  They are the loop body itself: as a function of
+    their own LLVM unrolls the lanes before it inlines, and nothing vectorises."""
+    source = [f"def {name}({arguments}):", f"    for lane in range({lanes}):", *(f"        {line}" for line in lines)]
+    return numba.njit(compile_inline(name, "\n".join(source), names), **OPTIONS)
 
 
 def _tuple(items: Iterable[str]) -> str:

@@ -71,9 +71,11 @@ class Rattle:
         cells = np.arange(len(mode))
         shape = 2 * self.modes[cells, :, mode] * self.amplitudes[cells, mode, None]
         total = np.zeros(len(mode))
-        for part in (shape.real, shape.imag):
-            _, rattle, inertia = self.model.energy(self._with_spin(part), constants)
-            total += rattle / inertia
+        # Modes that are nearly one have huge amplitudes that cancel, and no energy that is a number.
+        with np.errstate(invalid="ignore"):
+            for part in (shape.real, shape.imag):
+                _, rattle, inertia = self.model.energy(self._with_spin(part), constants)
+                total += rattle / inertia
         return total
 
     def at(self, time: Array) -> Array:

@@ -143,17 +143,44 @@ def energy(y: Any, p: Any) -> Any:
     return ellipsoid.energy(u1, u2, geometry[7], geometry[8], geometry[9], v1, v2, inverse)
 
 
-def rocking(columns: Columns) -> Array:
-    """Jacobian of the slow rattle (u1, u2, M1, M2) about upright rest without slip, shape (cells, 4, 4)."""
-    p = constants(columns)
-    rest = np.zeros((7, len(p[0])), dtype=complex)
-    columns_ = []
-    for i in range(4):
-        shifted = rest.copy()
-        shifted[i] += 1e-30j
-        slopes, _ = slow(*shifted, p)
-        columns_.append(np.stack(np.broadcast_arrays(*slopes[:4])).imag / 1e-30)
-    return np.moveaxis(np.stack(columns_, axis=-1), 0, 1)
+@inline
+def rocking(p: Any) -> Any:
+    """(B12, B21, C11, C12, C21, C22) of u' = B M, M' = C u, the rocking about upright rest without slip.
+
+    B's diagonal vanishes.
+    """
+    A11, A12, A22, A33, I1, I2 = p[0], p[1], p[2], p[3], p[4], p[5]
+    inv_c = 1.0 / np.sqrt(A33)
+    return 1.0 / (I2 + A33), -1.0 / (I1 + A33), A12 * inv_c, (A22 - A33) * inv_c, (A33 - A11) * inv_c, -A12 * inv_c
+
+
+def fastest_rocking(p: Any) -> Array:
+    """The higher frequency ν of the rocking about upright rest without slip, -ν² an eigenvalue of B C; (cells,)."""
+    B12, B21, C11, C12, C21, C22 = rocking(p)
+    first, second = -B12 * C21, -B21 * C12
+    half_split = np.sqrt((0.5 * (first - second)) ** 2 + B12 * C22 * B21 * C11)
+    return np.asarray(np.sqrt(np.maximum(0.5 * (first + second) + half_split, 0.0)))
+
+
+@inline
+def implicit(weight: Any, p: Any) -> Any:
+    """(1 - weight J)⁻¹ row by row, sixteen numbers; J the matrix of the rocking in (u1, u2, M1, M2)."""
+    B12, B21, C11, C12, C21, C22 = rocking(p)
+    square = weight * weight
+    # E = (1 - w² B C)⁻¹; the other blocks are w E B, w C E and 1 + w² C E B.
+    E11, E12 = 1.0 - square * B21 * C12, square * B12 * C22
+    E21, E22 = square * B21 * C11, 1.0 - square * B12 * C21
+    inv_det = 1.0 / (E11 * E22 - E12 * E21)
+    E11, E12, E21, E22 = E11 * inv_det, E12 * inv_det, E21 * inv_det, E22 * inv_det
+    F11, F12 = weight * (C11 * E11 + C12 * E21), weight * (C11 * E12 + C12 * E22)
+    F21, F22 = weight * (C21 * E11 + C22 * E21), weight * (C21 * E12 + C22 * E22)
+    b12, b21 = weight * B12, weight * B21
+    return (
+        E11, E12, E12 * b21, E11 * b12,
+        E21, E22, E22 * b21, E21 * b12,
+        F11, F12, 1.0 + F12 * b21, F11 * b12,
+        F21, F22, F22 * b21, 1.0 + F21 * b12,
+    )  # fmt: skip
 
 
 def velocities(y: Array, p: Array) -> Array:

@@ -13,8 +13,9 @@ from sweep.config import Config, Integrator, Values
 from sweep.grid import Array
 from sweep.models import MODELS, TIERS, analytic
 from sweep.parameters import PARAMETERS
-from sweep.reproduce.rows import Section, against, against_paper, states
-from sweep.reproduce.theory import standard
+from sweep.report.cells import standard
+from sweep.report.rows import Section, against, states
+from sweep.reproduce.rows import against_paper
 from sweep.run import run
 from sweep.trajectory import trajectory
 from sweep.trajectory_plot import draw_spin

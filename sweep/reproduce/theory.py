@@ -6,39 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from sweep.executor import execute
 from sweep.grid import Array
-from sweep.kernels.lanes import Kernel
-from sweep.kernels.methods import automatic_step
-from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS, analytic, linear
 from sweep.models.coefficients import coefficients, rattle_period
 from sweep.models.model import Columns, stack
-from sweep.parameters import PARAMETERS
-from sweep.reproduce.rows import Section, against, against_paper, below
-
-
-def standard(**parameters: Any) -> dict[str, Array]:
-    """The paper's standard case at μ = 75, with some parameters replaced, as columns."""
-    values = {name: p.default for name, p in PARAMETERS.items()} | {"mu": 75.0} | parameters
-    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in values.values()))
-    return {name: array.copy() for name, array in zip(values, arrays, strict=True)}
+from sweep.report import cells
+from sweep.report.cells import standard
+from sweep.report.rows import Section, against, below
+from sweep.reproduce.rows import against_paper
 
 
 def simulate(name: str, columns: Columns, t_end: float, step: float | None = None) -> tuple[Array, Array, Array]:
     """Final states (n, cells), spins and largest violations of the energy balance, relative."""
-    model = MODELS[name]
-    measure = [m for m in ("energy_error",) if m in model.measures]
-    kernel = Kernel(model, DOPRI5, measure)
-    steps = automatic_step("dopri5", model, columns)[0] if step is None else np.full(len(columns["a"]), step)
-    images = kernel.images(columns, steps, t_end, np.full((6, len(steps)), np.nan), rattle_period(columns))
-    execute(kernel, images, stop_when_settled=False)
-    states, constants = kernel.unpack(images)
-    spin = model.energy(states, constants)[0]
-    violation = (
-        images[:, kernel.row("violation")] / images[:, kernel.row("energy_start")] if measure else np.zeros(len(images))
-    )
-    return states, spin, violation
+    ends = cells.simulate(columns, t_end, model=name, step=step, measure=("energy_error",), ranges=False)
+    violation = ends["energy_error"] if ends.kernel.measure else np.zeros(len(ends.images))
+    return ends.states, ends["spin_final"], violation
 
 
 def formulas() -> Section:

@@ -1,0 +1,117 @@
+"""Reference spins and counts from `data/`, and errors against them."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sweep.executor import execute
+from sweep.grid import Array
+from sweep.kernels.lanes import TIME_LIMIT, Kernel
+from sweep.models import MODELS
+from sweep.models.coefficients import rattle_period
+from sweep.models.model import Columns
+from sweep.parameters import PARAMETERS
+from sweep.report.cells import never_stable
+from sweep.store import StoreError
+
+DATA = Path(__file__).parents[2] / "data"
+SPINS, COUNTS = DATA / "reference_spins.csv", DATA / "reference_counts_500.csv"
+
+
+@dataclass(frozen=True)
+class Spins:
+    """Spins of some bodies of a model at common times."""
+
+    columns: dict[str, Array]
+    """Physical parameters, each of shape (bodies,)."""
+    times: Array
+    """Multiples of the first."""
+    spins: Array
+    """Shape (bodies, times)."""
+
+    def select(self, which: Array) -> Spins:
+        """The bodies that `which` (a mask or indices) picks."""
+        return Spins({n: v[which] for n, v in self.columns.items()}, self.times, self.spins[which])
+
+    def name(self, body: int) -> str:
+        """What sets a body apart from the standard case, in words."""
+        values = {name: float(column[body]) for name, column in self.columns.items()}
+        shown = [
+            f"{'μ' if name == 'mu' else name} = {value:g}"
+            for name, value in values.items()
+            if name == "mu" or value != PARAMETERS[name].default
+        ]
+        return ", ".join(shown) or "standard"
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Reversals of cells of the slip model."""
+
+    columns: dict[str, Array]
+    reversals: Array
+    firm: Array
+    """Whether no window's start and no round-off decides the count."""
+
+
+def read_spins() -> dict[str, Spins]:
+    """The reference spins by model."""
+    found: dict[str, dict[tuple[float, ...], dict[float, float]]] = {}
+    for line in _lines(SPINS):
+        names = [name for name in MODELS[line["model"]].parameters if name != "c"]
+        body = tuple(float(line[name]) for name in names)
+        found.setdefault(line["model"], {}).setdefault(body, {})[float(line["t"])] = float(line["spin"])
+    spins = {}
+    for model, bodies in found.items():
+        names = [name for name in MODELS[model].parameters if name != "c"]
+        columns = dict(zip(names, np.array(list(bodies)).T, strict=True)) | {"c": np.ones(len(bodies))}
+        times = sorted(next(iter(bodies.values())))
+        values = np.array([[series[t] for t in times] for series in bodies.values()])
+        spins[model] = Spins({n: columns[n] for n in MODELS[model].parameters}, np.array(times), values)
+    return spins
+
+
+def read_counts() -> Counts:
+    lines = _lines(COUNTS)
+    names = ("a", "b", "delta", "mu", "n0", "x0", "y0")
+    columns = {name: np.array([float(line[name]) for line in lines]) for name in names}
+    reversals = np.array([int(float(line["reversals"])) for line in lines])
+    firm = np.array([line["firm"].strip().lower() in ("1", "true") for line in lines])
+    return Counts(columns | {"c": np.ones(len(lines))}, reversals, firm)
+
+
+def _lines(path: Path) -> list[dict[str, str]]:
+    if not path.exists():
+        raise StoreError(f"{path}: no such file; bench runs from a checkout of the project (pip install -e)")
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(line for line in stream if not line.startswith("#")))
+
+
+def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> tuple[Array, Array]:
+    """Largest error in spin over the reference's times, and `energy_error` at the last; shapes (bodies,).
+
+    A trajectory for each time: adams' steps depend on where it is to end.  One that does not get
+    there is off by infinity.
+    """
+    table = np.concatenate([_images(kernel, reference.columns, step, t) for t in reference.times])
+    execute(kernel, table, stop_when_settled=False)
+    spin = kernel.model.energy(*kernel.unpack(table))[0]
+    error = np.where(table[:, kernel.row("status")] == TIME_LIMIT, np.abs(spin - reference.spins.T.ravel()), np.inf)
+    last = table[-len(step) :]
+    violation = np.full(len(step), np.nan)
+    if "energy_error" in kernel.measure:
+        violation = last[:, kernel.row("violation")] / last[:, kernel.row("energy_start")]
+    return error.reshape(len(reference.times), -1).max(axis=0), violation
+
+
+def whole_steps(reference: Spins, step: Array) -> Array:
+    """The longest steps up to `step` that meet all times of the reference."""
+    return np.asarray(reference.times[0] / np.ceil(reference.times[0] / step * (1 - 1e-12)))
+
+
+def _images(kernel: Kernel, columns: Columns, step: Array, t_end: float) -> Array:
+    return kernel.images(columns, step, t_end, never_stable(len(step)), rattle_period(columns))
