@@ -49,13 +49,14 @@ def run_group(
     after_chunk : called with the statuses of the group's cells
     """
     grid, cpu = Grid.of(config), this_cpu()
-    began = time.perf_counter()
     if config.model not in MODELS:
         for i in group:
             yield Done(i, _evaluate(config, grid.part(tiles[i])), 0.0, cpu)
         return
     plans, tables = pool(plan(config, grid.part(tiles[i]), compiling) for i in group)
-    images = {method: table for method, (_, table) in tables.items()}
+    for kernel, _ in tables.values():
+        kernel.compile()
+    images, began = {method: table for method, (_, table) in tables.items()}, time.perf_counter()
     left = checkpoint.load_running() if checkpoint else None
     if (
         left
@@ -65,8 +66,6 @@ def run_group(
         for method, table in left[1].items():
             images[method][:] = table
         began -= left[2]
-    for kernel, _ in tables.values():
-        kernel.compile()
 
     def save() -> None:
         if checkpoint:

@@ -12,6 +12,7 @@ from sweep import dataset
 from sweep.config import Config
 from sweep.grid import Array, Grid
 from sweep.kernels import methods
+from sweep.kernels.build import build
 from sweep.kernels.lanes import Kernel
 from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
@@ -81,6 +82,7 @@ def plan(config: Config, grid: Grid | None = None, compiling: Callable[[], None]
         kernel = _kernel(method, model, config.measure, integrator.tolerance)
         if not kernel.is_compiled():
             compiling()
+            build(method, model.name, config.measure)
         theirs = {name: values[cells] for name, values in columns.items()}
         if integrator.step == "auto":
             step, rule = methods.automatic_step(method, model, theirs, integrator.tolerance)
