@@ -65,7 +65,7 @@ def main() -> None:
     kernels = {name: make_kernel(name, SLIP, ()) for name in ("dopri5", "adams")}
     print(f"{options.trajectories} trajectories to t = {options.t_end:g}, spin error <= {options.bound:g}")
     print("μ        method   step      error    ms a trajectory            speed over dopri5")
-    for mu in (60.0, 200.0, 1000.0, 1e4, 1e5):
+    for mu in (60.0, 100.0, 200.0, 1000.0, 1e4, 1e5):
         body = columns(mu, options.trajectories)
         limit = float(STABILITY_SHARE * DOPRI5.real_stability / slip.fastest_decay(body)[0])
         # Beyond 1000 dopri5 is left out: it takes as long as μ is large.
