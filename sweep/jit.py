@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
+import os
 import platform
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import FunctionCache
 from numba.core.registry import cpu_target
 from numba.extending import register_jitable
@@ -23,6 +26,11 @@ FASTMATH = {"contract", "nsz", "arcp"}
 
 # error_model="python" puts a branch in front of each division, which stops vectorisation.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FASTMATH}
+
+# Numba numbers the functions of a process from 1, and only that number tells the symbols of two closures
+# of one name apart.  Two kernels compiled by two processes and loaded by a third then shared symbols, and one
+# called the other's loop, with other rows: wrong numbers, or a crash.
+FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(5), "little"))
 
 _NUMERIC_SOURCES = ("jit.py", "models/*.py", "kernels/*.py")
 

@@ -51,3 +51,18 @@ def test_second_process_finds_the_kernel_and_an_edit_makes_a_new_one(copy: Path)
     changed = once(copy)
     assert changed[0] == "False"
     assert changed[1] != first[1]
+
+
+def test_kernels_of_two_processes_keep_apart_in_a_third(copy: Path) -> None:
+    """Each compiled in a process of its own; together they once called each other's loops."""
+    run = "import sweep; print([float(sweep.run('c.yaml', measure=m).spin_final) for m in {}])"
+    measures = ([], ["reversals"], ["reversals", "energy_error"])
+
+    def spins(*asked: list[str]) -> list[float]:
+        command = [sys.executable, "-c", run.format(list(asked))]
+        result = subprocess.run(command, cwd=copy, capture_output=True, text=True, check=True)
+        return [float(spin) for spin in result.stdout.strip("[]\n").split(",")]
+
+    alone = [spins(measure)[0] for measure in measures]
+    assert spins(*measures) == alone
+    assert spins(*measures[::-1]) == alone[::-1]
