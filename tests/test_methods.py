@@ -14,6 +14,7 @@ from conftest import SMALL, columns
 import sweep
 from sweep import ConfigError
 from sweep.cli import main
+from sweep.executor import execute
 from sweep.kernels import methods
 from sweep.models import MODELS
 from sweep.plan import plan
@@ -97,14 +98,12 @@ def test_verification_sees_a_step_too_long(write: Write) -> None:
 
 def test_a_changed_count_is_counted(write: Write) -> None:
     job = plan(sweep.load_config(write(SMALL + "verify: 1\n")))
-    from sweep.run import Reporter, simulate
-
-    simulate(job, None, Reporter())
     (part,) = job.parts
+    execute(part.kernel, part.images, stop_when_settled=True)
     part.images[3, part.kernel.row("reversals")] += 1
-    cells, found = verify(job)
-    assert list(np.flatnonzero(found["reversals"] != part.images[:, part.kernel.row("reversals")])) == [3]
-    np.testing.assert_array_equal(cells, np.arange(12))
+    found = verify(job, np.arange(12))
+    np.testing.assert_array_equal(found["verified_cell"], np.arange(12))
+    assert list(np.flatnonzero(found["verified_count_changed"])) == [3]
 
 
 def test_the_command_prints_it(write: Write, tmp_path: Path) -> None:
