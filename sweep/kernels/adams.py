@@ -22,13 +22,13 @@ import numba
 import numpy as np
 
 from sweep.jit import OPTIONS, inline, parallel
+from sweep.kernels import stretches
 from sweep.kernels.lanes import (
     BLOCK,
     DIVERGED,
     LANES,
     LIFT_OFF,
     PARADOX,
-    QUIET,
     RUNNING,
     TOLERANCE,
     Kernel,
@@ -41,7 +41,7 @@ from sweep.kernels.tableau import DOPRI5
 from sweep.models import linear, slip, slip_split
 from sweep.models.ellipsoid import inertia
 from sweep.models.model import Array, Columns, stack
-from sweep.models.modes import Rattle, bending
+from sweep.models.modes import bending
 from sweep.models.slip_split import SPLIT, newton, slow
 
 HISTORY = 8
@@ -68,15 +68,11 @@ assert BLOCK % HISTORY == 0
 assert max(PREDICTOR, CORRECTOR - 1, len(BDF)) == HISTORY
 
 
-# Resolving a rattle into modes takes about as long as this many steps of it.
-_WORTHWHILE = 20_000
-
-
 class AdamsKernel(Kernel):
     """`Kernel` for the slip model by this method; its states carry M in the place of ω.
 
     Where the rattle is so small that it moves by its linear modes to within `tolerance` in spin, it
-    is carried on by them, without steps (`sweep.models.modes`).
+    is carried on by them, without steps (`sweep.kernels.stretches`).
     """
 
     def __init__(self, measure: Iterable[str], tolerance: float = TOLERANCE) -> None:
@@ -84,7 +80,7 @@ class AdamsKernel(Kernel):
         history = [f"{name}{j}_{i}" for j in range(HISTORY) for name, n in (("f", 5), ("v", 2)) for i in range(n)]
         weights = [f"predict{j}" for j in range(PREDICTOR)] + [f"correct{j}" for j in range(CORRECTOR)]
         matrix = [f"P{i}{j}" for i in range(4) for j in range(4)]
-        more = ["quiet_energy", "quiet_after", "bending"]
+        more = ["quiet_energy", "quiet_after", "bending", *stretches.LIFTS]
         more += ["begin", "spin", "power0", "power1", "power2", "gamma", "per_weight", *weights, *matrix, *history]
         self._lay_out(SPLIT, measure, more)
         self._advance = self._make_advance(_make_run_block(self.rows, self.measure), "adams")
@@ -131,7 +127,7 @@ class AdamsKernel(Kernel):
         spin = self._write_states(images, np.moveaxis(states[:, ::-1], 0, -1))
         images[:, self.row("begin")] = lead * step
         reach = linear.fastest_spin(SPLIT, columns)
-        images[:, self.row("quiet_energy")] = 0.2 * self.tolerance * reach
+        images[:, self.row("quiet_energy")] = stretches.quiet_energy(reach)
         images[:, self.row("bending")] = bending(columns)
         if "reversals" in self.measure:
             images[:, self.row("phase")] = lead * step
@@ -155,57 +151,7 @@ class AdamsKernel(Kernel):
         return np.asarray(spin)
 
     def carry(self, images: Array) -> None:
-        """Carry the images that are `QUIET` on by the modes of their rattle, where that is worthwhile."""
-        quiet = np.flatnonzero(images[:, self.row("status")] == QUIET)
-        if not len(quiet):
-            return
-        part = images[quiet]
-        states, constants = self.unpack(part)
-        rattle = Rattle.of(slip.MODEL, slip_split.velocities(states, constants), slip_split.slip_constants(constants))
-        step, done, left = (part[:, self.row(name)] for name in ("step", "done", "goal"))
-        left = left - done
-        begin, end = rattle.validity(
-            part[:, self.row("bending")], self._distance(part), part[:, self.row("spin")], self.tolerance
-        )
-        steps = np.floor(np.minimum(end / step, left))
-        now = (begin == 0) & (steps >= np.minimum(_WORTHWHILE, left))
-        later = (begin > 0) & (end - begin >= _WORTHWHILE * step)
-        part[:, self.row("quiet_after")] = done + np.ceil(
-            np.where(later, begin, rattle.time_to(part[:, self.row("quiet_energy")])) / step
-        )
-        part[:, self.row("status")] = RUNNING
-        moved = part[now]
-        self._move(moved, rattle.select(now), steps[now])
-        part[now] = moved
-        images[quiet] = part
-
-    def _distance(self, images: Array) -> Array:
-        """Of the spin from the next critical one; from zero where there is none."""
-        first = self.row("stable_from")
-        ends = np.abs(images[:, first : first + 6] - images[:, [self.row("spin")]])
-        return np.asarray(np.where(np.isfinite(ends), ends, np.abs(images[:, [self.row("spin")]])).min(axis=1))
-
-    def _move(self, images: Array, rattle: Rattle, steps: Array) -> None:
-        """Write to images what `steps` steps of a linear rattle leave; the spin stays as it is."""
-        step, constants = images[:, self.row("step")], self.unpack(images)[1]
-        history = [slip_split.momentum(rattle.at((steps - j) * step), constants) for j in range(HISTORY)]
-        before = images[:, self.row("energy")].copy()
-        spin = self._write_states(images, np.array([stack(state) for state in history]))
-        images[:, self.row("done")] += steps
-        _, rattling, inertia_3 = SPLIT.energy(*self.unpack(images))
-        images[:, self.row("energy")] = rattling + 0.5 * inertia_3 * spin**2
-        if "reversals" in self.measure:
-            period, phase = images[:, self.row("period")], images[:, self.row("phase")] + steps * step
-            closes, rest = phase >= period, phase % period
-            images[:, self.row("closed_window")] = np.where(closes, spin * period, images[:, self.row("closed_window")])
-            window = images[:, self.row("window")] + spin * steps * step
-            images[:, self.row("window")] = np.where(closes, spin * rest, window)
-            images[:, self.row("phase")] = rest
-        if "energy_error" in self.measure:
-            images[:, self.row("work")] += before - images[:, self.row("energy")]
-            for j in range(3):
-                v1, v2 = history[j][5:]
-                images[:, self.row(f"power{j}")] = constants[13] * (v1**2 + v2**2)
+        stretches.carry(self, images, HISTORY, self.tolerance)
 
 
 def accurate_step(columns: Columns, tolerance: float) -> Array:
