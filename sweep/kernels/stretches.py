@@ -6,15 +6,17 @@ A is small the trajectory *leaps* to where A leaves the linear range, and B, pas
 spin, is *lifted*: the state carries it e^s times too large, s in a row of its image, and the next leap,
 which has B growing, lets it down.  No bit of B is lost however small it becomes.
 
-What a leap or a lift changes in spin at second order in the sizes α of the modes is put into M3.  What is
-left is d α⁴/8, for a lifted mode d α²/2 as long as it is there, d being the distance of the spin from its
-critical spin; both are kept below `tolerance`, and so is what products and round-off make of the growing mode.
+What a leap or a lift changes in spin at second order in the sizes α of the modes is put into M3.  With d the
+distance of the spin from its critical spin, what is left is d α⁴/8 < 1e-10, and for a lifted mode d α²/2
+as long as it is there, which is kept below `tolerance`.  Products and round-off make up less than tolerance/n
+of a growing mode when it is read off the state, products 1e-5 of one that has been lifted.
 Figures and what else was tried: docs/stiff.md.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,21 +85,27 @@ def carry(kernel: Kernel, images: Array, history: int, tolerance: float) -> None
         return
     part = images[quiet]
     rattle = Rattle.of(*kernel.unpack(part))
-    step, done, left = (part[:, kernel.row(name)] for name in ("step", "done", "goal"))
-    sizes, lifts = rattle.sizes(part[:, kernel.row("bending")]), part[:, [kernel.row(name) for name in LIFTS]]
-    late = (lifts > 0) & (sizes > _LATE * _LARGEST[1])
-    # Not let down in time, a lifted mode has turned the spin at its lifted size.
-    part[:, [kernel.row(name) for name in LIFTS]] = lifts = np.where(late, 0.0, lifts)
-    if "noise_limited" in kernel.measure:
-        part[late.any(axis=1), kernel.row("noise_limited")] = 1
-    stretch = plan(rattle, sizes, lifts, part[:, kernel.row("spin")], step, left - done, tolerance)
-    wait = np.ceil(np.minimum(stretch.wait / step, left))
+    sizes = rattle.sizes(part[:, kernel.row("bending")])
+    lifts = _given_up(kernel, part, sizes)
+    step, done, goal = (part[:, kernel.row(name)] for name in ("step", "done", "goal"))
+    stretch = plan(rattle, sizes, lifts, part[:, kernel.row("spin")], step, goal - done, tolerance)
+    wait = np.ceil(np.minimum(stretch.wait / step, goal))
     part[:, kernel.row("quiet_after")] = done + np.where(stretch.now, stretch.steps, 0) + wait
     part[:, kernel.row("status")] = RUNNING
     moved = part[stretch.now]
     move(kernel, moved, history, rattle.select(stretch.now), stretch.steps[stretch.now], stretch.lifts[stretch.now])
     part[stretch.now] = moved
     images[quiet] = part
+
+
+def _given_up(kernel: Kernel, images: Array, sizes: Array) -> Array:
+    """The lifts in `images`, less those of modes not let down in time: these turned the spin at their lifted size."""
+    rows = [kernel.row(name) for name in LIFTS]
+    late = (images[:, rows] > 0) & (sizes > _LATE * _LARGEST[1])
+    images[:, rows] = lifts = np.where(late, 0.0, images[:, rows])
+    if "noise_limited" in kernel.measure:
+        images[late.any(axis=1), kernel.row("noise_limited")] = 1
+    return lifts
 
 
 def plan(
@@ -111,42 +119,60 @@ def plan(
     spin, step : shape (cells,)
     left : steps to the time limit, shape (cells,)
     """
-    rates = rattle.rates.real
-    growing = np.argmax(rates, axis=1)
-
-    def of(values: Array, mode: Array) -> Array:
-        return np.take_along_axis(values, mode[:, None], axis=1)[:, 0]
-
     with np.errstate(all="ignore"):
-        logs, share = np.log(np.maximum(sizes, _ZERO)), np.log(tolerance / np.abs(spin))
-        log_g, log_d, rate_g, rate_d = (of(v, k) for v in (logs, rates) for k in (growing, 1 - growing))
-        lift_g, lift_d = of(lifts, growing), of(lifts, 1 - growing)
+        logs, rates, share = np.log(np.maximum(sizes, _ZERO)), rattle.rates.real, np.log(tolerance / np.abs(spin))
+        growing = np.argmax(rates, axis=1)
+        seen, true = _Modes.of(logs, rates, growing), _Modes.of(logs - lifts, rates, growing)
         hard = np.divide(*(np.abs(rattle.slopes[:, k]) for k in (1, 0))) >= _RATIO
         largest = np.log(np.where(hard, _LARGEST[1], _LARGEST[0]))
-        small = (logs < largest[:, None]).all(axis=1) & rattle.sound
-        unclear = _until_clear(log_g, log_d, rate_g, rate_d, largest, share)
         # By the true sizes, to where the first mode leaves the linear range.
-        true = logs - lifts
-        ends = np.where(rates > 0, (largest[:, None] - true) / rates, np.inf).min(axis=1)
-        low = log_d - lift_d + rate_d * np.ceil(ends / step) * step
-        lowest = low + rate_d / rate_g * (np.log(2) - largest)
-        sinks = (lowest < np.log(_ROUND_OFF) - share) & (lowest > np.log(_CLEAR) + _stirred(rattle, rate_g))
-        sinks &= (rate_g > 0) & (rate_d < 0) & (np.ceil(ends / step) < left) & (of(sizes, 1 - growing) > 0)
-        ends = np.where(sinks, ends, np.minimum(ends, _until_curved(true, rates, growing, share)))
-        steps = np.clip(np.where(sinks, np.ceil(ends / step), np.floor(ends / step)), 0, left)
-        lifted = np.where(hard, _LARGEST_LIFTED[1], _LARGEST_LIFTED[0])
-        lifted = np.log(np.minimum(lifted, np.sqrt(2 * tolerance / rattle.distances().min(axis=1))))
-        after = np.zeros_like(lifts)
-        np.put_along_axis(after, (1 - growing)[:, None], np.where(sinks, np.maximum(lifted - low, 0), 0)[:, None], 1)
-        use = sinks | (lift_g > 0) | (steps >= np.minimum(_WORTHWHILE, left))
+        ends = np.where(rates > 0, (largest[:, None] - (logs - lifts)) / rates, np.inf).min(axis=1)
+        low = true.log_d + true.rate_d * np.ceil(ends / step) * step
+        sinks = _sinks(true, low, largest, share, _stirred(rattle, true.rate_g)) & (np.ceil(ends / step) < left)
+        sinks &= np.isfinite(low) & (seen.log_d > np.log(_ZERO))
+        strict = np.floor(np.minimum(ends, _until_curved(true, share)) / step)
+        steps = np.clip(np.where(sinks, np.ceil(ends / step), strict), 0, left)
+
+        small = (logs < largest[:, None]).all(axis=1) & rattle.sound
+        unclear = _until_clear(seen, largest, share)
+        use = sinks | (seen.log_g > true.log_g) | (steps >= np.minimum(_WORTHWHILE, left))
         now = small & use & (unclear <= 0)
+
+        cap = np.where(hard, _LARGEST_LIFTED[1], _LARGEST_LIFTED[0])
+        cap = np.log(np.minimum(cap, np.sqrt(2 * tolerance / rattle.distances().min(axis=1))))
+        after = np.zeros_like(lifts)
+        np.put_along_axis(after, (1 - growing)[:, None], np.where(sinks, np.maximum(cap - low, 0), 0)[:, None], 1)
+
         # After a leap nothing happens until the growing mode has turned the spin; so too in a rattle
         # that grows out of the linear range.  One that decays into it is looked at when it is there.
-        swings = np.where(rate_g > 0, np.maximum(-np.where(now, largest, log_g), 1) / rate_g, np.inf)
+        swings = np.where(seen.rate_g > 0, np.maximum(-np.where(now, largest, seen.log_g), 1) / seen.rate_g, np.inf)
         falls = np.where(rates < 0, (logs - largest[:, None]) / -rates, 0).max(axis=1)
-        wait = np.where(now | (small & ~use) | (falls <= 0), swings, np.maximum(falls, 0))
-        wait = np.where(small & use & ~now, unclear, wait)
+        wait = np.where(small & use & ~now, unclear, np.where(small | (falls <= 0), swings, falls))
     return Stretch(now, steps, after, np.where(rattle.sound, wait, np.inf))
+
+
+class _Modes(NamedTuple):
+    """Logarithms of the sizes, and rates, of the mode that grows and of the one that decays; shape (cells,)."""
+
+    log_g: Array
+    log_d: Array
+    rate_g: Array
+    rate_d: Array
+
+    @classmethod
+    def of(cls, logs: Array, rates: Array, growing: Array) -> _Modes:
+        cells = np.arange(len(growing))
+        return cls(*(values[cells, mode] for values in (logs, rates) for mode in (growing, 1 - growing)))
+
+
+def _sinks(true: _Modes, low: Array, largest: Array, share: Array, stirred: Array) -> Array:
+    """Whether the mode that is `low` after a leap falls to where round-off would make up a `share` of it.
+
+    Where what the other makes of it (`stirred`) comes near, that is more than it had, and would be let down with it.
+    """
+    lowest = low + true.rate_d / true.rate_g * (np.log(2) - largest)
+    deep = (lowest < np.log(_ROUND_OFF) - share) & (lowest > np.log(_CLEAR) + stirred)
+    return np.asarray(deep & (true.rate_g > 0) & (true.rate_d < 0))
 
 
 def _stirred(rattle: Rattle, rate: Array) -> Array:
@@ -158,22 +184,22 @@ def _stirred(rattle: Rattle, rate: Array) -> Array:
     return np.asarray(-np.pi * (nu[:, 1] - nu[:, 0]) / (2 * rate))
 
 
-def _until_curved(logs: Array, rates: Array, growing: Array, share: Array) -> Array:
+def _until_curved(modes: _Modes, share: Array) -> Array:
     """Time until a growing mode changes itself or the other by more than a `share` (logarithm), shape (cells,)."""
-    alone = np.where(rates > 0, ((np.log(4) + share)[:, None] / 2 - logs) / rates, np.inf).min(axis=1)
-    cells = np.arange(len(growing))
-    log_g, log_d, rate_g, rate_d = (v[cells, k] for v in (logs, rates) for k in (growing, 1 - growing))
-    other = (share - np.log(_PRODUCTS) - 3 * log_g + log_d) / (3 * rate_g - rate_d)
-    return np.asarray(np.where(rate_g > 0, np.minimum(alone, other), np.inf))
+    alone = (np.log(4) + share) / 2
+    each = [np.where(rate > 0, (alone - log) / rate, np.inf) for log, rate in zip(modes[:2], modes[2:], strict=True)]
+    other = (share - np.log(_PRODUCTS) - 3 * modes.log_g + modes.log_d) / (3 * modes.rate_g - modes.rate_d)
+    return np.asarray(np.where(modes.rate_g > 0, np.minimum(np.minimum(*each), other), np.inf))
 
 
-def _until_clear(log_g: Array, log_d: Array, rate_g: Array, rate_d: Array, largest: Array, share: Array) -> Array:
+def _until_clear(modes: _Modes, largest: Array, share: Array) -> Array:
     """Time until neither products of the other nor its round-off make up more than a `share` of the growing mode.
 
     A share δ moves what the mode will do by δ over its rate in time, and so the spin by about δ n: hence
-    δ = tolerance/n.  A mode about to leave the linear range cannot wait for that.  All arguments but
-    the rates are logarithms.
+    δ = tolerance/n.  A mode about to leave the linear range cannot wait for that.  `largest` and `share`
+    are logarithms.
     """
+    log_g, log_d, rate_g, rate_d = modes
     waits = []
     for allowed in (share, np.full_like(share, np.log(_AT_WORST))):
         hidden = (
