@@ -28,6 +28,8 @@ STATUSES = {
 EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND = range(4)
 REASONS = {EXISTS: "exists", NO_FRICTION: "no_friction", NO_COUPLING: "no_coupling", NOT_FOUND: "not_found"}
 
+NOISE = {0: "firm", 1: "noise_limited"}
+
 STEP_RULES = {methods.FIXED: "fixed", methods.ACCURACY: "accuracy", methods.STABILITY: "stability"}
 
 
@@ -52,6 +54,9 @@ VARIABLES: dict[str, Variable] = {
     "reversals": Variable("int16", "1", "spin reversals of the simulated trajectory"),
     "t_first_reversal": Variable("float64", "1", "time of the first spin reversal, in sqrt(c/g)"),
     "t_last_reversal": Variable("float64", "1", "time of the last spin reversal, in sqrt(c/g)"),
+    "noise_limited": Variable(
+        "int8", "1", "whether a mode of the rattle fell under the round-off of the other before it grew", NOISE
+    ),
     "spin_mean": Variable("float64", "1", "spin averaged over the last full window before t_stop, in sqrt(g/c)"),
     "status": Variable("int8", "1", "how the simulation of the trajectory ended", STATUSES),
     "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)"),
@@ -116,6 +121,8 @@ def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, A
         result["t_last_reversal"] = row("last_reversal")
         if "first_reversal" in kernel.measure:
             result["t_first_reversal"] = row("first_reversal")
+        if "noise_limited" in kernel.measure:
+            result["noise_limited"] = row("noise_limited")
         result["spin_mean"] = np.where(closed, row("closed_window") / row("period"), np.nan)
     if "energy_error" in kernel.measure:
         start, violation = row("energy_start"), row("violation")

@@ -14,6 +14,8 @@ from sweep.kernels.lanes import BLOCK, DIVERGED, LANES, LIFT_OFF, PARADOX, RUNNI
 CHUNK_SECONDS = 0.7
 """Progress, checkpoints and Ctrl-C wait for a chunk at the most."""
 
+_MOST_BLOCKS = 2**40
+
 FAILURES = (LIFT_OFF, DIVERGED, PARADOX)
 
 
@@ -55,7 +57,8 @@ def execute(
 
 
 def _rescale(blocks: int, seconds: float) -> int:
-    return max(1, int(blocks * np.clip(CHUNK_SECONDS / seconds, 0.25, 8)))
+    # Where the last trajectories pause often, every call is short, and blocks would grow without end.
+    return min(max(1, int(blocks * np.clip(CHUNK_SECONDS / seconds, 0.25, 8))), _MOST_BLOCKS)
 
 
 def nominal_seconds(images: Array, kernel: Kernel) -> float:

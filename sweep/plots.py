@@ -25,7 +25,9 @@ _PANEL_VALUES = 4
 _MAX_ROWS = 8
 
 # What a trajectory that failed has no value of.
-_SIMULATED = {"reversals", "t_first_reversal", "t_last_reversal", "spin_mean", "spin_final", "energy_error"}
+_SIMULATED = {
+    "reversals", "t_first_reversal", "t_last_reversal", "noise_limited", "spin_mean", "spin_final", "energy_error",
+}  # fmt: skip
 _MAX_COLOURS = 40
 
 

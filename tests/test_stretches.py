@@ -11,12 +11,12 @@ from scipy.integrate import solve_ivp
 from test_adams import images
 
 from sweep.executor import execute
-from sweep.kernels import adams
+from sweep.kernels import stretches
 from sweep.kernels.adams import AdamsKernel
 from sweep.kernels.lanes import RUNNING, SETTLED, TIME_LIMIT
-from sweep.models import linear, slip
+from sweep.models import analytic, linear, slip, slip_split
 from sweep.models.model import stack
-from sweep.models.modes import Rattle, bending
+from sweep.models.modes import RATTLE, Rattle, bending
 
 ADAMS = AdamsKernel(("reversals", "energy_error"))
 row = ADAMS.row
@@ -38,62 +38,116 @@ def stepped(table: np.ndarray, **how: Any) -> np.ndarray:
 def carried(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Steps that each stretch stood for."""
     seen: list[float] = []
-    move = AdamsKernel._move
+    move = stretches.move
 
-    def watched(self: AdamsKernel, part: np.ndarray, rattle: Rattle, steps: np.ndarray) -> None:
+    def watched(kernel: Any, part: np.ndarray, history: int, rattle: Rattle, steps: np.ndarray, lifts: Any) -> None:
         seen.extend(steps)
-        move(self, part, rattle, steps)
+        move(kernel, part, history, rattle, steps, lifts)
 
-    monkeypatch.setattr(AdamsKernel, "_move", watched)
+    monkeypatch.setattr(stretches, "move", watched)
     return seen
 
 
 def resolved(size: float, **parameters: Any) -> tuple[Rattle, np.ndarray, np.ndarray, dict[str, np.ndarray]]:
     body = columns(x0=size, y0=size, **parameters)
-    states, constants = stack(slip.start(body)), stack(slip.constants(body))
-    return Rattle.of(slip.MODEL, states, constants), states, constants, body
+    states, constants = stack(slip_split.start(body)), stack(slip_split.constants(body))
+    return Rattle.of(states, constants), states, constants, body
+
+
+def later(body: dict[str, np.ndarray], times: np.ndarray) -> np.ndarray:
+    """States of the split form at `times`, by another integrator."""
+    constants = stack(slip.constants(body))[:, 0]
+    run = solve_ivp(
+        lambda _, y: slip.rhs(y, constants)[0], (0, times[-1]), stack(slip.start(body))[:, 0], "DOP853", times,
+        rtol=1e-11, atol=1e-20,
+    )  # fmt: skip
+    return stack(slip_split.momentum(run.y, np.repeat(stack(slip_split.constants(body)), len(times), axis=1)))
 
 
 def test_modes_move_as_the_full_model() -> None:
-    rattle, states, constants, _ = resolved(1e-6, mu=60.0)
-    np.testing.assert_allclose(rattle.at(np.zeros(1)), states, atol=1e-22)
-    times = np.array([3.0, 30.0, 100.0])
-    exact = solve_ivp(
-        lambda _, y: slip.rhs(y, constants[:, 0])[0], (0, 100), states[:, 0], "DOP853", times,
-        rtol=1e-10, atol=1e-20,
-    ).y  # fmt: skip
-    ours = np.stack([rattle.at(np.array([t]))[:, 0] for t in times], axis=1)
-    np.testing.assert_allclose(ours, exact, rtol=1e-5, atol=1e-13)
+    _, _, constants, body = resolved(1e-6, mu=60.0)
+    times = np.array([20.0, 30.0, 100.0])  # the slip is there by then
+    exact = later(body, times)
+    rattle = Rattle.of(exact, np.repeat(constants, 3, axis=1))
+    first = rattle.select(np.zeros(3, dtype=int))
+    factors = np.exp(first.rates * (times - times[0])[:, None])
+    ours = exact[list(RATTLE), :1].T + first.changes(factors, first.amplitudes)
+    np.testing.assert_allclose(ours, exact[list(RATTLE)].T, rtol=1e-5, atol=1e-13)
+    np.testing.assert_allclose(rattle.amplitudes, factors * first.amplitudes, rtol=1e-5)
+    # And what they turn the spin by.
+    turned = rattle.turned(rattle.amplitudes)
+    assert abs(turned[2] - turned[0]) > 1e-12
+    np.testing.assert_allclose(exact[4] - exact[4, 0], turned - turned[0], rtol=1e-4, atol=3e-15)
 
 
 def test_energies_of_the_modes_add_up() -> None:
     rattle, states, constants, _ = resolved(1e-6, mu=60.0, n0=[0.05, -0.02, 0.001])
-    _, whole, inertia = slip.energy(rattle.at(np.full(3, 40.0)), constants)
-    later = Rattle.of(slip.MODEL, rattle.at(np.full(3, 40.0)), constants)
-    np.testing.assert_allclose(later.energies.sum(axis=0), 2 * whole / inertia, rtol=0.1)
-    np.testing.assert_allclose(later.energies, rattle.energies * np.exp(40 * rattle.growth), rtol=1e-9)
+    _, whole, inertia = slip_split.energy(states, constants)
+    energies = rattle.unit_energies * np.abs(rattle.amplitudes) ** 2
+    np.testing.assert_allclose(energies.sum(axis=1), 2 * whole / inertia, rtol=0.1)
     np.testing.assert_allclose(
-        rattle.growth.max(axis=0) / 2, linear.growth_rate(slip.MODEL, constants, -states[4]), rtol=1e-9
+        rattle.rates.real.max(axis=1),
+        linear.growth_rate(slip.MODEL, slip_split.slip_constants(constants), np.array([0.05, -0.02, 0.001])),
+        rtol=1e-9,
     )
+
+
+def test_distances_are_those_from_the_critical_spins() -> None:
+    rattle, _, _, body = resolved(1e-6, mu=200.0, n0=[0.05, -0.04])
+    upper, lower = linear.critical_spins(slip.MODEL, body, analytic.critical_spins(body))
+    np.testing.assert_allclose(rattle.distances(), np.abs(body["n0"] - np.array([lower, upper])).T, rtol=0.07)
+
+
+def decide(sizes: Any, lifts: Any = (0.0, 0.0), left: float = 1e9, spin: float = 0.015) -> stretches.Stretch:
+    """What happens to a rattle of these sizes at a spin where the fast mode grows."""
+    rattle, *_ = resolved(1e-6, mu=200.0, n0=spin)
+    one = np.ones(1)
+    return stretches.plan(rattle, np.array([sizes]), np.array([lifts]), spin * one, 0.05 * one, left * one, 1e-8)
+
+
+def test_a_decayed_mode_is_lifted_and_let_down() -> None:
+    up = decide([1e-5, 1e-9])
+    assert up.now[0]
+    assert up.lifts[0, 1] == 0
+    rattle, *_ = resolved(1e-6, mu=200.0, n0=0.015)
+    true = np.log(1e-5) + rattle.rates.real[0, 0] * up.steps[0] * 0.05
+    assert 1e-5 < np.exp(true + up.lifts[0, 0]) < 1e-2
+    # The turn of the spin by the lifted one stays below the tolerance.
+    assert rattle.distances().min() * np.exp(2 * (true + up.lifts[0, 0])) / 2 < 1.001e-8
+    down = decide([1e-5, 1e-9], lifts=(0.0, 20.0))
+    assert down.now[0]
+    assert down.lifts[0, 1] == 0
+    assert down.steps[0] > 1.9 * up.steps[0]
+    assert down.lifts[0, 0] > up.lifts[0, 0]
+
+
+def test_what_a_fast_reversal_stirs_up_is_not_let_down() -> None:
+    """At n = 0.05 the reversal itself leaves more of the decayed mode than there was."""
+    fast = decide([1e-5, 1e-9], spin=0.05)
+    assert not fast.now[0]
+    assert not fast.lifts.any()
 
 
 def test_a_hidden_mode_is_waited_for() -> None:
     """A mode that round-off or products of the other hide must not be read off the state."""
-    rattle, _, _, body = resolved(1e-8, n0=0.02)
-    bend, distance, spin = bending(body), np.array([0.015]), np.array([0.02])
-    assert rattle.validity(bend, distance, spin, 1e-8)[0] == 0
-    growing = np.argmax(rattle.growth[:, 0])
-    for energy, ratio in ((1e-28, 1e-24), (1e-12, 1e-12)):
-        rattle.energies[:, 0] = energy
-        rattle.energies[growing] = energy * ratio
-        begin, end = rattle.validity(bend, distance, spin, 1e-8)
-        assert 0 < begin < end
+    for sizes in ([1e-6, 1e-18], [1e-3, 1e-8]):
+        hidden = decide(sizes)
+        assert not hidden.now[0]
+        assert 0 < hidden.wait[0] < 2000
 
 
 def test_a_large_rattle_is_left_to_the_steps() -> None:
-    rattle, _, _, body = resolved(1e-2, n0=0.05)
-    begin, end = rattle.validity(bending(body), np.array([0.05]), np.array([0.05]), 1e-8)
-    assert begin > 0 or end == 0
+    for sizes in ([0.1, 1e-5], [1e-5, 0.1]):
+        large = decide(sizes)
+        assert not large.now[0]
+        assert large.wait[0] > 50
+
+
+def test_where_both_decay_nothing_is_lifted() -> None:
+    still = decide([1e-4, 1e-4], spin=-0.002, left=1e6)
+    assert still.now[0]
+    assert still.steps[0] == 1e6
+    assert not still.lifts.any()
 
 
 def test_bending_is_the_size_of_what_steps_show() -> None:
@@ -178,6 +232,6 @@ def test_the_wait_is_bounded() -> None:
         return of(*given)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(adams.Rattle, "of", count)
+        patch.setattr(stretches.Rattle, "of", count)
         finish(images(ADAMS, 0.05, 9000.0, settle=True, mu=200.0))
     assert tried <= 20

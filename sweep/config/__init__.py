@@ -161,5 +161,5 @@ def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document
             yield source.fault(
                 ("measure", i), f"not measured on the {model.name} model; allowed: {', '.join(model.measures)}"
             )
-        elif name == "first_reversal" and "reversals" not in checked.measure:
+        elif name in ("first_reversal", "noise_limited") and "reversals" not in checked.measure:
             yield source.fault(("measure", i), "measured with the reversals; allowed: reversals beside it")

@@ -19,7 +19,7 @@ from sweep.kernels.methods import METHODS
 from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
-DEFAULT_MEASURES = ("reversals", "energy_error")
+DEFAULT_MEASURES = ("reversals", "energy_error", "noise_limited")
 
 MAX_CELLS = 1_000_000_000
 MAX_STEPS = 1e15

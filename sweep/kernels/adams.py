@@ -22,6 +22,7 @@ import numba
 import numpy as np
 
 from sweep.jit import OPTIONS, inline
+from sweep.kernels import stretches
 from sweep.kernels.adams_step import (
     BDF_GAMMA,
     CORRECTOR_NODES,
@@ -36,7 +37,6 @@ from sweep.kernels.lanes import (
     BLOCK,
     DIVERGED,
     LANES,
-    QUIET,
     RUNNING,
     TOLERANCE,
     Kernel,
@@ -49,7 +49,7 @@ from sweep.kernels.weights import fitted_weights
 from sweep.models import linear, slip, slip_split
 from sweep.models.ellipsoid import inertia
 from sweep.models.model import Array, Columns, stack
-from sweep.models.modes import Rattle, bending
+from sweep.models.modes import bending
 from sweep.models.slip_split import SPLIT, newton, slow
 
 # Twice the spin error at t = 400 for h ν = 0.274 (h = 0.125) where the rattle takes R up by a quarter (a = 10,
@@ -58,9 +58,6 @@ from sweep.models.slip_split import SPLIT, newton, slow
 _ERROR, _PHASE, _RISE, _GRIP = 1e-6, 0.274, 0.25, 60.0
 _LONGEST_PHASE = 0.45
 
-# Resolving a rattle into modes takes about as long as this many steps of it.
-_WORTHWHILE = 20_000
-
 assert BLOCK % HISTORY == 0
 
 
@@ -68,7 +65,7 @@ class AdamsKernel(Kernel):
     """`Kernel` for the slip model by this method; its states carry M in the place of ω.
 
     Where the rattle is so small that it moves by its linear modes to within `tolerance` in spin, it
-    is carried on by them, without steps (`sweep.models.modes`).
+    is carried on by them, without steps (`sweep.kernels.stretches`).
     """
 
     # No stability limit is near, and an error in spin of 1e-4 is one of 4e-3 in the energy of n = 0.05: with
@@ -81,7 +78,7 @@ class AdamsKernel(Kernel):
         weights = [f"predict{j}" for j in range(len(PREDICTOR_NODES))]
         weights += [f"correct{j}" for j in range(len(CORRECTOR_NODES))]
         matrix = [f"P{i}{j}" for i in range(4) for j in range(4)]
-        more = ["quiet_energy", "quiet_after", "bending"]
+        more = ["quiet_energy", "quiet_after", "bending", *stretches.LIFTS]
         more += ["begin", "spin", "power0", "power1", "power2", "gamma", "per_weight", *weights, *matrix, *history]
         self._lay_out(SPLIT, measure, more)
         self._advance = self._make_advance(_make_run_block(self.rows, self.measure), "adams")
@@ -126,77 +123,14 @@ class AdamsKernel(Kernel):
         images[grown, self.row("status")] = DIVERGED
         images[:, self.row("energy")] = energy
         images[:, self.row("spin")] = spin
-        images[:, self.row("quiet_energy")] = 0.2 * self.tolerance * linear.fastest_spin(SPLIT, columns)
+        images[:, self.row("quiet_energy")] = stretches.quiet_energy(linear.fastest_spin(SPLIT, columns))
         images[:, self.row("bending")] = bending(columns)
         if "reversals" in self.measure:
             images[:, self.row("phase")] = begin
             images[:, self.row("window")] = begin * (columns["n0"] + spin) / 2
 
-    def _write_states(self, images: Array, states: Array) -> Array:
-        """Let `images` stand at the first of `states`, shape (history, states, cells), newest first; the spin there."""
-        constants = self.unpack(images)[1]
-        images[:, :7] = states[0].T
-        for j, state in enumerate(states):
-            # Slot of the state j steps back, for a block that begins by writing slot 0.
-            first = self.row(f"f{(-1 - j) % HISTORY}_0")
-            images[:, first : first + 5] = stack(slow(*state, constants)[0]).T
-            images[:, first + 5 : first + 7] = state[5:].T
-        spin, _, _ = SPLIT.energy(states[0], constants)
-        images[:, self.row("spin")] = spin
-        return np.asarray(spin)
-
     def carry(self, images: Array) -> None:
-        """Carry the images that are `QUIET` on by the modes of their rattle, where that is worthwhile."""
-        quiet = np.flatnonzero(images[:, self.row("status")] == QUIET)
-        if not len(quiet):
-            return
-        part = images[quiet]
-        states, constants = self.unpack(part)
-        rattle = Rattle.of(slip.MODEL, slip_split.velocities(states, constants), slip_split.slip_constants(constants))
-        step, done, left = (part[:, self.row(name)] for name in ("step", "done", "goal"))
-        left = left - done
-        begin, end = rattle.validity(
-            part[:, self.row("bending")], self._distance(part), part[:, self.row("spin")], self.tolerance
-        )
-        steps = np.floor(np.minimum(end / step, left))
-        now = (begin == 0) & (steps >= np.minimum(_WORTHWHILE, left))
-        later = (begin > 0) & (end - begin >= _WORTHWHILE * step)
-        part[:, self.row("quiet_after")] = done + np.ceil(
-            np.where(later, begin, rattle.time_to(part[:, self.row("quiet_energy")])) / step
-        )
-        part[:, self.row("status")] = RUNNING
-        moved = part[now]
-        self._move(moved, rattle.select(now), steps[now])
-        part[now] = moved
-        images[quiet] = part
-
-    def _distance(self, images: Array) -> Array:
-        """Of the spin from the next critical one; from zero where there is none."""
-        first = self.row("stable_from")
-        ends = np.abs(images[:, first : first + 6] - images[:, [self.row("spin")]])
-        return np.asarray(np.where(np.isfinite(ends), ends, np.abs(images[:, [self.row("spin")]])).min(axis=1))
-
-    def _move(self, images: Array, rattle: Rattle, steps: Array) -> None:
-        """Write to images what `steps` steps of a linear rattle leave; the spin stays as it is."""
-        step, constants = images[:, self.row("step")], self.unpack(images)[1]
-        history = [slip_split.momentum(rattle.at((steps - j) * step), constants) for j in range(HISTORY)]
-        before = images[:, self.row("energy")].copy()
-        spin = self._write_states(images, np.array([stack(state) for state in history]))
-        images[:, self.row("done")] += steps
-        _, rattling, inertia_3 = SPLIT.energy(*self.unpack(images))
-        images[:, self.row("energy")] = rattling + 0.5 * inertia_3 * spin**2
-        if "reversals" in self.measure:
-            period, phase = images[:, self.row("period")], images[:, self.row("phase")] + steps * step
-            closes, rest = phase >= period, phase % period
-            images[:, self.row("closed_window")] = np.where(closes, spin * period, images[:, self.row("closed_window")])
-            window = images[:, self.row("window")] + spin * steps * step
-            images[:, self.row("window")] = np.where(closes, spin * rest, window)
-            images[:, self.row("phase")] = rest
-        if "energy_error" in self.measure:
-            images[:, self.row("work")] += before - images[:, self.row("energy")]
-            for j in range(3):
-                v1, v2 = history[j][5:]
-                images[:, self.row(f"power{j}")] = constants[13] * (v1**2 + v2**2)
+        stretches.carry(self, images, HISTORY, self.tolerance)
 
 
 def accurate_step(columns: Columns, tolerance: float) -> Array:

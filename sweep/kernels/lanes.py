@@ -21,6 +21,7 @@ import numba
 import numpy as np
 
 from sweep.jit import inline, is_cached, parallel
+from sweep.kernels import noise
 from sweep.kernels.stepper import make_load, make_rest, make_step, make_store
 from sweep.kernels.tableau import Tableau
 from sweep.models.model import Array, Columns, Model, stack
@@ -41,7 +42,7 @@ QUIET = 6
 TOLERANCE = 1e-8
 """Default error in spin, at t = 400."""
 
-MEASURES = ("reversals", "energy_error", "first_reversal")
+MEASURES = ("reversals", "energy_error", "first_reversal", "noise_limited")
 
 # Ranges of spin in which the rattle decays: about zero, and the next to either side.
 _STABLE = ("stable_from", "stable_to", "below_from", "below_to", "above_from", "above_to")
@@ -50,6 +51,7 @@ _MEASURED = {
     "reversals": ("step_rate", "period", "phase", "window", "closed_window", "reversals", "last_reversal"),
     "energy_error": ("work", "violation"),
     "first_reversal": ("first_reversal",),
+    "noise_limited": noise.ROWS,
 }
 
 # A rattle settles when it could not carry the spin across a limit even with this many times its energy.
@@ -133,6 +135,9 @@ class Kernel:
             images[:, self.row("last_reversal")] = np.nan
         if "first_reversal" in self.measure:
             images[:, self.row("first_reversal")] = np.nan
+        if "noise_limited" in self.measure:
+            for name, value in noise.start_rows(columns, rattle).items():
+                images[:, self.row(name)] = value
         return images
 
     def advance(self, images: Array, cells: Array, blocks: int, stop_when_settled: bool) -> None:
@@ -263,7 +268,7 @@ def _make_run_block(model: Model, tableau: Tableau, rows: tuple[str, ...], measu
 
 @inline
 def watch_nothing(*_: Any) -> None:
-    """In the place of `watch_spin` where no reversals are asked for; leaves no instruction."""
+    """In the place of what is not asked for; leaves no instruction."""
 
 
 def make_watch_spin(rows: tuple[str, ...]) -> Any:
@@ -312,6 +317,7 @@ def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...], 
     store_states = make_store(0, n, LANES)
     energy, rest = model.energy, make_rest(n, model.spin_state)
     will_settle = _make_will_settle(rows, "reversals" in measure)
+    track = noise.make_track(rows, LANES) if "noise_limited" in measure else watch_nothing
     watch_energy = "energy_error" in measure
     WORK = rows.index("work") * LANES if watch_energy else 0
     VIOLATION = rows.index("violation") * LANES if watch_energy else 0
@@ -352,6 +358,8 @@ def make_inspect(model: Model, rows: tuple[str, ...], measure: tuple[str, ...], 
                 (not finite) | (conserved & (total > before * allowed)) | (failed & (group[STABLE_STEP + lane] == 0.0))
             )
             group[STATUS + lane] = DIVERGED if (running | failed) & false else status
+            ended = (status != RUNNING) & (status != QUIET)
+            track(group, lane, running, ended & (energy_ratio > noise.SEEN * spin * spin), rattle, spin)
             store_states(group, lane, bounded & (rattle < NEGLIGIBLE), rest(y), y)
 
     return inspect

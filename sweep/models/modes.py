@@ -1,12 +1,12 @@
-"""Small rattle about upright spin as a sum of modes, each carried on by its own exponential.
+"""Small rattle about upright spin as a sum of its two rocking modes, in the variables of `slip_split`.
 
-As long as the rattle is tiny, z' = J(n) z with a constant spin n.  With e = 2 E/I3 the rattle's energy
-in units of spin², products of the rattle that this leaves out
+x = 2 Re Σ_k R_k z_k with z_k' = λ_k z_k, to first order in the rattle x = (u1, u2, M1, M2, v1, v2), at a constant
+spin n.  To second order the rattle turns the spin: M3' = Σ B_jk z_j z_k over the modes and their conjugates,
+so that M3 - Σ B_jk z_j z_k / (λ_j + λ_k) stays as it is, whatever becomes of the z_k.
 
-* turn the spin: by e/2d at the most until a mode that grows has reached e, d being the distance of n
-  from its critical spin (averaged equations, ndotab, abdot);
-* bend a mode: the share c e of its amplitude, c = `bending`, appears in the direction of the other
-  and hides one that is weaker than that.  Round-off hides it likewise, from `_ROUND_OFF` on.
+A mode of amplitude z_k, by the averaged equations (ndotab, abdot), turns the spin by d α²/2 in all while it
+decays or grows: α = sqrt(2 E_k / I3)/d is its *size*, d the distance of n from the mode's critical spin.
+What stays out of account is of the order α⁴ d in spin, and α_j³ where mode j bends the other.
 """
 
 from __future__ import annotations
@@ -15,117 +15,81 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sweep.models import ellipsoid, linear
-from sweep.models.model import Array, Columns, Model
+from sweep.models import ellipsoid, linear, slip
+from sweep.models.model import Array, Columns, stack
+from sweep.models.slip_split import SPLIT, momentum, slip_constants, slow
 
-# Share of a strong mode that appears as the weak one when a state is resolved into modes.
-_ROUND_OFF = 1e-14
+RATTLE = (0, 1, 2, 3, 5, 6)
+"""Indices of the states that vanish in upright spin; the other is M3 = -I3 n."""
 
-# Stands for an energy of zero where its logarithm is asked for.
-_ZERO = 1e-300
-
-# Of the tolerance in spin, what the neglected turn of the spin may take at either end.
-_TURN_SHARE = 0.1
+# Where quadratic forms are evaluated: what they leave out is 1e-16 of them.
+_SMALL = 1e-8
 
 
 @dataclass(frozen=True)
 class Rattle:
-    """Rattles resolved into modes; arrays over cells, with m modes of which two rock."""
+    """Rattles resolved into modes, the slower first; arrays over cells."""
 
-    model: Model
-    turning: Array
-    """The state that carries the spin, shape (cells,)."""
+    sound: Array
+    """Whether there are two rocking modes to be resolved into, shape (cells,)."""
     rates: Array
-    """Eigenvalues, shape (cells, m), in sqrt(g/c)."""
+    """Eigenvalues λ with positive imaginary part, shape (cells, 2), in sqrt(g/c)."""
     modes: Array
-    """Right eigenvectors as columns, shape (cells, m, m)."""
+    """Right eigenvectors R as columns, shape (cells, 6, 2)."""
+    readings: Array
+    """z = readings (u1, u2, M1, M2): without the slip, which a history does not keep.  Shape (cells, 2, 4)."""
     amplitudes: Array
-    """Shape (cells, m)."""
-    growth: Array
-    """Of the energies of the two rocking modes, shape (2, cells), in sqrt(g/c)."""
-    energies: Array
-    """Of the two rocking modes, averaged over a period, in units of spin², shape (2, cells)."""
+    """z, shape (cells, 2)."""
+    turning: Array
+    """B, over modes and conjugates (R_1, R_2, R_1*, R_2*), shape (cells, 4, 4)."""
+    unit_energies: Array
+    """2 E_k / I3 of z_k = 1, averaged over a period, in units of spin², shape (cells, 2)."""
+    slopes: Array
+    """d Re λ_k / dn by the turning alone (the form (abdot) gives it), shape (cells, 2)."""
 
     @classmethod
-    def of(cls, model: Model, states: Array, constants: Array) -> Rattle:
-        """Resolve `states`, shape (states, cells), which must be small but for the spin."""
-        spin, _, _ = model.energy(states, constants)
-        rates, modes = np.linalg.eig(linear.jacobian(model, constants, spin))
-        rattle, turning = np.delete(states, model.spin_state, axis=0).T, states[model.spin_state]
-        defective = np.linalg.det(modes) == 0
-        modes[defective] = np.nan
-        amplitudes = np.linalg.solve(modes, rattle[..., None].astype(complex))[..., 0]
-        rocking = np.argsort(-rates.imag, axis=1)[:, :2]
-        growth = 2 * np.take_along_axis(rates.real, rocking, axis=1).T
-        whole = cls(model, turning, rates, modes, amplitudes, growth, growth)
-        energies = np.array([whole._energy(constants, mode) for mode in rocking.T])
-        return cls(model, turning, rates, modes, amplitudes, growth, energies)
+    def of(cls, states: Array, constants: Array) -> Rattle:
+        """Resolve `states` of the split form, shape (7, cells), which must be small but for the spin."""
+        spin, _, inertia = SPLIT.energy(states, constants)
+        rates, modes, sound = _rocking(constants, spin)
+        pairs = np.concatenate([modes[:, :4], modes[:, :4].conj()], axis=2)
+        sound &= np.abs(np.linalg.det(pairs)) > 0
+        pairs[~sound] = np.eye(4)
+        readings = np.linalg.inv(pairs)[:, :2]
+        amplitudes = (readings @ states[list(RATTLE[:4])].T[..., None])[..., 0]
+        upright = -inertia * spin
+        turning = _turning(modes, upright, constants)
+        unit = _unit_energies(modes, upright, constants)
+        cells = np.arange(len(spin))
+        slopes = np.stack([2 * turning[cells, k, k + 2].real for k in (0, 1)], axis=1) / (unit * inertia[:, None])
+        return cls(sound, rates, modes, readings, amplitudes, turning, unit, slopes)
 
     def select(self, cells: Array) -> Rattle:
-        return Rattle(
-            self.model, self.turning[cells], self.rates[cells], self.modes[cells], self.amplitudes[cells],
-            self.growth[:, cells], self.energies[:, cells],
-        )  # fmt: skip
+        return Rattle(**{name: values[cells] for name, values in vars(self).items()})
 
-    def _energy(self, constants: Array, mode: Array) -> Array:
-        cells = np.arange(len(mode))
-        shape = 2 * self.modes[cells, :, mode] * self.amplitudes[cells, mode, None]
-        total = np.zeros(len(mode))
-        # Modes that are nearly one have huge amplitudes that cancel, and no energy that is a number.
-        with np.errstate(invalid="ignore"):
-            for part in (shape.real, shape.imag):
-                _, rattle, inertia = self.model.energy(self._with_spin(part), constants)
-                total += rattle / inertia
-        return total
-
-    def at(self, time: Array) -> Array:
-        """States after `time`, shape (states, cells)."""
-        # What is exactly zero stays so, however far a growing exponential overflows.
-        exponents = np.where(self.amplitudes == 0, 0.0, self.rates * time[:, None])
-        moved = self.amplitudes * np.exp(exponents)
-        return self._with_spin((self.modes @ moved[..., None])[..., 0].real)
-
-    def _with_spin(self, rattle: Array) -> Array:
-        return np.insert(rattle.T, self.model.spin_state, self.turning, axis=0)
-
-    def time_to(self, energy: Array) -> Array:
-        """Time until a growing mode reaches `energy`, shape (cells,); infinite where none grows."""
+    def distances(self) -> Array:
+        """Of the spin from each mode's critical spin, infinite for a mode that does not turn it, shape (cells, 2)."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            times = np.where(self.growth > 0, np.log(energy / np.maximum(self.energies, _ZERO)) / self.growth, np.inf)
-        return np.asarray(np.maximum(np.fmin(*times), 0.0))
+            return np.where(self.slopes == 0, np.inf, np.abs(self.rates.real / self.slopes))
 
-    def validity(self, bending: Array, distance: Array, spin: Array, tolerance: float) -> tuple[Array, Array]:
-        """Begin and end of the time in which this resolution holds to `tolerance` in spin, shape (cells,).
-
-        Parameters
-        ----------
-        bending : as `bending` gives it, shape (cells,)
-        distance : of the spin from the next critical one, shape (cells,)
-        spin : shape (cells,)
-
-        Notes
-        -----
-        A share δ of a mode's amplitude moves what it will do later by δ over its rate in time, and so
-        the spin by about δ n; hence δ = tolerance/n.  All conditions are linear in time once the
-        logarithms are taken.  Modes that both decay hide nothing that would matter.
-        """
+    def sizes(self, bending: Array) -> Array:
+        """α (see the module), or what bends a mode as much by the other nonlinearities; shape (cells, 2)."""
         with np.errstate(divide="ignore"):
-            log_e, log_c = np.log(np.maximum(self.energies, _ZERO)), np.log(bending)
-            log_share = np.log(tolerance / np.abs(spin))
-            log_cap = np.log(_TURN_SHARE * tolerance * np.abs(distance))
-        begin, end = np.zeros_like(spin), np.where(np.isnan(self.energies).any(axis=0), 0.0, np.inf)
-        grows = self.growth.max(axis=0) > 0
-        for strong, weak in ((0, 1), (1, 0)):
-            e, g = log_e[strong], self.growth[strong]
-            difference, rate = 0.5 * (e - log_e[weak]) - log_share, 0.5 * (g - self.growth[weak])
-            conditions = ((log_c + e + difference, g + rate), (np.log(_ROUND_OFF) + difference, rate))
-            for excess, change in ((e - log_cap, g), *((np.where(grows, x, -np.inf), r) for x, r in conditions)):
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    crossing = -excess / change
-                begin = np.where((excess > 0) & (change < 0), np.fmax(begin, crossing), begin)
-                end = np.where(change > 0, np.fmin(end, crossing), end)
-                end = np.where((excess > 0) & (change >= 0), 0.0, end)
-        return begin, end
+            steepest = np.maximum(1 / self.distances(), np.sqrt(bending)[:, None])
+        return np.asarray(np.abs(self.amplitudes) * np.sqrt(self.unit_energies) * steepest)
+
+    def changes(self, factors: Array, amplitudes: Array) -> Array:
+        """What the rattle x gains where `amplitudes` grow by `factors`; both and the result over (cells, modes)."""
+        return np.asarray(2 * (self.modes @ ((factors - 1) * amplitudes)[..., None])[..., 0].real)
+
+    def turn(self, amplitudes: Array) -> Array:
+        """M3' for a rattle of these amplitudes, shape (cells,)."""
+        return _form(self.turning, amplitudes)
+
+    def turned(self, amplitudes: Array) -> Array:
+        """The part of M3 that goes and comes with a rattle of these amplitudes, shape (cells,)."""
+        rates = np.concatenate([self.rates, self.rates.conj()], axis=1)
+        return _form(self.turning / (rates[:, :, None] + rates[:, None, :]), amplitudes)
 
 
 def bending(columns: Columns) -> Array:
@@ -136,3 +100,49 @@ def bending(columns: Columns) -> Array:
     a, b, c = columns["a"], columns["b"], columns["c"]
     I1, I2, I3 = ellipsoid.inertia(columns)
     return np.asarray(I3 / c * np.maximum((a**2 - c**2) / (I2 + c**2), (b**2 - c**2) / (I1 + c**2)))
+
+
+def _rocking(constants: Array, spin: Array) -> tuple[Array, Array, Array]:
+    """Rates and modes as `Rattle` has them, and where there are two."""
+    rates, modes = np.linalg.eig(linear.jacobian(slip.MODEL, slip_constants(constants), spin))
+    # Without much friction the slip swings too, but slowly.
+    order = np.argsort(-rates.imag, axis=1)[:, 1::-1]
+    rates = np.take_along_axis(rates, order, axis=1)
+    modes = np.take_along_axis(modes, order[:, None, :], axis=2).astype(complex)
+    return rates, _to_momentum(constants, spin) @ modes, np.asarray((rates.imag > 0).all(axis=1))
+
+
+def _to_momentum(constants: Array, spin: Array) -> Array:
+    """Jacobian of `momentum` over the rattle at upright spin, shape (cells, 6, 6)."""
+    upright = stack(slip.upright(spin)).astype(complex)
+    columns = []
+    for i in RATTLE:
+        shifted = upright.copy()
+        shifted[i] += 1e-30j
+        columns.append(stack(momentum(shifted, constants))[list(RATTLE)].imag / 1e-30)
+    return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
+
+
+def _turning(modes: Array, upright: Array, constants: Array) -> Array:
+    """B by polarisation: B(x, y) = (M3'(x + y) - M3'(x - y))/4."""
+    both = np.moveaxis(np.concatenate([modes, modes.conj()], axis=2), 0, -1) * _SMALL
+    one, other = both[:, :, None], both[:, None, :]
+    forms = []
+    for rattle in (one + other, one - other):
+        slopes, _ = slow(*np.insert(rattle, 4, upright, axis=0), constants)
+        forms.append(slopes[4])
+    return np.asarray(np.moveaxis((forms[0] - forms[1]) / (4 * _SMALL**2), -1, 0))
+
+
+def _unit_energies(modes: Array, upright: Array, constants: Array) -> Array:
+    total = np.zeros((modes.shape[2], len(upright)))
+    for part in (modes.real, modes.imag):
+        states = np.insert(np.moveaxis(part, 0, -1) * _SMALL, 4, upright, axis=0)
+        _, rattle, inertia = SPLIT.energy(states, constants)
+        total += 4 * rattle / inertia / _SMALL**2
+    return total.T
+
+
+def _form(matrix: Array, amplitudes: Array) -> Array:
+    z = np.concatenate([amplitudes, amplitudes.conj()], axis=1)
+    return np.asarray((z[:, None, :] @ matrix @ z[:, :, None])[:, 0, 0].real)

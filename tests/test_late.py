@@ -1,0 +1,126 @@
+"""Late reversals, which round-off makes come too early: lifted by adams, and said of a cell where it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import columns
+from test_adams import images
+
+import sweep
+from sweep import ConfigError
+from sweep.config.schema import DEFAULT_MEASURES
+from sweep.executor import execute
+from sweep.kernels import noise, stretches
+from sweep.kernels.adams import AdamsKernel, accurate_step
+from sweep.kernels.lanes import QUIET, RUNNING, Kernel
+from sweep.kernels.methods import automatic_step
+from sweep.kernels.tableau import DOPRI5
+from sweep.models import MODELS, slip_split
+from sweep.models.model import stack
+from sweep.models.modes import _rocking
+
+Write = Callable[..., Path]
+
+# Time and number of the last reversal at b = 3, n0 = 0.05, in double-double arithmetic.
+LAST = {200.0: (9, 12914.14), 188.0: (9, 18719.15), 180.0: (9, 29032.53), 176.0: (9, 41315.4), 140.0: (7, 15880.39)}
+FIRM = {60.0: (3, 2379.9), 130.0: (6, 7412.95)}
+
+
+def run(kernel: Kernel, step: object, t_end: float, **parameters: object) -> np.ndarray:
+    table = images(kernel, step, t_end, settle=True, **parameters)
+    execute(kernel, table, stop_when_settled=True)
+    return table
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-6])
+def test_late_reversals_come_when_they_should(tolerance: float) -> None:
+    kernel, cases = AdamsKernel(DEFAULT_MEASURES, tolerance), LAST | FIRM
+    table = run(kernel, accurate_step(columns(mu=list(cases)), tolerance), 45_000.0, mu=list(cases))
+    assert [(n, pytest.approx(t, rel=1e-3)) for n, t in cases.values()] == list(
+        zip(table[:, kernel.row("reversals")], table[:, kernel.row("last_reversal")], strict=True)
+    )
+    assert not table[:, kernel.row("noise_limited")].any()
+
+
+def test_the_ninth_reversal_does_not_hang_on_the_last_bits() -> None:
+    kernel = AdamsKernel(DEFAULT_MEASURES)
+    x0 = 0.01 * np.array([1, 1, 1 + 1e-12])
+    table = run(kernel, [0.05, 0.1, 0.05], 14_000.0, mu=200.0, x0=x0)
+    assert (table[:, kernel.row("reversals")] == 9).all()
+    np.testing.assert_allclose(table[:, kernel.row("last_reversal")], 12914, atol=15)
+
+
+def test_round_off_is_said_where_nothing_is_lifted() -> None:
+    kernel, mu = Kernel(MODELS["slip"], DOPRI5, DEFAULT_MEASURES), [200.0, 188.0, 180.0, 176.0, 60.0, 130.0]
+    step, _ = automatic_step("dopri5", MODELS["slip"], columns(mu=mu))
+    table = run(kernel, step, 30_000.0, mu=mu)
+    assert list(table[:, kernel.row("noise_limited")]) == [1, 1, 1, 1, 0, 0]
+    assert list(table[:, kernel.row("reversals")]) == [9, 9, 9, 9, 3, 6]
+    # They are off: else there would be nothing to say.
+    late = [LAST[m][1] for m in mu[:4]]
+    assert (table[:4, kernel.row("last_reversal")] < 0.97 * np.array(late)).all()
+
+
+def test_a_mode_that_sank_but_did_not_come_back_does_not_matter() -> None:
+    """Nothing has come of the round-off yet at t = 9000; at 12 000 a rattle has, though no reversal."""
+    kernel = Kernel(MODELS["slip"], DOPRI5, DEFAULT_MEASURES)
+    step, _ = automatic_step("dopri5", MODELS["slip"], columns(mu=200.0))
+    for t_end, flag in ((9_000.0, 0), (12_000.0, 1)):
+        table = run(kernel, step, t_end, mu=200.0)
+        assert table[0, kernel.row("reversals")] == 8
+        assert table[0, [kernel.row("depth0"), kernel.row("depth1")]].min() < np.log(noise.DEPTH)
+        assert table[0, kernel.row("noise_limited")] == flag
+
+
+def test_a_mode_let_down_too_late_is_said() -> None:
+    kernel = AdamsKernel(DEFAULT_MEASURES)
+    table = images(kernel, 0.05, 9000.0, n0=[0.05, 0.01])
+    table[:, [kernel.row(name) for name in stretches.LIFTS]] = 12.0
+    table[:, kernel.row("status")] = QUIET
+    kernel.carry(table)
+    assert (table[:, kernel.row("status")] == RUNNING).all()
+    assert list(table[:, kernel.row("noise_limited")]) == [0, 1]
+    assert list(table[:, kernel.row("lift0")]) == [12, 0]
+
+
+def test_growth_is_that_of_the_model() -> None:
+    body = columns(b=[1.5, 3.0, 6.0], mu=[60.0, 200.0, 400.0], n0=[0.05, -0.1, 0.08])
+    c = noise.growth_coefficients(body)
+    constants = stack(slip_split.constants(body))
+    for share in (-1.0, -0.4, 0.1, 0.7):
+        spin = share * body["n0"]
+        rates, _, _ = _rocking(constants, spin)
+        largest = np.abs(c[:, 1] * body["n0"]).max()
+        fitted = (c * spin ** np.arange(c.shape[1])[:, None]).sum(axis=1)
+        np.testing.assert_allclose(fitted, rates.real.T, atol=0.03 * largest)
+
+
+def test_only_what_is_asked_for_is_measured(write: Write) -> None:
+    for kernel in (AdamsKernel(("reversals",)), Kernel(MODELS["slip"], DOPRI5, ("reversals",))):
+        assert not set(noise.ROWS) & set(kernel.rows)
+    assert "noise_limited" not in sweep.run(write(), measure=["reversals"])
+    with pytest.raises(ConfigError, match="measured with the reversals; allowed: reversals beside it"):
+        sweep.load_config(write(), {"measure": ["noise_limited"]})
+
+
+def test_the_dataset_says_it(write: Write) -> None:
+    for method, flags in (("dopri5", [1, 0]), ("adams", [0, 0])):
+        text = f"friction: {{mu: [200, 60]}}\nintegrator: {{method: {method}, t_end: 13000}}\n"
+        found = sweep.run(write(text))["noise_limited"]
+        assert found.dtype == np.int8
+        assert found.attrs["flag_meanings"] == "firm noise_limited"
+        assert list(found.attrs["flag_values"]) == [0, 1]
+        assert found.values.tolist() == flags
+
+
+def test_the_same_alone_and_among_others() -> None:
+    """What a cell's rates are fitted with does not depend on its company."""
+    body = columns(n0=[0.01, 0.05, 0.1], mu=[60.0, 60.0, 200.0])
+    together = noise.growth_coefficients(body)
+    for i in range(3):
+        alone = noise.growth_coefficients({name: values[i : i + 1] for name, values in body.items()})
+        np.testing.assert_array_equal(alone[..., 0], together[..., i])

@@ -1,0 +1,44 @@
+"""The kernel against spins in extended precision, made by `scripts/reference_spins.py`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from sweep.executor import execute
+from sweep.kernels.lanes import TIME_LIMIT, Kernel
+from sweep.kernels.tableau import DOPRI5
+from sweep.models import MODELS
+from sweep.models.coefficients import rattle_period
+
+TABLE = np.genfromtxt(ROOT / "data" / "reference_spins.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+T_END = 400.0
+
+
+@pytest.mark.parametrize(
+    ("model", "step", "choice"),
+    [
+        ("slip", 0.004, {"mu": 60.0}),
+        ("slip", 0.004, {"x0": 2.0}),
+        ("slip", 0.0005, {"mu": 1000.0}),
+        ("noslip", 0.01, {}),
+        ("effective", 0.005, {}),
+        ("averaged", 0.05, {}),
+    ],
+)
+def test_the_kernel_meets_the_reference(model: str, step: float, choice: dict[str, float]) -> None:
+    which = (TABLE["model"] == model) & (TABLE["t"] == T_END)
+    for name, value in choice.items():
+        which &= TABLE[name] == value
+    rows = TABLE[which]
+    columns = {name: rows[name].astype(float) for name in MODELS["slip"].parameters}
+    # The measurements of the other tests, whose compiled kernel is there already.
+    kernel = Kernel(MODELS[model], DOPRI5, MODELS[model].measures)
+    never_settles = np.full((6, len(rows)), np.nan)
+    table = kernel.images(columns, np.full(len(rows), step), T_END, never_settles, rattle_period(columns))
+    execute(kernel, table, stop_when_settled=False)
+    assert set(table[:, kernel.row("status")]) == {TIME_LIMIT}
+    spins = MODELS[model].energy(*kernel.unpack(table))[0]
+    assert len(rows) == {"slip": 1, "noslip": 4}.get(model, 8)
+    np.testing.assert_allclose(spins, rows["spin"], rtol=0, atol=1e-10)
