@@ -31,8 +31,9 @@ def identify(config: Config) -> Identity:
 
 
 def _versions() -> str:
-    libraries = (f"{name} {metadata.version(name)}" for name in ("numba", "llvmlite", "numpy"))
-    return ", ".join((f"sweep {metadata.version('rattleback-sweep')}", f"Python {platform.python_version()}", *libraries))
+    own, libraries = metadata.version("rattleback-sweep"), ("numba", "llvmlite", "numpy")
+    found = [f"{name} {metadata.version(name)}" for name in libraries]
+    return ", ".join([f"sweep {own}", f"Python {platform.python_version()}", *found])
 
 
 def this_cpu() -> str:

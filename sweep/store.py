@@ -29,7 +29,6 @@ from matplotlib.figure import Figure
 
 from sweep.grid import Array
 
-
 _PROBE = 1 << 22
 """Bytes; more than HDF5 writes at once."""
 
@@ -61,11 +60,6 @@ class Identity:
             return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
         return "other sources of the model or kernel" if self.source_hash != other.source_hash else ""
 
-    @property
-    def stamp(self) -> str:
-        """What each file of a checkpoint carries, to be known from another run's."""
-        return f"{self.config_hash} {self.source_hash} {self.versions}"
-
 
 class Checkpoint:
     """What a run keeps until it is finished: a folder of finished tiles and the images of unfinished ones.
@@ -75,7 +69,7 @@ class Checkpoint:
 
     def __init__(self, folder: Path, identity: Identity, note: Callable[[str], None]) -> None:
         """Go on from what is in `folder`; `StoreError` if that is of another run."""
-        self.folder, self.note, self._stamp = folder, note, identity.stamp
+        self.folder, self.note, self.identity = folder, note, identity
         head = folder / "identity.json"
         if head.exists():
             try:
@@ -117,8 +111,13 @@ class Checkpoint:
         tiles, seconds = tables.pop("tiles").tolist(), float(tables.pop("seconds"))
         return None if self.done & set(tiles) else (tiles, tables, seconds)
 
+    def _stamp(self, path: Path, names: Iterable[str]) -> str:
+        """What a file carries that tells it from other files and other runs', and from one with arrays lost."""
+        run = self.identity
+        return f"{path.stem}: {', '.join(names)}; {run.config_hash} {run.source_hash}, {run.versions}"
+
     def _write(self, path: Path, arrays: Mapping[str, Array]) -> None:
-        named: dict[str, Any] = {"stamp": np.array(f"{path.stem} {self._stamp}"), **arrays}
+        named: dict[str, Any] = {**arrays, "stamp": np.array(self._stamp(path, arrays))}
         with replacing(path) as temporary, temporary.open("wb") as stream:
             np.savez(stream, **named)
 
@@ -129,7 +128,7 @@ class Checkpoint:
                 if damaged := archive.zip.testzip():  # numpy's reading ends where a damaged header says
                     raise ValueError(f"checksum of {damaged}")
                 arrays = {name: archive[name] for name in archive.files}
-            if arrays.pop("stamp", None) != f"{path.stem} {self._stamp}":
+            if arrays.pop("stamp", None) != self._stamp(path, arrays):
                 raise ValueError("not a file of this run")
             return arrays
         except FileNotFoundError:

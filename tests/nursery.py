@@ -13,8 +13,10 @@ import resource
 import sys
 from collections.abc import Mapping
 from importlib import metadata
+from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numba
 
@@ -27,10 +29,11 @@ TILE = 3
 
 def context() -> Any:
     """Where to start processes with `command`."""
-    # No threads of a kernel outlive a fork, and this one of numba's ways to share out work starts new ones.
-    os.environ["NUMBA_THREADING_LAYER"] = "workqueue"
     started = multiprocessing.get_context("forkserver")
     started.set_forkserver_preload(["warm"])
+    # Of numba's ways to share out work this one starts new threads after a fork.
+    with patch.dict(os.environ, NUMBA_THREADING_LAYER="workqueue", PYTHONPATH=os.pathsep.join(sys.path)):
+        forkserver.ensure_running()
     return started
 
 
@@ -50,6 +53,8 @@ def command(
     versions : of packages, in the place of the true ones
     unprivileged : bound by the permissions of files even as root
     """
+    # A lock that numba makes would outlive a killed process, were it not of this method.
+    multiprocessing.set_start_method("fork", force=True)
     with log.open("wb") as stream:
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
