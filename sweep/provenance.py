@@ -27,7 +27,13 @@ _DECISIVE = tuple(
 
 
 def identify(config: Config) -> Identity:
-    return Identity(config.to_yaml(), config.fingerprint(), fingerprint(*_DECISIVE))
+    return Identity(config.to_yaml(), config.fingerprint(), fingerprint(*_DECISIVE), _versions())
+
+
+def _versions() -> str:
+    own, libraries = metadata.version("rattleback-sweep"), ("numba", "llvmlite", "numpy")
+    found = [f"{name} {metadata.version(name)}" for name in libraries]
+    return ", ".join([f"sweep {own}", f"Python {platform.python_version()}", *found])
 
 
 def this_cpu() -> str:
@@ -42,6 +48,7 @@ def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] =
         "config": identity.config,
         "config_hash": identity.config_hash,
         "source_hash": identity.source_hash,
+        "versions": identity.versions,
         "integrator": _integrator_words(config),
         "sweep_version": metadata.version("rattleback-sweep"),
         "git_commit": _git_commit(),

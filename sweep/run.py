@@ -97,9 +97,10 @@ def run(
         if files.has_dataset(identify(config)):
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
+            files.picture.unlink(missing_ok=True)  # of a dataset that is gone
             checkpoint = Checkpoint(files.checkpoint, identify(config), reporter.note)
             _compute(config, checkpoint, reporter, cluster).save(files)
-            checkpoint.remove()
+        files.discard_checkpoint()
         result = open_dataset(files.dataset, load=Grid.of(config).size <= LARGE)
         draw(result, files, reporter)
     return result

@@ -14,9 +14,10 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sweep.grid import Array
+
+_PROBE = 1 << 22
+"""Bytes; more than HDF5 writes at once."""
 
 
 class StoreError(Exception):
@@ -42,6 +46,8 @@ class Identity:
     config_hash: str
     source_hash: str
     """Of the numeric sources and of the libraries that compile them."""
+    versions: str
+    """Of this program and of those libraries."""
 
     def difference(self, other: Identity) -> str:
         """Why a run of `other` cannot go on from this one; "" if it can."""
@@ -50,9 +56,9 @@ class Identity:
             changed = [f"- {line.strip()}" for line in old if line not in new]
             changed += [f"+ {line.strip()}" for line in new if line not in old]
             return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs"])
-        if self.source_hash != other.source_hash:
-            return "other sources of the model or kernel, or other versions of numpy or numba"
-        return ""
+        if self.versions != other.versions:
+            return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
+        return "other sources of the model or kernel" if self.source_hash != other.source_hash else ""
 
 
 class Checkpoint:
@@ -63,7 +69,7 @@ class Checkpoint:
 
     def __init__(self, folder: Path, identity: Identity, note: Callable[[str], None]) -> None:
         """Go on from what is in `folder`; `StoreError` if that is of another run."""
-        self.folder, self.note = folder, note
+        self.folder, self.note, self.identity = folder, note, identity
         head = folder / "identity.json"
         if head.exists():
             try:
@@ -77,9 +83,8 @@ class Checkpoint:
                 temporary.write_text(json.dumps(identity.__dict__), encoding="utf-8")
         for left in folder.glob(".*.part"):
             left.unlink()
-        self.done = {
-            int(path.stem) for path in folder.glob("[0-9]*.npz") if self._read(path) is not None
-        }  # fmt: skip
+        numbered = [path for path in folder.iterdir() if re.fullmatch(r"\d{6,}\.npz", path.name)]
+        self.done = {int(path.stem) for path in numbered if self._read(path) is not None}
 
     def save(self, tile: int, arrays: Mapping[str, Array]) -> None:
         """Keep the results of a tile."""
@@ -106,19 +111,26 @@ class Checkpoint:
         tiles, seconds = tables.pop("tiles").tolist(), float(tables.pop("seconds"))
         return None if self.done & set(tiles) else (tiles, tables, seconds)
 
-    def remove(self) -> None:
-        shutil.rmtree(self.folder)
+    def _stamp(self, path: Path, names: Iterable[str]) -> str:
+        """What a file carries that tells it from other files and other runs', and from one with arrays lost."""
+        run = self.identity
+        return f"{path.stem}: {', '.join(names)}; {run.config_hash} {run.source_hash}, {run.versions}"
 
     def _write(self, path: Path, arrays: Mapping[str, Array]) -> None:
-        named: dict[str, Any] = dict(arrays)
+        named: dict[str, Any] = {**arrays, "stamp": np.array(self._stamp(path, arrays))}
         with replacing(path) as temporary, temporary.open("wb") as stream:
             np.savez(stream, **named)
 
     def _read(self, path: Path) -> dict[str, Array] | None:
-        """The arrays in a file, whose checksums have been looked at; None where it cannot be read."""
+        """The arrays in a file of this run, whose checksums have been looked at; None where it cannot be read."""
         try:
             with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-                return {name: archive[name] for name in archive.files}
+                if damaged := archive.zip.testzip():  # numpy's reading ends where a damaged header says
+                    raise ValueError(f"checksum of {damaged}")
+                arrays = {name: archive[name] for name in archive.files}
+            if arrays.pop("stamp", None) != self._stamp(path, arrays):
+                raise ValueError("not a file of this run")
+            return arrays
         except FileNotFoundError:
             return None
         except Exception as error:  # what a damaged archive makes zipfile and numpy raise is not listed anywhere
@@ -178,19 +190,28 @@ class RunFiles:
             handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):
-                    break
             except BlockingIOError:
                 os.close(handle)
                 raise StoreError(
                     f"{self.folder / self.name}: another run is at work there; allowed: wait, or another --output"
                 ) from None
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), path.stat()):
+                    break
             os.close(handle)  # of a file that the run before has just removed
         try:
+            self._sweep_up()
             yield
         finally:
             path.unlink(missing_ok=True)
             os.close(handle)
+
+    def _sweep_up(self) -> None:
+        """Remove the unfinished files of a run that was killed."""
+        for target in (self.dataset, self.picture):
+            for path in self.folder.glob(f".{target.name}.*.part"):
+                if path.suffixes[-2][1:].isdigit():  # else it is of a run whose name begins like this one's
+                    path.unlink()
 
     def has_dataset(self, identity: Identity) -> bool:
         """Whether the finished dataset of `identity` is there.
@@ -203,7 +224,7 @@ class RunFiles:
         if not self.dataset.exists():
             return False
         with open_dataset(self.dataset, load=False) as dataset:
-            found = Identity(*(str(dataset.attrs.get(key, "")) for key in ("config", "config_hash", "source_hash")))
+            found = Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
         _refuse_other(self.dataset, found, identity)
         return True
 
@@ -238,7 +259,8 @@ class RunFiles:
                         target.setncatts(variable.attrs)
                     for name, place, values in blocks:
                         file[name][place] = values
-            except RuntimeError as error:  # netCDF's own, of a full disk for one
+            except RuntimeError as error:  # netCDF's own, which does not tell what the system said
+                _probe(temporary)
                 raise StoreError(f"{self.dataset}: cannot be written: {error}") from None
 
     def save_result(self, dataset: xr.Dataset, figure: Figure) -> None:
@@ -252,9 +274,14 @@ class RunFiles:
             figure.savefig(temporary, format="png")
 
     def discard(self) -> None:
-        for path in (self.dataset, self.picture):
+        # The picture first: without its dataset it would pass for the next one's.
+        for path in (self.picture, self.dataset):
             path.unlink(missing_ok=True)
-        shutil.rmtree(self.checkpoint, ignore_errors=True)
+        self.discard_checkpoint()
+
+    def discard_checkpoint(self) -> None:
+        if self.checkpoint.exists():
+            shutil.rmtree(self.checkpoint)
 
 
 def write_frame(frame: xr.Dataset, path: Path) -> None:
@@ -295,8 +322,17 @@ def replacing(path: Path) -> Iterator[Path]:
         _flush(temporary)
         os.replace(temporary, path)
         _flush(path.parent)
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _probe(path: Path) -> None:
+    """Write to a file that another library failed to write, for the system's own error."""
+    with path.open("ab") as stream:
+        stream.write(bytes(_PROBE))
+        os.fsync(stream.fileno())
 
 
 def _flush(path: Path) -> None:

@@ -1,0 +1,532 @@
+"""Real faults: killed, interrupted, without room or rights, damaged, twice at once, changed in between.
+
+Whatever happens, the same command goes on and ends in the files of an undisturbed run, byte for byte.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import nursery
+import pytest
+import xarray as xr
+from conftest import ROOT, SMALL
+
+from sweep.store import Checkpoint, Identity, StoreError
+
+TEXT = SMALL + "verify: 0.3\n"
+
+KILLS = 50
+
+Start = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("config") / "small.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@dataclass
+class Runs:
+    """The command `run CONFIG --output OUT`, again and again."""
+
+    config: Path
+    out: Path
+    started: list[Any] = field(default_factory=list)
+
+    def start(self, *arguments: str, **settings: Any) -> Any:
+        """A process that runs it."""
+        asked = ["run", str(self.config), "--output", str(self.out), *arguments]
+        log = self.out.parent / f"{self.out.name}.log{len(self.started)}"
+        process = nursery.context().Process(target=nursery.command, args=(asked, log), kwargs=settings)
+        process.start()
+        process.log = log
+        self.started.append(process)
+        return process
+
+    def finish(self, *arguments: str, **settings: Any) -> tuple[int, str]:
+        """Exit code and output of a process that runs it."""
+        process = self.start(*arguments, **settings)
+        process.join(120)
+        return process.exitcode, process.log.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def runs(config: Path, tmp_path: Path) -> Iterator[Runs]:
+    runs = Runs(config, tmp_path / "out")
+    yield runs
+    for process in runs.started:
+        process.kill()
+        process.join()
+        process.close()
+
+
+@pytest.fixture(scope="module")
+def first(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that nothing happened to."""
+    runs = Runs(config, tmp_path_factory.mktemp("undisturbed") / "out")
+    code, said = runs.finish()
+    assert code == 0, said
+    return runs.out
+
+
+@pytest.fixture(scope="module")
+def undisturbed(first: Path) -> dict[str, bytes]:
+    return contents(first)
+
+
+@pytest.fixture(scope="module")
+def values(first: Path) -> xr.Dataset:
+    return xr.load_dataset(first / "small.nc")
+
+
+def same_values(path: Path, values: xr.Dataset) -> None:
+    """Every variable bit for bit; the file is cut otherwise, for its tiles are of another size."""
+    found = xr.load_dataset(path)
+    assert set(found.variables) == set(values.variables)
+    for name, variable in values.variables.items():
+        assert found[name].values.tobytes() == variable.values.tobytes(), name
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """All files of a folder, but for the clock in a dataset."""
+    return {
+        path.name: without_clock(path) if path.suffix == ".nc" else path.read_bytes() for path in folder.iterdir()
+    }  # fmt: skip
+
+
+def without_clock(path: Path) -> bytes:
+    """The bytes of a dataset, with those of the attributes that tell the time replaced."""
+    whole = path.read_bytes()
+    with netCDF4.Dataset(path) as dataset:
+        clock = [dataset.created.encode()]
+        clock += [struct.pack("<d", dataset.getncattr(name)) for name in ("wall_time", "trajectories_per_second")]
+    masked = bytearray(whole)
+    for value in clock:
+        at = whole.index(value)
+        assert whole.count(value) == 1
+        masked[at : at + len(value)] = b"#" * len(value)
+        # HDF5 keeps attributes in blocks: signature, version, address of the heap, offset in it, checksum.
+        checksum = whole.rindex(b"FHDB", 0, at) + 4 + 1 + 8 + 5
+        masked[checksum : checksum + 4] = b"####"
+    return bytes(masked)
+
+
+class Watch:
+    """Looks at the files of a run while they come and go: one with its final name is complete."""
+
+    def __init__(self, folder: Path, undisturbed: dict[str, bytes]) -> None:
+        self.folder, self.undisturbed, self.seen = folder, undisturbed, set[tuple[int, int]]()
+        self.names: set[str] = set()
+
+    def look(self) -> None:
+        files = [*_listed(self.folder), *_listed(self.folder / "small.checkpoint")]
+        self.names = {path.name for path in files}
+        for path in files:
+            try:
+                stat = path.stat()
+                if path.name.startswith(".") or path.is_dir() or (stat.st_ino, stat.st_mtime_ns) in self.seen:
+                    continue
+                self._open(path)
+            except FileNotFoundError:
+                continue  # replaced or removed just now
+            self.seen.add((stat.st_ino, stat.st_mtime_ns))
+
+    def _open(self, path: Path) -> None:
+        if path.suffix == ".nc":
+            assert without_clock(path) == self.undisturbed[path.name]
+        elif path.suffix == ".png":
+            assert path.read_bytes() == self.undisturbed[path.name]
+        elif path.suffix == ".npz":
+            with np.load(path, allow_pickle=False) as archive:
+                assert archive.zip.testzip() is None
+        else:
+            assert json.loads(path.read_bytes()), path
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return [folder / name for name in os.listdir(folder)]
+    except FileNotFoundError:
+        return []
+
+
+class Moments:
+    """When to strike, told from the names of the files: each method says whether it is now."""
+
+    def __init__(self, watch: Watch) -> None:
+        self.watch = watch
+        self.before = self._images()
+        self.tiles = len(self._tiles())
+
+    def _images(self) -> int:
+        try:
+            return (self.watch.folder / "small.checkpoint" / "running.npz").stat().st_mtime_ns
+        except FileNotFoundError:
+            return 0
+
+    def _tiles(self) -> list[str]:
+        return [name for name in self.watch.names if name.startswith("0")]
+
+    def _unfinished(self, *names: str) -> bool:
+        return any(name.endswith(".part") and name.startswith(names) for name in self.watch.names)
+
+    def start(self) -> bool:
+        """The lock is taken, no chunk is done."""
+        return ".small.lock" in self.watch.names
+
+    def kernel(self) -> bool:
+        """A chunk is done and saved, the next one is at work."""
+        return self._images() != self.before and not self._unfinished(".")
+
+    def checkpoint(self) -> bool:
+        return self._images() != self.before and self._unfinished(".running", ".0")
+
+    def tile(self) -> bool:
+        """A tile is saved, others of its group are not."""
+        return len(self._tiles()) > self.tiles
+
+    def dataset(self) -> bool:
+        return self._unfinished(".small.nc")
+
+    def files(self) -> bool:
+        """The dataset is there, its picture is not."""
+        return "small.nc" in self.watch.names and "small.png" not in self.watch.names
+
+    def picture(self) -> bool:
+        return self._unfinished(".small.png")
+
+
+def strike(runs: Runs, undisturbed: dict[str, bytes], moment: str, delay: float, with_signal: int) -> Any:
+    """Start the command and send the signal at the moment; None where it ended before that came."""
+    watch = Watch(runs.out, undisturbed)
+    watch.look()
+    now = getattr(Moments(watch), moment)
+    process = runs.start()
+    while not now():
+        if not process.is_alive():
+            return None
+        watch.look()
+        time.sleep(2e-4)
+    time.sleep(delay)
+    os.kill(process.pid, with_signal)
+    process.join(60)
+    watch.look()
+    return process
+
+
+def test_killed_at_any_moment(config: Path, tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
+    rng = random.Random(1)
+    wanted = Counter(start=4, kernel=12, checkpoint=12, tile=4, dataset=10, files=4, picture=4)
+    order = ["start", "kernel", "checkpoint", "tile", "dataset", "files", "picture"]
+    survived: Counter[str] = Counter()
+    for lane in range(40):
+        runs = Runs(config, tmp_path / f"{lane}")
+        for moment in sorted((m for m in order for _ in range(3) if survived[m] < wanted[m]), key=order.index):
+            # Up to a whole chunk later where the moment lasts, at once where it is over soon.
+            delay = rng.uniform(0, 0.03) if moment in ("start", "kernel", "files") else 0.0
+            process = strike(runs, undisturbed, moment, delay, signal.SIGKILL)
+            if process is None:
+                assert runs.started[-1].exitcode == 0, runs.started[-1].log.read_text()
+                break
+            if process.exitcode == -signal.SIGKILL:
+                survived[moment] += 1
+                assert ".small.lock" in os.listdir(runs.out)
+        code, said = runs.finish()
+        assert code == 0, said
+        assert contents(runs.out) == undisturbed
+        if survived >= wanted:
+            break
+    print(f"killed: {dict(survived)}, {survived.total()} times; {lane + 1} runs")
+    assert survived >= wanted, survived
+    assert survived.total() >= KILLS
+
+
+def test_interrupted(runs: Runs, undisturbed: dict[str, bytes]) -> None:
+    for moment in ("kernel", "checkpoint", "kernel", "dataset", "files"):
+        process = strike(runs, undisturbed, moment, 0.0, signal.SIGINT)
+        assert process is not None
+        said = process.log.read_text()
+        assert (process.exitcode, "Traceback" in said) == (130, False), said
+        assert "finished and kept; the same command goes on" in said
+        assert not [name for name in os.listdir(runs.out) if name.startswith(".")]
+    code, said = runs.finish()
+    assert code == 0, said
+    assert contents(runs.out) == undisturbed
+
+
+def test_killed_and_interrupted_from_the_shell(runs: Runs, values: xr.Dataset) -> None:
+    """The command as a user types it, with tiles and chunks as they are; its numbers are the same."""
+    command = [sys.executable, "-m", "sweep", "run", str(runs.config), "--output", str(runs.out)]
+    running = runs.out / "small.checkpoint" / "running.npz"
+    for with_signal, code in ((signal.SIGKILL, -9), (signal.SIGINT, 130)):
+        running.unlink(missing_ok=True)
+        with subprocess.Popen([*command, "--set", "t_end=30000"], cwd=ROOT, stderr=subprocess.DEVNULL) as process:
+            while not running.exists():
+                assert process.poll() is None
+                time.sleep(0.01)
+            process.send_signal(with_signal)
+        assert process.returncode == code
+    done = subprocess.run([*command, "--fresh", "--quiet"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    same_values(runs.out / "small.nc", values)
+
+
+def refused(result: tuple[int, str], *words: str) -> None:
+    """One line that says these words, exit code 2."""
+    code, said = result
+    assert code == 2, said
+    assert all(word in said for word in words), said
+    assert "Traceback" not in said
+    assert len(said.splitlines()) == 1, said
+
+
+# Bytes a file may have: less than the images of a group, than the dataset, than the picture.
+ROOM = {"running.npz": 2_000, "small.nc": 30_000, "small.png": 90_000}
+
+
+@pytest.mark.parametrize("file", ROOM)
+def test_a_file_finds_no_room(runs: Runs, undisturbed: dict[str, bytes], file: str) -> None:
+    refused(runs.finish("--quiet", room=ROOM[file]), file, "cannot be written: File too large")
+    Watch(runs.out, undisturbed).look()
+    assert not list(runs.out.rglob(".*"))
+    code, said = runs.finish()
+    assert code == 0, said
+    assert contents(runs.out) == undisturbed
+
+
+def test_the_disk_is_full(runs: Runs, values: xr.Dataset) -> None:
+    """A disk that grows, in a name space of its own; files that may grow where there is no such thing."""
+    sizes = {"running.npz": 12, "small.nc": 64, "small.png": 160, "": 4096}
+    runs.out.mkdir()
+    own = subprocess.run(["unshare", "-rm", "mount", "-t", "tmpfs", "x", runs.out], capture_output=True, check=False)
+    disk = own.returncode == 0
+    lines = [f'mount -t tmpfs -o size=4k tmpfs "{runs.out}"'] if disk else []
+    for i, kilobytes in enumerate(sizes.values()):
+        lines.append(f'mount -o remount,size={kilobytes}k "{runs.out}"' if disk else f"ulimit -S -f {kilobytes}")
+        command = f'"{sys.executable}" -m sweep run "{runs.config}" --output "{runs.out}" --quiet'
+        lines.append(
+            f'{command} >"{runs.out}.{i}" 2>&1; echo $? >>"{runs.out}.{i}"; cp -a "{runs.out}" "{runs.out}-{i}"'
+        )
+    script = "\n".join(lines)
+    subprocess.run([*(["unshare", "-rm"] if disk else []), "bash", "-c", script], cwd=ROOT, check=True)
+    for i, file in enumerate(sizes):
+        *said, code = (runs.out.parent / f"{runs.out.name}.{i}").read_text().splitlines()
+        if file:
+            reason = "No space left on device" if disk else "File too large"
+            refused((int(code), "\n".join(said)), file, reason)
+        else:
+            assert (int(code), said) == (0, [])
+        left = runs.out.parent / f"{runs.out.name}-{i}"
+        assert not list(left.rglob(".*"))
+        for path in left.glob("*.nc"):
+            same_values(path, values)
+
+
+@pytest.mark.parametrize("what", ["folder", "parent", "checkpoint"])
+def test_a_read_only_folder(runs: Runs, undisturbed: dict[str, bytes], what: str) -> None:
+    assert strike(runs, undisturbed, "kernel", 0.0, signal.SIGKILL)
+    checkpoint = runs.out / "small.checkpoint"
+    if what == "parent":
+        shutil.rmtree(runs.out)
+    (runs.out / ".small.lock").unlink(missing_ok=True)
+    folder = {"folder": runs.out, "parent": runs.out.parent / "closed", "checkpoint": checkpoint}[what]
+    folder.mkdir(exist_ok=True)
+    folder.chmod(0o555)
+    if what == "parent":
+        runs.out = folder / "out"
+    refused(runs.finish("--quiet", unprivileged=True), str(folder), "Permission denied")
+    folder.chmod(0o755)
+    code, said = runs.finish(unprivileged=True)
+    assert code == 0, said
+    assert contents(runs.out) == undisturbed
+
+
+@pytest.fixture(scope="module")
+def killed(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a run leaves that was killed with a group of tiles done and another begun."""
+    runs = Runs(config, tmp_path_factory.mktemp("killed") / "out")
+    running = runs.out / "small.checkpoint" / "running.npz"
+    process = runs.start()
+    while not running.with_name("000002.npz").exists() or 3 not in np.load(running)["tiles"]:
+        assert process.is_alive()
+    process.kill()
+    process.join()
+    return runs.out
+
+
+def cut(share: float) -> Callable[[Path], None]:
+    return lambda path: os.truncate(path, int(share * path.stat().st_size))
+
+
+def flip(share: float) -> Callable[[Path], None]:
+    def flip_byte(path: Path) -> None:
+        whole = bytearray(path.read_bytes())
+        whole[int(share * (len(whole) - 1))] ^= 0xFF
+        path.write_bytes(whole)
+
+    return flip_byte
+
+
+def foreign(path: Path) -> None:
+    with path.open("wb") as stream:
+        np.savez(stream, status=np.ones(2), seconds=np.ones(()), cpu=np.array("x"), tiles=np.arange(3))
+
+
+def other_tile(path: Path) -> None:
+    """Each gets what the next one had."""
+    files = sorted(path.parent.glob("*.npz"))
+    shutil.copy(files[(files.index(path) + 1) % len(files)], path)
+
+
+DAMAGES: dict[str, Callable[[Path], None]] = {
+    **{f"cut{i}": cut(i) for i in (0, 0.4, 0.999)},
+    **{f"flip{i}": flip(i) for i in (0, 0.3, 0.7, 1)},
+    "removed": Path.unlink,
+    "foreign": foreign,
+    "another's": other_tile,
+}
+
+
+@pytest.mark.parametrize("how", DAMAGES)
+def test_damaged_tiles_and_images_are_computed_again(
+    runs: Runs, killed: Path, undisturbed: dict[str, bytes], how: str
+) -> None:
+    shutil.copytree(killed, runs.out)
+    damaged = sorted((runs.out / "small.checkpoint").glob("*.npz"))
+    assert len(damaged) >= 4
+    for path in damaged:
+        DAMAGES[how](path)
+    code, said = runs.finish()
+    assert code == 0, said
+    unseen = how in ("removed", "flip1")  # the last byte is the length of a comment
+    assert unseen or all(f"{path.name}: damaged" in said for path in damaged), said
+    assert contents(runs.out) == undisturbed
+
+
+@pytest.mark.parametrize("how", [name for name in DAMAGES if name not in ("removed", "another's")])
+def test_a_damaged_identity_is_refused(runs: Runs, killed: Path, how: str) -> None:
+    shutil.copytree(killed, runs.out)
+    DAMAGES[how](runs.out / "small.checkpoint" / "identity.json")
+    refused(runs.finish("--quiet"), "identity.json: damaged", "--fresh")
+
+
+def test_tiles_without_an_identity_are_known_by_their_stamp(
+    runs: Runs, killed: Path, undisturbed: dict[str, bytes]
+) -> None:
+    for settings in ([], ["--set", "delta=0.04"]):
+        shutil.copytree(killed, runs.out, dirs_exist_ok=True)
+        (runs.out / "small.checkpoint" / "identity.json").unlink()
+        code, said = runs.finish(*settings)
+        assert (code, "not a file of this run" in said) == (0, bool(settings)), said
+        assert (contents(runs.out) == undisturbed) == (not settings)
+        shutil.rmtree(runs.out)
+
+
+def test_foreign_files_in_the_folder(runs: Runs, killed: Path, undisturbed: dict[str, bytes]) -> None:
+    shutil.copytree(killed, runs.out)
+    for name in ("1.npz", "0abc.npz", "notes.txt", "000099.npz", ".x.part", "000099.npz.orig"):
+        (runs.out / "small.checkpoint" / name).write_bytes(b"mine")
+    code, said = runs.finish()
+    assert code == 0, said
+    assert contents(runs.out) == undisturbed
+
+
+def test_every_flipped_byte_of_a_tile_is_seen(tmp_path: Path) -> None:
+    """Numpy alone reads past some: a header that tells a smaller shape ends before the checksum."""
+    identity = Identity("name: x", "0" * 16, "1" * 16, "sweep 0")
+    tile = {"status": np.ones(3), "seconds": np.array(2.0), "cpu": np.array("zen")}
+    checkpoint = Checkpoint(tmp_path / "c", identity, lambda _: None)
+    checkpoint.save(0, tile)
+    path = tmp_path / "c" / "000000.npz"
+    whole, missed = path.read_bytes(), 0
+    for place in range(len(whole)):
+        for bit in (place % 8, (place + 3) % 8):
+            damaged = bytearray(whole)
+            damaged[place] ^= 1 << bit
+            path.write_bytes(damaged)
+            try:
+                found = checkpoint.load(0)
+            except StoreError:
+                continue
+            missed += 1
+            assert found.keys() == tile.keys()
+            assert all(np.array_equal(found[name], tile[name]) for name in tile)
+    assert missed < len(whole)  # dates and rights of the entries
+
+
+def test_two_runs_at_once(runs: Runs, undisturbed: dict[str, bytes]) -> None:
+    watch = Watch(runs.out, undisturbed)
+    now = Moments(watch).kernel
+    first = runs.start()
+    while not now():
+        assert first.is_alive()
+        watch.look()
+    os.kill(first.pid, signal.SIGSTOP)  # at work for as long as it takes
+    refused(runs.finish("--quiet"), f"{runs.out / 'small'}: another run is at work there")
+    refused(runs.finish("--quiet", "--fresh"), "another run is at work there")
+    os.kill(first.pid, signal.SIGCONT)
+    first.join(60)
+    assert first.exitcode == 0, first.log.read_text()
+    assert contents(runs.out) == undisturbed
+
+
+@pytest.mark.parametrize("whole", [False, True], ids=["begun", "whole"])
+def test_another_version_is_refused(runs: Runs, killed: Path, undisturbed: dict[str, bytes], whole: bool) -> None:
+    if whole:
+        assert runs.finish()[0] == 0
+    else:
+        shutil.copytree(killed, runs.out)
+    before = {path: path.read_bytes() for path in runs.out.rglob("[!.]*.*") if path.is_file()}
+    for package in ("rattleback-sweep", "numba"):
+        code, said = runs.finish("--quiet", versions={package: "9.9"})
+        assert (code, "not resumed, it comes from other versions: sweep" in said) == (2, True), said
+        assert f"{package.removeprefix('rattleback-')} 9.9" in said.partition(", now")[2]
+        assert {path: path.read_bytes() for path in runs.out.rglob("[!.]*.*") if path.is_file()} == before
+    assert runs.finish("--fresh", versions={"rattleback-sweep": "9.9"})[0] == 0
+    assert runs.finish("--fresh")[0] == 0
+    assert contents(runs.out) == undisturbed
+
+
+def test_another_configuration_is_refused(runs: Runs, killed: Path, undisturbed: dict[str, bytes]) -> None:
+    shutil.copytree(killed, runs.out)
+    code, said = runs.finish("--quiet", "--set", "t_end=1400")
+    assert (code, *(f"t_end: {t}.0" in said for t in (1400, 1500))) == (2, True, True), said
+    assert runs.finish("--fresh", "--set", "t_end=1400")[0] == 0
+    assert runs.finish("--quiet")[0] == 2
+    assert runs.finish("--fresh")[0] == 0
+    assert contents(runs.out) == undisturbed
+
+
+def test_an_edited_kernel_is_refused(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "sweep", tmp_path / "sweep")
+    (tmp_path / "c.yaml").write_text("model: analytic\nfriction: {mu: [40, 60]}\n", encoding="utf-8")
+
+    def run(*arguments: str) -> tuple[int, str]:
+        command = [sys.executable, "-m", "sweep", "run", "c.yaml", "--output", "out", "--quiet", *arguments]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        return done.returncode, done.stderr
+
+    assert run() == (0, "")
+    with (tmp_path / "sweep" / "kernels" / "lanes.py").open("a", encoding="utf-8") as source:
+        source.write("\n# edited\n")
+    code, said = run()
+    assert (code, "out/c.nc: not resumed, it comes from other sources of the model or kernel" in said) == (2, True)
+    assert run("--fresh") == (0, "")
