@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 
@@ -50,10 +50,7 @@ class Refined:
         tile_size : cells a tile, by the number of cells
         """
         for i in range(self._learned, len(self.tiles)):
-            found = self.checkpoint.load(i)
-            self._outcome.ravel()[self._nodes[self.tiles[i]]] = found["reversals"].astype(np.int32) * len(
-                dataset.STATUSES
-            ) + found["status"].astype(np.int32)
+            self._outcome.ravel()[self._nodes[self.tiles[i]]] = _outcome(self.checkpoint.load(i))
         self._learned = len(self.tiles)
         more = refinement.missing(self._outcome, self._refined, self.config.refine)
         first, step = len(self._nodes), tile_size(len(more))
@@ -104,3 +101,8 @@ class Refined:
     def _formulas(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
         for tile in self.grid.tiles(_TILE):
             yield tile, dataset.predicted(formulas(TIERS[self.config.model], self.grid.part(tile)))
+
+
+def _outcome(found: Mapping[str, Array]) -> Array:
+    """Count and status as one number."""
+    return found["reversals"].astype(np.int32) * len(dataset.STATUSES) + found["status"].astype(np.int32)

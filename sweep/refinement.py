@@ -24,10 +24,12 @@ UNKNOWN = -1
 """Outcome of a node that is not simulated; those of the others are not negative."""
 
 BESIDE = 3
-"""Least level of the blocks that are halved for a change beside them; a block is 2^level intervals a side."""
+"""Least level of the blocks that are halved for a change beside them; a block is 2^level intervals a side.
+
+Lower ones cost much and find little: README, refined maps."""
 
 
-def missing(outcome: Outcomes, refined: Sequence[int], depth: int, beside: int = BESIDE) -> Nodes:
+def missing(outcome: Outcomes, refined: Sequence[int], depth: int) -> Nodes:
     """Nodes to simulate next, as ascending indices in the C order of `outcome`; none when all is known.
 
     Parameters
@@ -37,19 +39,19 @@ def missing(outcome: Outcomes, refined: Sequence[int], depth: int, beside: int =
     depth : level of the largest blocks
     """
     wanted = np.zeros(outcome.shape, bool)
-    for size, blocks, _ in _levels(outcome, refined, depth, beside):
+    for size, blocks, _ in _levels(outcome, refined, depth):
         at = [np.append(np.arange(0, n - 1, size), n - 1) for n in outcome.shape]
         wanted[_mesh(outcome, refined, at)] |= _corners(blocks, refined)
     return np.flatnonzero(wanted & (outcome == UNKNOWN))
 
 
-def sources(outcome: Outcomes, refined: Sequence[int], depth: int, beside: int = BESIDE) -> Nodes:
+def sources(outcome: Outcomes, refined: Sequence[int], depth: int) -> Nodes:
     """For each node the simulated one whose outcome it has, its own or its block's; shape of `outcome`.
 
     Takes the outcomes as `missing` leaves them when it finds nothing more.
     """
     source = np.arange(outcome.size).reshape(outcome.shape)
-    for size, blocks, halved in _levels(outcome, refined, depth, beside):
+    for size, blocks, halved in _levels(outcome, refined, depth):
         # A node on the sides of several blocks has one outcome with each: any will do.
         block = [np.minimum(np.arange(n), n - 2) // size for n in outcome.shape]
         inferred = (blocks & ~halved)[_mesh(outcome, refined, block)] & (outcome == UNKNOWN)
@@ -63,14 +65,12 @@ def _mesh(outcome: Outcomes, refined: Sequence[int], places: Sequence[Any]) -> t
     return np.ix_(*(at if i in refined else range(outcome.shape[i]) for i, at in enumerate(places)))
 
 
-def _levels(
-    outcome: Outcomes, refined: Sequence[int], depth: int, beside: int
-) -> Iterator[tuple[int, Flags, Flags]]:  # fmt: skip
+def _levels(outcome: Outcomes, refined: Sequence[int], depth: int) -> Iterator[tuple[int, Flags, Flags]]:
     """From the largest blocks to single cells: intervals a side, which of these blocks there are, which are halved."""
     changed = _changed(outcome, refined, depth)
     blocks = np.ones_like(changed[depth])
     for level in range(depth, 0, -1):
-        halved = blocks & (_widened(changed[level], refined) if level >= beside else changed[level])
+        halved = blocks & (_widened(changed[level], refined) if level >= BESIDE else changed[level])
         yield 2**level, blocks, halved
         blocks = halved
         for axis in refined:

@@ -114,9 +114,7 @@ def _compute(
     return compute(config, checkpoint, _Count(reporter), cluster)
 
 
-def _compute_whole(
-    config: Config, checkpoint: Checkpoint | Memory, count: _Count, cluster: Cluster | None
-) -> Whole:  # fmt: skip
+def _compute_whole(config: Config, checkpoint: Checkpoint | Memory, count: _Count, cluster: Cluster | None) -> Whole:
     grid = Grid.of(config)
     tiles = grid.tiles(tile_size(grid.size))
     if checkpoint.done or checkpoint.load_running():
@@ -128,7 +126,7 @@ def _compute_whole(
 
 def _compute_refined(
     config: Config, checkpoint: Checkpoint | Memory, count: _Count, cluster: Cluster | None
-) -> Refined:  # fmt: skip
+) -> Refined:
     if checkpoint.done or checkpoint.load_running():
         count.reporter.note(f"{len(checkpoint.done)} tiles are there from an earlier run: going on")
     refined = Refined(config, checkpoint)
@@ -151,7 +149,7 @@ def _run_tiles(
 
 def _here(
     config: Config, tiles: Sequence[Tile], todo: Sequence[int], checkpoint: Checkpoint | Memory, count: _Count
-) -> Iterator[Done]:  # fmt: skip
+) -> Iterator[Done]:
     for group in local.groups(Grid.of(config), tiles, todo, checkpoint):
         yield from local.run_group(
             config, tiles, group, checkpoint=checkpoint, compiling=count.reporter.compiling, after_chunk=count.chunk
