@@ -39,7 +39,7 @@ def missing(outcome: Outcomes, refined: Sequence[int], depth: int) -> Nodes:
     depth : level of the largest blocks
     """
     wanted = np.zeros(outcome.shape, bool)
-    for size, blocks, _ in _levels(outcome, refined, depth):
+    for size, blocks in _levels(outcome, refined, depth):
         at = [np.append(np.arange(0, n - 1, size), n - 1) for n in outcome.shape]
         wanted[_mesh(outcome, refined, at)] |= _corners(blocks, refined)
     return np.flatnonzero(wanted & (outcome == UNKNOWN))
@@ -51,10 +51,10 @@ def sources(outcome: Outcomes, refined: Sequence[int], depth: int) -> Nodes:
     Takes the outcomes as `missing` leaves them when it finds nothing more.
     """
     source = np.arange(outcome.size).reshape(outcome.shape)
-    for size, blocks, halved in _levels(outcome, refined, depth):
+    for size, blocks in _levels(outcome, refined, depth):  # the halves of a block come after it
         # A node on the sides of several blocks has one outcome with each: any will do.
         block = [np.minimum(np.arange(n), n - 2) // size for n in outcome.shape]
-        inferred = (blocks & ~halved)[_mesh(outcome, refined, block)] & (outcome == UNKNOWN)
+        inferred = blocks[_mesh(outcome, refined, block)] & (outcome == UNKNOWN)
         first = _mesh(outcome, refined, [size * i for i in block])
         np.copyto(source, np.ravel_multi_index(first, outcome.shape), where=inferred)
     return source
@@ -65,17 +65,16 @@ def _mesh(outcome: Outcomes, refined: Sequence[int], places: Sequence[Any]) -> t
     return np.ix_(*(at if i in refined else range(outcome.shape[i]) for i, at in enumerate(places)))
 
 
-def _levels(outcome: Outcomes, refined: Sequence[int], depth: int) -> Iterator[tuple[int, Flags, Flags]]:
-    """From the largest blocks to single cells: intervals a side, which of these blocks there are, which are halved."""
+def _levels(outcome: Outcomes, refined: Sequence[int], depth: int) -> Iterator[tuple[int, Flags]]:
+    """From the largest blocks to single cells: intervals a side, and which of these blocks there are."""
     changed = _changed(outcome, refined, depth)
     blocks = np.ones_like(changed[depth])
     for level in range(depth, 0, -1):
-        halved = blocks & (_widened(changed[level], refined) if level >= BESIDE else changed[level])
-        yield 2**level, blocks, halved
-        blocks = halved
+        yield 2**level, blocks
+        blocks = blocks & (_widened(changed[level], refined) if level >= BESIDE else changed[level])
         for axis in refined:
             blocks = blocks.repeat(2, axis).take(range(changed[level - 1].shape[axis]), axis)
-    yield 1, blocks, np.zeros_like(blocks)
+    yield 1, blocks
 
 
 def _changed(outcome: Outcomes, refined: Sequence[int], depth: int) -> list[Flags]:
