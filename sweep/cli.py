@@ -285,7 +285,7 @@ def _estimate(config: Config) -> str:
 
     grid = Grid.of(config)
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one cell"
-    lines = [f"cells:  {grid.size} ({axes})"]
+    lines = [f"cells:  {grid.size} ({axes})" + (", not all of them simulated" if config.refine else "")]
     if config.model not in MODELS:
         return lines[0]
     sample = plan(config, grid.sample(_SAMPLE))
@@ -319,6 +319,8 @@ def _summary(dataset: xr.Dataset) -> str:
     dims = " × ".join(f"{d} {n}" for d, n in dataset["status"].sizes.items()) or "one cell"
     ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if code in status)
     lines = [f"{status.size} cells ({dims}): {ends}"]
+    if "simulated_share" in dataset.attrs:
+        lines.append(f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the others are inferred")
     if "reversals" in dataset:
         valid = np.isin(status, (1, 2))
         ours = np.ravel(dataset["reversals"].values)[valid].astype(int)

@@ -59,6 +59,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "spin_mean": Variable("float64", "1", "spin averaged over the last full window before t_stop, in sqrt(g/c)"),
     "status": Variable("int8", "1", "how the simulation of the trajectory ended", STATUSES),
+    "inferred": Variable("int8", "1", "how reversals and status were found", {0: "simulated", 1: "inferred"}),
     "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)"),
     "t_stop": Variable("float64", "1", "time at which the simulation ended, in sqrt(c/g)"),
     "energy_error": Variable(

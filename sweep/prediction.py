@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,17 +38,25 @@ class Prediction:
     formulas: Formulas | None
     """None for a tier without friction: it reverses for ever."""
     stability: Stability | None
-    """None for a tier that is not simulated."""
+    """None for a tier that is not simulated, and where the eigenvalues are not asked for."""
 
 
 def predict(tier: Tier, grid: Grid) -> Prediction:
-    columns, (body_grid, body) = grid.columns(), grid.bodies()
-    bodies = body_grid.columns()
-    formulas = None
+    prediction = formulas(tier, grid)
+    if not isinstance(tier, Model):
+        return prediction
+    bodies, body = grid.bodies()
+    stability = _stability(tier, grid.columns(), bodies.columns(), body, prediction.formulas)
+    return replace(prediction, stability=stability)
+
+
+def formulas(tier: Tier, grid: Grid) -> Prediction:
+    """What costs next to nothing: all but the eigenvalues."""
+    bodies = grid.bodies()[0].columns()
+    found = None
     if "mu" in tier.parameters:
-        formulas = Formulas(analytic.reversal_count(columns), analytic.critical_spins(bodies))
-    stability = _stability(tier, columns, bodies, body, formulas) if isinstance(tier, Model) else None
-    return Prediction(analytic.form_factor(bodies), formulas, stability)
+        found = Formulas(analytic.reversal_count(grid.columns()), analytic.critical_spins(bodies))
+    return Prediction(analytic.form_factor(bodies), found, None)
 
 
 def _stability(model: Model, columns: Columns, bodies: Columns, body: Array, formulas: Formulas | None) -> Stability:

@@ -43,4 +43,4 @@ class Terminal(Reporter):
         rate = (progress.done - progress.done_before) / progress.seconds
         if self._task is None:
             self._task = self._bar.add_task("cells", total=progress.cells, failed=0, rate=0.0)
-        self._bar.update(self._task, completed=progress.done, failed=progress.failed, rate=rate)
+        self._bar.update(self._task, total=progress.cells, completed=progress.done, failed=progress.failed, rate=rate)

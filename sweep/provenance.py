@@ -22,7 +22,17 @@ from sweep.store import Identity
 # Beside the numeric sources: they fill the images, and turn them into results.
 _DECISIVE = tuple(
     str(Path(__file__).parent / name)
-    for name in ("grid.py", "prediction.py", "plan.py", "dataset.py", "verification.py", "local.py", "run.py")
+    for name in (
+        "grid.py",
+        "prediction.py",
+        "plan.py",
+        "dataset.py",
+        "verification.py",
+        "local.py",
+        "refinement.py",
+        "refined.py",
+        "run.py",
+    )
 )
 
 

@@ -21,6 +21,7 @@ from sweep.models import MODELS, TIERS
 from sweep.models.model import Model
 from sweep.prediction import predict as predict_grid
 from sweep.provenance import identify
+from sweep.refined import Refined
 from sweep.store import Checkpoint, Memory, RunFiles, open_dataset
 from sweep.whole import Whole
 
@@ -106,38 +107,67 @@ def run(
     return result
 
 
-def _compute(config: Config, checkpoint: Checkpoint | Memory, reporter: Reporter, cluster: Cluster | None) -> Whole:
-    """Run all tiles that `checkpoint` does not have."""
+def _compute(
+    config: Config, checkpoint: Checkpoint | Memory, reporter: Reporter, cluster: Cluster | None
+) -> Whole | Refined:
+    # A single cell has no neighbours to infer it from.
+    compute = _compute_refined if config.refine and config.axes else _compute_whole
+    return compute(config, checkpoint, _Count(reporter), cluster)
+
+
+def _compute_whole(config: Config, checkpoint: Checkpoint | Memory, count: _Count, cluster: Cluster | None) -> Whole:
     grid = Grid.of(config)
     tiles = grid.tiles(tile_size(grid.size))
-    todo = [i for i in range(len(tiles)) if i not in checkpoint.done]
-    if len(todo) < len(tiles) or checkpoint.load_running():
-        reporter.note(f"{len(tiles) - len(todo)} of {len(tiles)} tiles are there from an earlier run: going on")
-    count = _Count(reporter, grid.size, grid.size - sum(grid.part(tiles[i]).size for i in todo))
-    for done in (
-        cluster.run(config, tiles, todo) if cluster else _here(config, tiles, todo, checkpoint, reporter, count)
-    ):
-        checkpoint.save(done.tile, done.arrays | {"seconds": np.array(done.seconds), "cpu": np.array(done.cpu)})
-        count.tile(done.arrays["status"])
+    if checkpoint.done or checkpoint.load_running():
+        done = f"{len(checkpoint.done)} of {len(tiles)} tiles"
+        count.reporter.note(f"{done} are there from an earlier run: going on")
+    _run_tiles(config, tiles, checkpoint, count, cluster)
     return Whole(config, grid, tiles, checkpoint)
 
 
+def _compute_refined(
+    config: Config, checkpoint: Checkpoint | Memory, count: _Count, cluster: Cluster | None
+) -> Refined:
+    if checkpoint.done or checkpoint.load_running():
+        count.reporter.note(f"{len(checkpoint.done)} tiles are there from an earlier run: going on")
+    refined = Refined(config, checkpoint)
+    while refined.grow(tile_size):
+        _run_tiles(refined.cases(), refined.tiles, checkpoint, count, cluster)
+    return refined
+
+
+def _run_tiles(
+    config: Config, tiles: Sequence[Tile], checkpoint: Checkpoint | Memory, count: _Count, cluster: Cluster | None
+) -> None:
+    """Run all tiles that `checkpoint` does not have."""
+    grid = Grid.of(config)
+    todo = [i for i in range(len(tiles)) if i not in checkpoint.done]
+    count.expect(grid.size, sum(grid.part(tiles[i]).size for i in todo))
+    for done in cluster.run(config, tiles, todo) if cluster else _here(config, tiles, todo, checkpoint, count):
+        checkpoint.save(done.tile, done.arrays | {"seconds": np.array(done.seconds), "cpu": np.array(done.cpu)})
+        count.tile(done.arrays["status"])
+
+
 def _here(
-    config: Config, tiles: Sequence[Tile], todo: Sequence[int], checkpoint: Checkpoint | Memory,
-    reporter: Reporter, count: _Count,
-) -> Iterator[Done]:  # fmt: skip
+    config: Config, tiles: Sequence[Tile], todo: Sequence[int], checkpoint: Checkpoint | Memory, count: _Count
+) -> Iterator[Done]:
     for group in local.groups(Grid.of(config), tiles, todo, checkpoint):
         yield from local.run_group(
-            config, tiles, group, checkpoint=checkpoint, compiling=reporter.compiling, after_chunk=count.chunk
+            config, tiles, group, checkpoint=checkpoint, compiling=count.reporter.compiling, after_chunk=count.chunk
         )
 
 
 class _Count:
     """Adds up finished tiles and the chunks of the running ones for the reporter."""
 
-    def __init__(self, reporter: Reporter, cells: int, before: int) -> None:
-        self.reporter, self.cells, self.before = reporter, cells, before
-        self.done, self.failed, self.began = before, 0, time.perf_counter()
+    def __init__(self, reporter: Reporter) -> None:
+        self.reporter, self.began = reporter, time.perf_counter()
+        self.cells = self.before = self.done = self.failed = 0
+
+    def expect(self, cells: int, todo: int) -> None:
+        """Of `cells` in all `todo` are left to do; those done that were not counted here, an earlier run left."""
+        there = cells - todo - self.done
+        self.cells, self.before, self.done = cells, self.before + there, self.done + there
 
     def chunk(self, status: Array) -> None:
         done, failed = int((status != RUNNING).sum()), int(np.isin(status, executor.FAILURES).sum())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,15 @@ from sweep.config import Config
 from sweep.grid import Array, Grid, Tile
 from sweep.provenance import provenance
 from sweep.store import Checkpoint, Memory, RunFiles
+
+
+def attributes(config: Config, cells: int, tiles: Iterable[Mapping[str, Array]]) -> dict[str, Any]:
+    """Where the numbers of a finished run come from, and what its `cells`, in `tiles`, have cost."""
+    seconds, cpus = 0.0, set[str]()
+    for tile in tiles:
+        seconds += float(tile["seconds"])
+        cpus.add(str(tile["cpu"]))
+    return provenance(config, seconds, cells, cpus)
 
 
 @dataclass(frozen=True)
@@ -46,13 +55,11 @@ class Whole:
 
     def _frame(self, arrays: Mapping[str, Array]) -> xr.Dataset:
         """Coordinates, attributes and what is not over the cells, with `arrays`."""
-        seconds, cpus, again = 0.0, set(), dict[str, list[Array]]()
+        again = dict[str, list[Array]]()
         for _, tile in self._tiles():
-            seconds += float(tile["seconds"])
-            cpus.add(str(tile["cpu"]))
             for name in tile:
                 if name.startswith("verified_"):
                     again.setdefault(name, []).append(tile[name])
-        attributes: dict[str, Any] = provenance(self.config, seconds, self.grid.size, cpus)
-        framed = dataset.label(self.config, self.grid, arrays, attributes)
+        words = attributes(self.config, self.grid.size, (tile for _, tile in self._tiles()))
+        framed = dataset.label(self.config, self.grid, arrays, words)
         return dataset.beside(framed, {n: np.concatenate(v) for n, v in again.items()}) if again else framed

@@ -54,6 +54,7 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
         "critical_reason",
         "method",
         "t_first_reversal",
+        "inferred",
     }
     assert {name: str(small[name].dtype) for name in ("reversals", "status", "spin_final", "reversals_predicted")} == {
         "reversals": "int16", "status": "int8", "spin_final": "float64", "reversals_predicted": "int16",

@@ -94,11 +94,14 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         measure=_measures(checked.measure, model),
         max_failed_fraction=checked.max_failed_fraction,
         verify=checked.verify,
+        refine=checked.refine,
         cases=columns,
         cases_file=checked.cases,
     )
     if reason := _too_large(config):
         raise ConfigError([source.fault((), reason)])
+    if reason := _too_large_to_refine(config):
+        raise ConfigError([source.fault(("refine",), reason)])
     if beyond := off_the_body(config):
         raise ConfigError([source.fault(("start", "x0"), beyond)])
     if reason := _unusable_step(config):
@@ -109,6 +112,13 @@ def _resolve(checked: Any, source: document.Document) -> Config:
 def _too_large(config: Config) -> str:
     cells = math.prod(map(len, config.axes.values()))
     return f"{cells} cells; allowed: at most {schema.MAX_CELLS}" if cells > schema.MAX_CELLS else ""
+
+
+def _too_large_to_refine(config: Config) -> str:
+    cells = math.prod(map(len, config.axes.values()))
+    if not config.refine or cells <= schema.MAX_REFINED_CELLS:
+        return ""
+    return f"{cells} cells, all held in memory; allowed: at most {schema.MAX_REFINED_CELLS}, or refine: 0"
 
 
 def _unusable_step(config: Config) -> str:
@@ -156,6 +166,8 @@ def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document
         yield source.fault(("integrator", "step"), "a number beside method: auto; allowed: auto")
     if checked.verify and not isinstance(model, Model):
         yield source.fault(("verify",), f"the {model.name} model takes no steps; allowed: 0")
+    if checked.refine:
+        yield from _unrefinable(checked, model, source)
     for i, name in enumerate(checked.measure or ()):
         if name not in model.measures:
             yield source.fault(
@@ -163,3 +175,14 @@ def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document
             )
         elif name in ("first_reversal", "noise_limited") and "reversals" not in checked.measure:
             yield source.fault(("measure", i), "measured with the reversals; allowed: reversals beside it")
+
+
+def _unrefinable(checked: Any, model: Tier, source: document.Document) -> Any:
+    if not isinstance(model, Model):
+        yield source.fault(("refine",), f"the {model.name} model is not simulated; allowed: 0")
+    if checked.cases is not None:
+        yield source.fault(("refine",), "beside cases, which have no neighbours; allowed: 0, or axes")
+    if checked.verify:
+        yield source.fault(("verify",), "beside refine; allowed: 0")
+    if "reversals" not in _measures(checked.measure, model):
+        yield source.fault(("measure",), "no reversals, which refine goes by; allowed: reversals among them")

@@ -22,6 +22,8 @@ from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 DEFAULT_MEASURES = ("reversals", "energy_error", "noise_limited")
 
 MAX_CELLS = 1_000_000_000
+MAX_REFINED_CELLS = 2**24
+"""Of a refined run, which holds all its arrays in memory."""
 MAX_STEPS = 1e15
 
 
@@ -146,6 +148,8 @@ class _Top(_Strict):
     """By default `DEFAULT_MEASURES`, as far as the model has them."""
     verify: float = Field(default=0.0, ge=0, le=1)
     """Share of the cells to run again with finer steps."""
+    refine: int = Field(default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1)
+    """Level of the largest blocks of cells whose inside is inferred from their sides: 2^refine cells a side."""
     max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
 
 
@@ -164,6 +168,7 @@ class Config:
     measure: tuple[str, ...]
     max_failed_fraction: float
     verify: float = 0.0
+    refine: int = 0
     cases: dict[str, tuple[float, ...]] | None = None
     """Columns of the table of cases, where there is one."""
     cases_file: str | None = None
@@ -185,6 +190,7 @@ class Config:
             "integrator": self.integrator.model_dump(),
             "measure": list(self.measure),
             "verify": self.verify,
+            "refine": self.refine,
             "max_failed_fraction": self.max_failed_fraction,
         }
 

@@ -1,0 +1,80 @@
+"""A map of 1024 × 1024 cells over μ and b, most of them inferred: what it costs, and how many cells are wrong.
+
+Runs the map with `refine`, then some blocks of its cells in full, drawn at random, and compares.
+Run as `python scripts/refined_map.py`; `--help` tells how to ask for less.  Interrupted, the same
+command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+import sweep
+
+CONFIG = """\
+name: refined_{size}_{depth}
+model: slip
+body: {{a: 10.0, b: {{start: 1.2, stop: 9.8, num: {size}}}, delta: 0.03}}
+friction: {{mu: {{start: 20, stop: 200, num: {size}}}}}
+start: {{n0: 0.05, x0: 0.01, y0: 0.01}}
+integrator: {{method: adams, tolerance: 1.0e-6, t_end: {t_end}}}
+measure: [reversals]
+refine: {depth}
+"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--size", type=int, default=1024, help="cells along each axis (default 1024)")
+    parser.add_argument("--t-end", type=float, default=30_000.0, help="time limit in sqrt(c/g) (default 30000)")
+    parser.add_argument("--depth", type=int, default=4, help="refine: (default 4)")
+    parser.add_argument("--blocks", type=int, default=6, help="blocks run in full (default 6)")
+    parser.add_argument("--side", type=int, default=64, help="cells along each axis of these (default 64)")
+    parser.add_argument("--seed", type=int, default=0, help="of the draw of blocks (default 0)")
+    parser.add_argument(
+        "--output", type=Path, default=Path("runs/refined_map"), help="folder (default runs/refined_map)"
+    )
+    options = parser.parse_args()
+
+    options.output.mkdir(parents=True, exist_ok=True)
+    config = options.output / "refined_map.yaml"
+    config.write_text(CONFIG.format(size=options.size, depth=options.depth, t_end=options.t_end), encoding="utf-8")
+    began = time.perf_counter()
+    refined = sweep.run(config, options.output)
+    print(
+        f"{options.size}²: {refined.attrs['simulated_share']:.2%} simulated, {refined.attrs['wall_time']:.0f} s "
+        f"of simulation, {time.perf_counter() - began:.0f} s in all",
+        flush=True,
+    )
+
+    rng = np.random.default_rng(options.seed)
+    found = []
+    print("μ           b           share   wrong count   status   either")
+    for i, j in rng.integers(0, options.size - options.side + 1, (options.blocks, 2)):
+        block = refined.isel(mu=slice(i, i + options.side), b=slice(j, j + options.side))
+        found.append(compare(block, sweep.run(config, mu=block.mu.values, b=block.b.values, refine=0)))
+        edges = [f"{v.values[0]:5.4g}…{v.values[-1]:<5.4g}" for v in (block.mu, block.b)]
+        print(*edges, tell(found[-1]), flush=True)
+    print(f"{'all blocks':23}", tell(np.mean(found, axis=0)))
+
+
+def compare(block: xr.Dataset, full: xr.Dataset) -> np.ndarray:
+    """Shares of the cells: simulated, of another count, of another status, of either."""
+    count, status = ((block[name] != full[name]).values for name in ("reversals", "status"))
+    simulated = (block.inferred == 0).values
+    assert not (simulated & (count | status)).any(), "a simulated cell differs from the full run"
+    return np.array([simulated.mean(), count.mean(), status.mean(), (count | status).mean()])
+
+
+def tell(shares: np.ndarray) -> str:
+    simulated, *wrong = shares
+    return f"{simulated:6.1%}  " + "  ".join(f"{share:8.3%}" for share in wrong)
+
+
+if __name__ == "__main__":
+    main()
