@@ -1,0 +1,342 @@
+"""Reference reversal counts of 500 random cells of the slip model, firm or marked as not.
+
+A fixed random sample of the parameters a sweep covers, with no cell left out, so that shares of right counts
+mean something.  The equations are the package's own, traced into heyoka.py's Taylor series (errors of
+the derivation are for `scripts/reference_counts.py` to find).
+
+The contact and slip states are divided by `UNIT`: heyoka's tolerance is relative to the largest state, and in
+these units that is the rattle's, however small it gets, and not ω3.  The integral of the spin is an
+eighth state.  Each cell is followed in double precision, then from a start 1e-9 away at another tolerance;
+where these two do not agree on when the last reversal comes, it grew out of round-off, and 80-bit
+arithmetic takes over (which delays it, and may not be enough: `noise_limited`).
+
+    python scripts/reference_counts_500.py data/reference_counts_500.csv
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import heyoka
+import numpy as np
+from reference_spins import traced_rhs
+
+from sweep.models import linear, slip
+from sweep.models.coefficients import rattle_period
+from sweep.models.model import Array, stack
+
+SEED, CELLS = 20250500, 500
+T_END = 30_000.0
+LANES = 8
+UNIT = 2.0**-100
+
+TOLERANCE, OTHER_TOLERANCE, EXTENDED_TOLERANCE = 1e-16, 1e-15, 1.1e-19
+NUDGE = 1 + 1e-9
+
+WINDOWS, SAMPLES = 32, 16
+"""Windows between two looks at a cell, and samples of a window, at which the normal force is seen."""
+
+MARGIN = 2.0
+"""A cell has settled when even this many times the rattle's `reach` would change nothing."""
+
+LINEAR = 1e-6
+"""Reach of a rattle that is taken as linear: the spin it shifts, LINEAR² / 2d, is 1e-9 at a usual distance d = 5e-4."""
+
+SAME_TIME, ROUGHLY_SAME_TIME = 1e-5, 1e-2
+"""Times that do not hang on round-off agree to 1e-7; two that do may meet by chance: one pair agreed to 1e-3 where
+80 bits delay the reversal by 10 %."""
+LEAST_FORCE = 0.1
+"""Between two samples the normal force may be somewhat lower: below this, lift-off is in doubt."""
+
+SPIN = slip.MODEL.spin_state
+RATTLE = [i for i in range(len(slip.MODEL.states)) if i != SPIN]
+SCALE = np.array([1.0 if i == SPIN else UNIT for i in range(len(slip.MODEL.states))])
+
+
+def draw() -> dict[str, Array]:
+    """Parameters of the sample, shape (cells,), in units of c and sqrt(c/g); written with six digits."""
+    random = np.random.default_rng(SEED)
+    columns = {
+        "a": np.full(CELLS, 10.0),
+        "b": random.uniform(1.2, 9.8, CELLS),
+        "c": np.ones(CELLS),
+        "delta": np.full(CELLS, 0.03),
+        "mu": 20 * 10 ** random.random(CELLS),
+        "n0": 0.01 * 10 ** random.random(CELLS),
+        "x0": np.full(CELLS, 0.01),
+        "y0": np.full(CELLS, 0.01),
+    }
+    return {name: np.array([float(f"{value:.6g}") for value in column]) for name, column in columns.items()}
+
+
+# --- integration ------------------------------------------------------------------------------
+
+
+def system() -> list[tuple[Any, Any]]:
+    """Equations of the slip model in multiples of `SCALE`, and of the spin's integral."""
+    *states, integral = heyoka.make_vars(*slip.MODEL.states, "integral")
+    parameters = tuple(heyoka.par[i] for i in range(count_constants()))
+    slopes, (spin, *_) = traced_rhs(slip.MODEL)(tuple(s * k for s, k in zip(states, SCALE, strict=True)), parameters)
+    scaled = [slope * (1 / k) for slope, k in zip(slopes, SCALE, strict=True)]
+    return list(zip([*states, integral], [*scaled, spin], strict=True))
+
+
+def count_constants() -> int:
+    return len(slip.constants({name: np.ones(1) for name in slip.MODEL.parameters}))
+
+
+Advance = Callable[[Array, Array, Array], Array]
+"""(states at grid[0], constants, times) of shapes (8, lanes), (k, lanes), (samples, lanes) -> states at these
+times, shape (samples, 8, lanes)."""
+
+
+def double_precision(tolerance: float) -> Advance:
+    integrator = heyoka.taylor_adaptive_batch(
+        system(), state=np.zeros((8, LANES)), pars=np.ones((count_constants(), LANES)), tol=tolerance
+    )
+
+    def advance(states: Array, constants: Array, times: Array) -> Array:
+        integrator.set_time(0.0)
+        integrator.state[:], integrator.pars[:] = states, constants
+        return np.asarray(integrator.propagate_grid(times)[1])
+
+    return advance
+
+
+def extended_precision() -> Advance:
+    real = np.longdouble
+    integrator = heyoka.taylor_adaptive(
+        system(), state=[real(0)] * 8, pars=[real(1)] * count_constants(), fp_type=real, tol=real(EXTENDED_TOLERANCE)
+    )
+
+    def advance(states: Array, constants: Array, times: Array) -> Array:
+        integrator.time = real(0)
+        integrator.state[:], integrator.pars[:] = states[:, 0], constants[:, 0]
+        return np.asarray(integrator.propagate_grid(times[:, 0])[-1])[:, :, None]
+
+    return advance
+
+
+@dataclass
+class Run:
+    """One cell followed to its end."""
+
+    period: float
+    integrals: list[Any] = field(default_factory=lambda: [0.0])
+    """Of the spin, at successive halves of windows."""
+    least_force: float = np.inf
+    status: str = "running"
+
+    def time(self) -> float:
+        return min(self.period / 2 * (len(self.integrals) - 1), T_END)
+
+    def averages(self, shift: int) -> Array:
+        """Of the spin over the windows, which begin `shift` half windows after the start."""
+        last = int(2 * T_END / self.period)
+        return np.diff(np.array(self.integrals[: last + 1])[shift::2]) / self.period
+
+    def reversals(self, shift: int = 0) -> int:
+        return len(sign_changes(self.averages(shift)))
+
+    def last_reversal(self) -> float:
+        averages = self.averages(0)
+        if not self.reversals():
+            return float("nan")
+        k = sign_changes(averages)[-1]
+        return float(self.period * (k + 0.5 + averages[k] / (averages[k] - averages[k + 1])))
+
+
+def sign_changes(averages: Array) -> Array:
+    """Windows after which the sign changes."""
+    return np.flatnonzero(averages[1:] * averages[:-1] < 0)
+
+
+def follow(columns: dict[str, Array], advance: Advance, lanes: int, real: Any) -> list[Run]:
+    """All cells, `lanes` at a time; a lane whose cell has ended takes the next of similar stiffness."""
+    columns = {name: column.astype(real) for name, column in columns.items()}
+    period, constants = rattle_period(columns), stack(slip.constants(columns))
+    start = np.vstack([stack(slip.start(columns)) / SCALE[:, None], np.zeros((1, len(period)))])
+    runs = [Run(float(p)) for p in period]
+    waiting: Iterator[int] = iter(np.argsort(slip.fastest_decay(columns) * period))
+    steps = np.arange(WINDOWS * SAMPLES + 1)[:, None] / real(SAMPLES)
+
+    held = np.array([next(waiting) for _ in range(lanes)])
+    states = start[:, held]
+    while any(runs[cell].status == "running" for cell in held):
+        path = advance(states, constants[:, held], steps * period[held])
+        states = path[-1].copy()
+        look(runs, held, path, constants[:, held])
+        states[-1] = 0
+        for lane in np.flatnonzero(reach(states[:-1] * SCALE[:, None], constants[:, held]) < LINEAR):
+            if runs[held[lane]].status == "running" and lane == first_lane(held, held[lane]):
+                leap(runs[held[lane]], states[:, lane], constants[:, held[lane]])
+        for lane in np.flatnonzero([runs[cell].status != "running" for cell in held]):
+            # With no cell left, a lane shadows another.
+            if (cell := next(waiting, None)) is not None:
+                held[lane], states[:, lane] = cell, start[:, cell]
+            else:
+                other = next((o for o in range(lanes) if runs[held[o]].status == "running"), lane)
+                held[lane], states[:, lane] = held[other], states[:, other]
+    return runs
+
+
+def look(runs: list[Run], held: Array, path: Array, constants: Array) -> None:
+    """Enter a stretch of all lanes' paths, shape (samples, 8, lanes), and end the cells that are done."""
+    states = np.moveaxis(path[:, :-1] * SCALE[:, None], 1, 0)
+    _, (_, _, force, _) = slip.rhs(tuple(states), tuple(constants))
+    settled = have_settled(states[:, -1].astype(float), constants.astype(float))
+    for cell in np.unique(held):
+        lane, run = first_lane(held, cell), runs[cell]
+        base = run.integrals[-1]
+        run.integrals += [base + part for part in path[SAMPLES // 2 :: SAMPLES // 2, -1, lane]]
+        run.least_force = min(run.least_force, float(force[:, lane].min()))
+        upright = float(states[SPIN, -1, lane]) * run.averages(0)[-1] < 0
+        if run.least_force <= 0:
+            run.status = "lift_off"
+        elif run.time() >= T_END:
+            run.status = "time_limit"
+        elif settled[lane] and upright:
+            run.status = "settled"
+
+
+def first_lane(held: Array, cell: int) -> int:
+    """The lane whose cell it is; later ones shadow it."""
+    return int(np.argmax(held == cell))
+
+
+def reach(states: Array, constants: Array) -> Array:
+    """sqrt(2E/I3): the rattle moves the spin by no more while it decays.  Shape (lanes,).
+
+    The averaged equations (ndotab, abdot) integrate to Δn = sqrt(d² + 2E/I3) - d for a mode of energy E
+    at distance d from its critical spin.
+    """
+    _, rattle, inertia = slip.energy(states.astype(float), constants.astype(float))
+    return np.asarray(np.sqrt(2 * rattle / inertia))
+
+
+def have_settled(states: Array, constants: Array) -> Array:
+    """Whether the rattle decays at all spins that it can reach, with a margin, all of one sign.  Shape (lanes,)."""
+    spin, *_ = slip.energy(states, constants)
+    within = MARGIN * reach(states, constants)
+    near = [spin + share * within for share in np.linspace(-1, 1, 5)]
+    decays = np.all([linear.growth_rate(slip.MODEL, constants, n) < 0 for n in near], axis=0)
+    return np.asarray(decays & (within < np.abs(spin)))
+
+
+# --- while the rattle is tiny -----------------------------------------------------------------
+
+
+def leap(run: Run, states: Array, constants: Array) -> None:
+    """Carry each mode by its own exponential, at constant spin, until the rattle matters; in place."""
+    values, modes = eigenpairs(jacobian(constants, -states[SPIN]))
+    amplitudes = solve(modes, states[RATTLE][:, None].astype(np.clongdouble))[:, 0]
+    halves = np.arange(1, 2 * WINDOWS + 1) / 2
+    factors = np.exp(values * np.longdouble(WINDOWS * run.period))
+    while run.time() < T_END and reach(states[:-1] * SCALE, constants) < LINEAR:
+        amplitudes *= factors
+        states[RATTLE] = (modes @ amplitudes).real
+        base = run.integrals[-1]
+        run.integrals += [base - states[SPIN] * run.period * half for half in halves]
+    if run.time() >= T_END:
+        run.status = "time_limit"
+
+
+def jacobian(constants: Array, spin: Any) -> Array:
+    """Of the rattle at upright spin, in 80-bit arithmetic by complex steps, shape (6, 6)."""
+    step, columns = np.longdouble(1e-30), []
+    for i in RATTLE:
+        states = np.array(slip.MODEL.upright(spin)).astype(np.clongdouble)
+        states[i] += 1j * step
+        columns.append(np.array(slip.rhs(states, constants.astype(np.longdouble))[0])[RATTLE].imag / step)
+    return np.array(columns).T
+
+
+def eigenpairs(matrix: Array) -> tuple[Array, Array]:
+    """Eigenvalues and -vectors in 80-bit arithmetic: Newton steps from those in double precision."""
+    _, vectors = np.linalg.eig(matrix.astype(float))
+    vectors = vectors.astype(np.clongdouble)
+    for _ in range(3):
+        image = solve(vectors, matrix @ vectors)
+        values = np.diag(image)
+        distance = values[None, :] - values[:, None] + np.eye(len(matrix))
+        vectors = vectors + vectors @ ((image - np.diag(values)) / distance)
+    return values.copy(), vectors
+
+
+def solve(matrix: Array, right: Array) -> Array:
+    """matrix⁻¹ right in 80-bit arithmetic, by refinement of double precision's."""
+    inverse = np.linalg.inv(matrix.astype(complex))
+    # Products in 80 bits: columns of very different sizes keep their own precision.
+    result = inverse @ right
+    for _ in range(3):
+        result = result + inverse @ (right - matrix @ result)
+    return np.asarray(result)
+
+
+# --- the table --------------------------------------------------------------------------------
+
+
+def differ(one: Run, other: Run, tolerance: float) -> bool:
+    """In count, end or the time of the last reversal."""
+    if (one.reversals(), one.status) != (other.reversals(), other.status):
+        return True
+    return abs(one.last_reversal() - other.last_reversal()) > tolerance * other.last_reversal()
+
+
+def row(columns: dict[str, Array], cell: int, runs: list[Run]) -> dict[str, Any]:
+    """Of the runs of one cell, the last is taken for the best."""
+    best, limited = runs[-1], any(differ(run, runs[-1], ROUGHLY_SAME_TIME) for run in runs[:-1])
+    counts = {run.reversals(shift) for run in runs for shift in (0, 1)}
+    ends = {run.status for run in runs}
+    firm = len(counts) == len(ends) == 1 and all(run.least_force > LEAST_FORCE for run in runs)
+    return {
+        **{name: f"{column[cell]:g}" for name, column in columns.items()},
+        "reversals": best.reversals(),
+        "t_last_reversal": f"{best.last_reversal():.4f}",
+        "status": best.status,
+        "settled": int(best.status == "settled"),
+        "t_stop": f"{best.time():.2f}",
+        "firm": int(firm),
+        "noise_limited": int(limited),
+        "bits": 80 if len(runs) == 3 else 64,
+    }
+
+
+def all_runs(columns: dict[str, Array]) -> list[list[Run]]:
+    """Of each cell: in double precision, from the nudged start and to the first start again, at need in 80 bits."""
+    nudged = columns | {"x0": columns["x0"] * NUDGE}
+    doubled = [
+        follow(nudged, double_precision(OTHER_TOLERANCE), LANES, float),
+        follow(columns, double_precision(TOLERANCE), LANES, float),
+    ]
+    print(f"in double precision: {time.process_time():.0f} s", flush=True)
+    runs = [list(pair) for pair in zip(*doubled, strict=True)]
+    extended = extended_precision()
+    for cell, pair in enumerate(runs):
+        if differ(*pair, SAME_TIME):
+            alone = {name: column[[cell]] for name, column in columns.items()}
+            began = time.process_time()
+            pair += follow(alone, extended, 1, np.longdouble)
+            print(f"cell {cell} in 80 bits: {time.process_time() - began:.0f} s", flush=True)
+    return runs
+
+
+def main(output: Path) -> None:
+    columns = draw()
+    runs = all_runs(columns)
+    rows = [row(columns, cell, of_cell) for cell, of_cell in enumerate(runs)]
+    with output.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"{time.process_time():.0f} s of CPU time")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
