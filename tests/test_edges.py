@@ -30,7 +30,7 @@ def invoke(*arguments: str | Path) -> Result:
         (["integrator.step=1e-320"], "steps to t_end; allowed: at most 1e+15"),
         (["mu=1e300"], "allowed: a finite number >= 0 and < 1e+12"),
         (["n0=1e200"], "< 1000"),
-        (["mu={start: 1, stop: 2, num: 10000}", "n0={start: 1, stop: 2, num: 10000}"], "100000000 cells; allowed"),
+        (["mu={start: 1, stop: 2, num: 100000}", "n0={start: 1, stop: 2, num: 100000}"], "10000000000 cells; allowed"),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("dry", [[], ["--dry-run"]], ids=["run", "dry"])
