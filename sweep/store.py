@@ -27,6 +27,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sweep.config import files
+from sweep.config.faults import printable
 from sweep.grid import Array
 
 
@@ -55,8 +56,8 @@ class Identity:
         """Why a run of `other` cannot go on from this one; "" if it can."""
         if self.config_hash != other.config_hash:
             old, new = (c.config.splitlines() for c in (self, other))
-            changed = [f"- {line.strip()}" for line in old if line not in new]
-            changed += [f"+ {line.strip()}" for line in new if line not in old]
+            changed = [f"- {printable(line.strip())}" for line in old if line not in new]
+            changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
             return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs"])
         if self.source_hash != other.source_hash:
             return "other sources of the model or kernel, or other versions of numpy or numba"

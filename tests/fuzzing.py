@@ -185,7 +185,7 @@ def _round_trip(config: Any, folder: Path) -> None:
     other = load_config(again)
     if (other.fingerprint(), list(other.axes)) != (config.fingerprint(), list(config.axes)):
         raise Violation(f"read again, another configuration:\n{config.to_yaml()}\n{other.to_yaml()}")
-    if not (folder / config.name).resolve().parent == folder.resolve():
+    if Path(os.path.normpath(folder / config.name)).parent != folder or not config.name.isprintable():
         raise Violation(f"a name that leaves the folder: {config.name!r}")
 
 
@@ -406,6 +406,7 @@ def _in_child(work: Callable[[], bool], seconds: int = 60) -> bool:
     if not child:
         code = 2
         try:
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)  # nothing may wait longer, not even in C
             signal.alarm(seconds)
             code = 0 if work() else 1
         except BaseException as error:
@@ -429,14 +430,18 @@ CRASHES: list[int] = []
 
 
 def _read(random: Random, file: Path, folder: Path) -> bool:
-    accepted = _invoke(folder, "info", str(file))
-    if random.random() < 0.15:
-        variable = random.choice((None, None, "status", "mu", "spin_final", "form_factor", "nothing", "../x", ""))
-        target = folder / "picture.png"
-        accepted &= _invoke(
-            folder, "plot", str(file), "--output", str(target), *(("--var", variable) if variable else ())
-        )
-        target.unlink(missing_ok=True)
+    """`info` on a file, and now and then `plot`."""
+    target = folder / "picture.png"
+    variable = random.choice((None, None, "status", "mu", "spin_final", "form_factor", "nothing", "../x", ""))
+    plot = ["plot", str(file), "--output", str(target), *(("--var", variable) if variable is not None else ())]
+    verbs = [["info", str(file)], *([plot] if random.random() < 0.15 else [])]
+
+    def work() -> bool:
+        results = [_invoke(folder, *arguments) for arguments in verbs]
+        return all(results)
+
+    accepted = _in_child(work)
+    target.unlink(missing_ok=True)
     return accepted
 
 
@@ -450,7 +455,7 @@ def damaged(random: Random, folder: Path) -> bool:
     if random.random() < 0.1:
         del data[random.randrange(len(data)) :]
     file.write_bytes(data)
-    return _in_child(lambda: _read(random, file, folder))
+    return _read(random, file, folder)
 
 
 def foreign(random: Random, folder: Path) -> bool:
@@ -459,7 +464,8 @@ def foreign(random: Random, folder: Path) -> bool:
              "wall_time", "spin_final", "form_factor", "b", "mu", "temperature")  # fmt: skip
     dims = {"b": 6, "mu": random.choice((0, 1, 7)), "time": random.choice((0, 3, 20)), "lat": 2}
     odd: dict[str, Any] = {
-        "title": random.choice(("a", "$\\frac", "\x1b[2J", "é\nb", 3, [1, 2])), "flag_values": [1, 2], "flag_meanings": "a b",
+        "title": random.choice(("a", "$\\frac", "\x1b[2J", "é\nb", 3, [1, 2])), "flag_values": [1, 2],
+        "flag_meanings": "a b",
         "units": random.choice(("days since 2000", "s", 3)), "wall_time": random.choice((1.0, "x")),
         "scale_factor": random.choice((2.0, "x")),
     }  # fmt: skip
@@ -484,7 +490,7 @@ def foreign(random: Random, folder: Path) -> bool:
             xr.Dataset(variables, attrs=attributes()).to_netcdf(file, engine="netcdf4")
         except (ValueError, TypeError):  # xarray itself does not write this one
             return False
-    return _in_child(lambda: _read(random, file, folder))
+    return _read(random, file, folder)
 
 
 KINDS: dict[str, Callable[[Random, Path], bool]] = {
