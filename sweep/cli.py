@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sweep.config.faults import ConfigError, Fault
+from sweep.config.faults import ConfigError, Fault, brief, printable
 from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
@@ -84,7 +86,7 @@ def run(
                 sys.exit(INTERRUPTED)
         if not quiet:
             click.echo(_summary(result))
-            click.echo(f"wrote {folder / checked.name}.nc and .png")
+            _say(f"wrote {folder / checked.name}.nc and .png")
         failed = _failed_fraction(result)
         if failed > checked.max_failed_fraction:
             allowed = f"max_failed_fraction {checked.max_failed_fraction:.2%}"
@@ -120,7 +122,7 @@ def trajectory(config: Path, cells: tuple[str, ...], output: Path | None, settin
         result = follow(checked, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
         files.save_result(result, trajectory_plot.draw(result))
-        click.echo(f"wrote {files.dataset} and .png")
+        _say(f"wrote {files.dataset} and .png")
 
 
 @main.command()
@@ -146,7 +148,7 @@ def critical(config: Path, width: float, output: Path | None, settings: tuple[st
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_critical")
         files.save_result(result, plots.draw_critical(result))
         if not quiet:
-            click.echo(f"wrote {files.dataset} and .png")
+            _say(f"wrote {files.dataset} and .png")
 
 
 @main.command()
@@ -201,17 +203,15 @@ def plot(file: Path, variable: str | None, output: Path | None) -> None:
     """Draw the maps of a dataset again."""
     with _explained():
         from sweep import plots
-        from sweep.store import StoreError, open_dataset, replacing
+        from sweep.store import open_dataset, replacing
 
         dataset = open_dataset(file)
-        target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
-        try:
+        with _about(file):
             figure = plots.draw(dataset, variable)
-        except (ValueError, KeyError) as error:
-            raise StoreError(f"{file}: {error}") from None
-        with replacing(target) as temporary:
-            figure.savefig(temporary, format="png")
-        click.echo(f"wrote {target}")
+            target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
+            with replacing(target) as temporary:
+                figure.savefig(temporary, format="png")
+        _say(f"wrote {target}")
 
 
 @main.command()
@@ -224,13 +224,33 @@ def info(file: Path) -> None:
         dataset = open_dataset(file)
         if "status" not in dataset:
             raise StoreError(f"{file}: not a dataset of sweep: no variable status")
-        click.echo(dataset.attrs.get("title", file.name))
-        click.echo(_summary(dataset))
-        for name, variable in dataset.data_vars.items():
-            click.echo(f"  {name} ({', '.join(map(str, variable.dims))}): {variable.attrs.get('long_name', '')}")
-        for key in sorted(set(dataset.attrs) - {"title", "config"}):
-            click.echo(f"{key}: {dataset.attrs[key]}")
-        click.echo(f"config:\n{dataset.attrs.get('config', '')}")
+        with _about(file):
+            lines = [str(dataset.attrs.get("title", file.name)), _summary(dataset)]
+            for name, variable in dataset.data_vars.items():
+                lines.append(f"  {name} ({', '.join(map(str, variable.dims))}): {variable.attrs.get('long_name', '')}")
+            lines += [f"{key}: {dataset.attrs[key]}" for key in sorted(set(dataset.attrs) - {"title", "config"})]
+            lines.append(f"config:\n{dataset.attrs.get('config', '')}")
+        _say("\n".join(lines))
+
+
+def _say(text: str, *, err: bool = False) -> None:
+    """Print lines that may quote files and their names."""
+    click.echo("\n".join(map(printable, text.split("\n"))), err=err)
+
+
+@contextmanager
+def _about(file: Path) -> Iterator[None]:
+    """Whatever a dataset of another program makes of what reads it is a fault of the file."""
+    from sweep.store import StoreError
+
+    try:
+        yield
+    except (StoreError, OSError):
+        raise
+    except Exception as error:
+        known = isinstance(error, ValueError) and "allowed" in str(error)
+        reason = str(error) if known else f"not a dataset of sweep: {type(error).__name__}: {error}"
+        raise StoreError(f"{file}: {reason}".splitlines()[0]) from None
 
 
 class _explained:
@@ -245,10 +265,10 @@ class _explained:
         from sweep.store import StoreError
 
         if isinstance(error, ConfigError | StoreError):
-            click.echo(str(error), err=True)
+            _say(str(error), err=True)
             sys.exit(WRONG_INPUT)
         if isinstance(error, OSError):
-            click.echo(f"{error.filename or 'a file'}: {error.strerror or error}", err=True)
+            _say(f"{error.filename or 'a file'}: {error.strerror or error}", err=True)
             sys.exit(WRONG_INPUT)
         if isinstance(error, KeyboardInterrupt):
             click.echo("interrupted", err=True)
@@ -262,17 +282,18 @@ def _parse_settings(settings: tuple[str, ...]) -> dict[str, Any]:
     for setting in settings:
         path, equals, value = setting.partition("=")
         if not (equals and path):
-            raise ConfigError([Fault(f"--set {setting}", None, None, (), "not a setting; allowed: PATH=VALUE")])
-        parsed[path] = parse_value(value, f"--set {path}")
+            raise ConfigError([Fault(f"--set {brief(setting)}", None, None, (), "not a setting; allowed: PATH=VALUE")])
+        parsed[path] = parse_value(value, f"--set {brief(path)}")
     return parsed
 
 
 def _parse_pair(text: str, option: str) -> tuple[str, float]:
+    from sweep.config.document import number
+
     name, _, value = text.partition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        raise ConfigError([Fault(f"{option} {text}", None, None, (), "allowed: NAME=NUMBER")]) from None
+    if (parsed := number(value)) is None:
+        raise ConfigError([Fault(f"{option} {brief(text)}", None, None, (), "allowed: NAME=NUMBER")])
+    return name, parsed
 
 
 def _estimate(config: Config) -> str:

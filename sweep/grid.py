@@ -143,8 +143,9 @@ def _off_the_body(p: Mapping[str, Array]) -> str:
     if "x0" not in p:
         return ""
     cos, sin = np.cos(p["delta"]), np.sin(p["delta"])
-    x, y = p["x0"] * cos - p["y0"] * sin, p["x0"] * sin + p["y0"] * cos
-    outside = np.flatnonzero((x / p["a"]) ** 2 + (y / p["b"]) ** 2 >= 1)
+    with np.errstate(over="ignore"):  # infinity is off the body as well
+        x, y = p["x0"] * cos - p["y0"] * sin, p["x0"] * sin + p["y0"] * cos
+        outside = np.flatnonzero((x / p["a"]) ** 2 + (y / p["b"]) ** 2 >= 1)
     if not len(outside):
         return ""
     i = outside[0]

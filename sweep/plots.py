@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import product
 from typing import Any
@@ -50,10 +51,11 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     long = [d for d in dims if dataset.sizes[d] > _PANEL_VALUES]
     long = long or sorted(dims, key=lambda d: -dataset.sizes[d])[:1]
     across = long[:2]
-    panels = list(_panels(dataset, [d for d in dims if d not in across]))
-    if len(panels) > _MAX_ROWS:
-        shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in dims if d not in across)
-        raise ValueError(f"{len(panels)} panels ({shown}); allowed: {_MAX_ROWS}, select a part of the dataset first")
+    rest = [d for d in dims if d not in across]
+    if (count := math.prod(dataset.sizes[d] for d in rest)) > _MAX_ROWS:
+        shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
+        raise ValueError(f"{count} panels ({shown}); allowed: {_MAX_ROWS}, select a part of the dataset first")
+    panels = list(_panels(dataset, rest))
     painter = _maps if len(across) == 2 else _curves
     return painter(dataset, names, across, panels)
 

@@ -27,6 +27,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from sweep.config import files
+from sweep.config.faults import printable
 from sweep.grid import Array
 
 _PROBE = 1 << 22
@@ -49,12 +51,19 @@ class Identity:
     versions: str
     """Of this program and of those libraries."""
 
+    @classmethod
+    def of(cls, raw: Any) -> Identity:
+        """The identity that a file says; `ValueError` if it says none."""
+        if not isinstance(raw, dict) or {str} != set(map(type, raw.values())) or set(raw) != set(cls.__annotations__):
+            raise ValueError("no identity of a run")
+        return cls(**raw)
+
     def difference(self, other: Identity) -> str:
         """Why a run of `other` cannot go on from this one; "" if it can."""
         if self.config_hash != other.config_hash:
             old, new = (c.config.splitlines() for c in (self, other))
-            changed = [f"- {line.strip()}" for line in old if line not in new]
-            changed += [f"+ {line.strip()}" for line in new if line not in old]
+            changed = [f"- {printable(line.strip())}" for line in old if line not in new]
+            changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
             return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs"])
         if self.versions != other.versions:
             return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
@@ -73,8 +82,8 @@ class Checkpoint:
         head = folder / "identity.json"
         if head.exists():
             try:
-                found = Identity(**json.loads(head.read_text(encoding="utf-8")))
-            except (OSError, ValueError, TypeError) as error:
+                found = Identity.of(json.loads(files.read(head, files.MIB)))
+            except (OSError, ValueError, RecursionError) as error:
                 raise StoreError(f"{head}: damaged ({error}); start again with --fresh") from None
             _refuse_other(folder, found, identity)
         else:
@@ -108,7 +117,12 @@ class Checkpoint:
         tables = self._read(self.folder / "running.npz")
         if tables is None or not {"tiles", "seconds"} <= set(tables):
             return None
-        tiles, seconds = tables.pop("tiles").tolist(), float(tables.pop("seconds"))
+        numbers, spent = tables.pop("tiles"), tables.pop("seconds")
+        if (numbers.ndim, numbers.dtype.kind, spent.ndim, spent.dtype.kind) != (1, "i", 0, "f"):
+            return None
+        tiles, seconds = numbers.tolist(), float(spent)
+        if not tiles or len(set(tiles)) < len(tiles) or any(table.dtype.kind != "f" for table in tables.values()):
+            return None
         return None if self.done & set(tiles) else (tiles, tables, seconds)
 
     def _stamp(self, path: Path, names: Iterable[str]) -> str:
@@ -124,6 +138,8 @@ class Checkpoint:
     def _read(self, path: Path) -> dict[str, Array] | None:
         """The arrays in a file of this run, whose checksums have been looked at; None where it cannot be read."""
         try:
+            if path.exists() and not path.is_file():
+                raise OSError("not a file")  # opening a pipe would wait for its other end
             with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
                 if damaged := archive.zip.testzip():  # numpy's reading ends where a damaged header says
                     raise ValueError(f"checksum of {damaged}")
@@ -300,15 +316,29 @@ def _refuse_other(path: Path, found: Identity, wanted: Identity) -> None:
 
 def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
     """Read a dataset, into memory or as it is asked for; `StoreError` if it is none."""
+    if not path.is_file():
+        raise StoreError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     try:
-        dataset = xr.open_dataset(path, engine="netcdf4")
+        if load:
+            _refuse_larger_than_memory(path)
+        dataset = xr.open_dataset(path, engine="netcdf4", decode_times=False)
         if load:
             with dataset:
                 dataset.load()
         return dataset
-    except (OSError, ValueError, RuntimeError) as error:
-        reason = "no such file" if not path.exists() else f"not a netCDF dataset: {error}"
-        raise StoreError(f"{path}: {reason}") from None
+    except StoreError:
+        raise
+    except Exception as error:  # what damaged files make HDF5, netCDF and xarray raise is not listed anywhere
+        raise StoreError(f"{path}: not a netCDF dataset: {error}") from None
+
+
+def _refuse_larger_than_memory(path: Path) -> None:
+    """A file of a few bytes can declare any number of values."""
+    with netCDF4.Dataset(path) as file:
+        size = sum(variable.size * np.dtype(variable.dtype).itemsize for variable in file.variables.values())
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if size > memory:
+        raise StoreError(f"{path}: {size / 2**30:.3g} GiB of data; allowed: at most {memory / 2**30:.3g}, the memory")
 
 
 @contextmanager

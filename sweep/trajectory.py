@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,9 @@ from sweep.run import as_config, simulated, with_dopri5
 
 SAMPLES_A_RADIAN = 3
 """Samples in a radian of the fastest motion: nearly twenty a period."""
+
+MAX_TRAJECTORIES = 1000
+"""All combinations of what is asked for are followed, and each is held in memory as a whole."""
 
 # name: units, long_name
 SERIES: dict[str, tuple[str, str]] = {
@@ -104,6 +108,8 @@ def _choose(config: Config, at: dict[str, list[float]]) -> Config:
     ]
     if faults:
         raise ConfigError(faults)
+    if (count := prod(map(len, at.values()))) > MAX_TRAJECTORIES:
+        raise ConfigError([Fault("--at", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
     combinations = list(product(*at.values())) if at else [()]
     cases = {
         name: tuple(dict(zip(at, values, strict=True)).get(name, constant) for values in combinations)

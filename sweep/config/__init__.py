@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from sweep.config import cases, document, schema
-from sweep.config.faults import ConfigError, Fault
+from sweep.config.faults import ConfigError, Fault, brief
 from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.kernels import methods
@@ -22,9 +22,6 @@ from sweep.models.model import Model, Tier
 from sweep.parameters import PARAMETERS
 
 __all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "load_config"]
-
-# Maps are drawn with μ downwards and b across, a panel for each n0; other axes follow as written.
-_FIRST_AXES = ("mu", "b", "n0")
 
 
 def load_config(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -44,8 +41,10 @@ def load_config(path: str | Path, overrides: Mapping[str, Any] | None = None) ->
     source = document.read(Path(path))
     for key, value in (overrides or {}).items():
         plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-        source.set(_full_path(key), plain, f"--set {key}")
-    source.values.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "_", Path(path).stem))
+        source.set(_full_path(key), plain, f"--set {brief(key)}")
+    # A name that nobody gave is none to refuse.
+    stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(path).stem).lstrip("._-")[:100]
+    source.values.setdefault("name", stem or "sweep")
     try:
         checked = schema.Schema.model_validate(source.values)
     except ValidationError as error:
@@ -71,7 +70,7 @@ def _resolve(checked: Any, source: document.Document) -> Config:
     }
     columns = cases.read(source, checked.cases) if checked.cases is not None else None
     faults = list(_misfits(checked, given, columns, source))
-    order = sorted(model.parameters, key=lambda n: (_rank(n, _FIRST_AXES), _rank(n, tuple(given))))
+    order = sorted(model.parameters, key=lambda n: (_rank(n, schema.FIRST_AXES), _rank(n, tuple(given))))
     parameters = {}
     for name in order:
         default = PARAMETERS[name].default
@@ -129,8 +128,9 @@ def _unusable_step(config: Config) -> str:
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
     # A window of the period-averaged spin closes at most once a step.
-    longest = min(float(rattle_period(columns).min()) / 2 for columns in distinct(Grid.of(config), BODY))
-    return f"{step:g}; allowed: auto, or at most {longest:.3g}, half a rattle's period" if step > longest else ""
+    with np.errstate(all="ignore"):  # a body that is next to nothing has a period of NaN
+        longest = min(float(rattle_period(columns).min()) / 2 for columns in distinct(Grid.of(config), BODY))
+    return "" if step <= longest else f"{step:g}; allowed: auto, or at most {longest:.3g}, half a rattle's period"
 
 
 def _measures(asked: list[str] | None, model: Tier) -> tuple[str, ...]:

@@ -1,14 +1,25 @@
-"""Tables of cases: a CSV file with a column a parameter and a row a trajectory."""
+"""Tables of cases: a CSV file with a column a parameter and a row a trajectory.
+
+A configuration may name any file, so little of one that is no table is told: of a file without a
+column that is a parameter, the first cell, shortened; otherwise each cell that is wrong.
+"""
 
 from __future__ import annotations
 
 import csv
+import io
+from collections.abc import Iterator
+from itertools import islice
+from math import isfinite, nan
 from pathlib import Path
 
-from sweep.config.document import Document
-from sweep.config.faults import ConfigError, Fault
+from sweep.config import files
+from sweep.config.document import Document, number
+from sweep.config.faults import ConfigError, Fault, brief, quote
+from sweep.config.schema import MAX_AXIS
 from sweep.parameters import PARAMETERS
 
+LIMIT = 32 * files.MIB
 _MAX_FAULTS = 20
 
 
@@ -16,49 +27,66 @@ def read(source: Document, name: str) -> dict[str, tuple[float, ...]]:
     """Columns of the table `name` (relative to the configuration's folder), checked cell by cell."""
     path = Path(source.file).parent / name
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = list(csv.reader(stream, strict=True))
+        return _columns(str(path), files.read(path, LIMIT))
     except FileNotFoundError:
-        raise ConfigError([source.fault(("cases",), f"{name}: no such file in {path.parent}")]) from None
-    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
-        raise ConfigError([source.fault(("cases",), f"{name}: not a readable CSV file: {error}")]) from None
-    header = [cell.strip() for cell in rows[0]] if rows else []
-    faults = _header_faults(str(path), header)
+        reason = f"no such file in {path.parent}"
+    except OSError as error:
+        reason = f"cannot be read: {error.strerror}"
+    except UnicodeDecodeError as error:
+        reason = f"not UTF-8 text: byte {error.start}"
+    except csv.Error as error:
+        reason = f"not a readable CSV file: {error}"
+    raise ConfigError([source.fault(("cases",), f"{brief(name)}: {reason}")])
+
+
+def _columns(file: str, text: str) -> dict[str, tuple[float, ...]]:
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    header = [cell.strip() for cell in next(reader, [])]
+    faults = _header_faults(file, header)
     table: list[list[float]] = []
-    for line, row in enumerate(rows[1:], start=2):
-        if not row or faults[_MAX_FAULTS:]:
+    for row in reader:
+        if faults[_MAX_FAULTS:]:
+            break
+        if not row:
             continue
+        line = reader.line_num
         if len(row) != len(header):
-            faults.append(Fault(str(path), line, None, (), f"{len(row)} values; allowed: {len(header)}, as in line 1"))
-            continue
-        if not faults:
-            table.append([_number(str(path), line, column, header, row, faults) for column in range(len(row))])
+            faults.append(Fault(file, line, None, (), f"{len(row)} values; allowed: {len(header)}, as in line 1"))
+        elif len(table) == MAX_AXIS:
+            faults.append(Fault(file, line, None, (), f"too many rows; allowed: at most {MAX_AXIS}"))
+            break
+        elif not faults:
+            table.append([_number(file, line, column, header, row, faults) for column in range(len(row))])
     if not faults and not table:
-        faults.append(Fault(str(path), None, None, (), "no cases; allowed: a row or more under the header"))
+        faults.append(Fault(file, None, None, (), "no cases; allowed: a row or more under the header"))
     if faults:
         raise ConfigError(faults)
     return {key: tuple(row[i] for row in table) for i, key in enumerate(header)}
 
 
 def _header_faults(file: str, header: list[str]) -> list[Fault]:
-    faults = []
+    allowed = ", ".join(PARAMETERS)
     if not header:
-        return [Fault(file, None, None, (), f"empty; line 1 names the columns: {', '.join(PARAMETERS)}")]
+        return [Fault(file, None, None, (), f"empty; line 1 names the columns: {allowed}")]
+    if not set(header) & set(PARAMETERS):
+        return [Fault(file, 1, 1, (), f"{quote(header[0])}: unknown parameter; allowed: {allowed}")]
+    return list(islice(_misnamed(file, header), _MAX_FAULTS))
+
+
+def _misnamed(file: str, header: list[str]) -> Iterator[Fault]:
+    seen = set()
     for column, name in enumerate(header, start=1):
         if name not in PARAMETERS:
-            faults.append(Fault(file, 1, column, (name,), f"unknown parameter; allowed: {', '.join(PARAMETERS)}"))
-        elif name in header[: column - 1]:
-            faults.append(Fault(file, 1, column, (name,), "a column twice; allowed: each once"))
-    return faults
+            yield Fault(file, 1, column, (name,), f"unknown parameter; allowed: {', '.join(PARAMETERS)}")
+        elif name in seen:
+            yield Fault(file, 1, column, (name,), "a column twice; allowed: each once")
+        seen.add(name)
 
 
 def _number(file: str, line: int, column: int, header: list[str], row: list[str], faults: list[Fault]) -> float:
-    parameter = PARAMETERS[header[column]]
-    try:
-        value = float(row[column])
-    except ValueError:
-        value = float("nan")
-    if not parameter.allows(value) or value in (float("inf"), float("-inf")):
-        message = f"{row[column].strip()!r}; allowed: {parameter.allowed}"
-        faults.append(Fault(file, line, column + 1, (parameter.name,), message))
+    parameter, text = PARAMETERS[header[column]], row[column].strip()
+    value = number(text)
+    if value is None or not isfinite(value) or not parameter.allows(value):
+        faults.append(Fault(file, line, column + 1, (parameter.name,), f"{quote(text)}; allowed: {parameter.allowed}"))
+        return nan
     return value

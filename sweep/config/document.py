@@ -2,6 +2,7 @@
 
 YAML 1.2: 1e-3 is a number and `no` a word.  Only plain data passes: tags, anchors and duplicate
 keys are refused, so nothing in a file can run code, repeat itself without end or hide a line.
+A document has at most `LIMIT` bytes: reading takes some 20 s a megabyte.
 """
 
 from __future__ import annotations
@@ -12,15 +13,16 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
+from sweep.config import files
 from sweep.config.faults import ConfigError, Fault, Path
+
+LIMIT = 1 * files.MIB
 
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _SPECIAL = {".inf": float("inf"), "-.inf": float("-inf"), ".nan": float("nan")}
-# What an untagged node can resolve to; timestamps and the like are read as the words they look like.
-_PLAIN = {"map", "seq", "str", "int", "float", "bool", "null", "timestamp", "merge", "value"}
 _WORDS: dict[str, bool | None] = {
     "true": True, "True": True, "false": False, "False": False, "null": None, "~": None, "": None,
 }  # fmt: skip
@@ -51,7 +53,8 @@ class Document:
         for part in path[:-1]:
             section = section.setdefault(part, {})
             if not isinstance(section, dict):
-                raise ConfigError([Fault(source, None, None, path, f"{part} is not a section")])
+                allowed = "a path through sections to a key"
+                raise ConfigError([Fault(source, None, None, path, f"{part} is not a section; allowed: {allowed}")])
         section[path[-1]] = value
         for table in (self.keys, self.places):
             for old in [p for p in table if p[: len(path)] == path]:
@@ -63,7 +66,7 @@ def read(path: FilePath) -> Document:
     """Read a YAML file; `ConfigError` says what is wrong with it and where."""
     document = Document(str(path))
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = files.read(path, LIMIT)
     except FileNotFoundError:
         raise ConfigError([Fault(str(path), None, None, (), "no such file")]) from None
     except OSError as error:
@@ -98,7 +101,7 @@ def _compose(text: str, file: str) -> Node | None:
         line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
         problem = (error.problem or error.context or "not YAML").split("\n")[0]
         raise ConfigError([Fault(file, line, column, (), f"not YAML: {problem}")]) from None
-    except (YAMLError, RecursionError, ValueError) as error:
+    except Exception as error:  # ruamel lets escape what chr() and its own recursion raise, and more
         problem = "nested too deeply" if isinstance(error, RecursionError) else str(error).split("\n")[0]
         raise ConfigError([Fault(file, None, None, (), f"not YAML: {problem}")]) from None
 
@@ -108,8 +111,9 @@ def _convert(node: Node, path: Path, document: Document, faults: list[Fault]) ->
         return document.file, of.start_mark.line + 1, of.start_mark.column + 1
 
     document.places[path] = place(node)
-    # An alias leads back to a node with an anchor, so none is ever followed.
-    if node.anchor or str(node.tag).removeprefix("tag:yaml.org,2002:") not in _PLAIN:
+    # An alias leads back to a node with an anchor, so none is ever followed.  A node starts with its
+    # tag; what it resolves to by itself, such as a timestamp, is read as the word it looks like.
+    if node.anchor or node.start_mark.buffer[node.start_mark.pointer] == "!":
         faults.append(Fault(*place(node), path, "a YAML tag or anchor; allowed: plain values"))
         return None
     if isinstance(node, ScalarNode):
@@ -139,6 +143,12 @@ def _scalar(node: ScalarNode) -> str | float | int | bool | None:
         return _WORDS[text]
     if text.lower() in _SPECIAL:
         return _SPECIAL[text.lower()]
-    if _FLOAT.fullmatch(text):
-        return int(text) if text.lstrip("+-").isdigit() and len(text) < 19 else float(text)
-    return text
+    value = number(text)
+    if value is None:
+        return text
+    return int(text) if text.lstrip("+-").isdigit() and len(text) < 19 else value
+
+
+def number(text: str) -> float | None:
+    """The number that `text` spells in plain decimal digits; None if it is none."""
+    return float(text) if _FLOAT.fullmatch(text) else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from dataclasses import dataclass
 
 Path = tuple[str | int, ...]
@@ -11,9 +12,33 @@ Path = tuple[str | int, ...]
 def spell(path: Path) -> str:
     """body.b[2] for ("body", "b", 2)."""
     text = ""
-    for part in path:
+    for part in (brief(part, 60) if isinstance(part, str) else part for part in path):
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
     return text
+
+
+_MAX_LINES = 100
+
+_REPR = reprlib.Repr()
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 60
+
+
+def quote(value: object) -> str:
+    """A value as it was given, or its beginning and end where it is long."""
+    try:
+        return _REPR.repr(value)
+    except ValueError:  # Python does not spell integers of more than 4300 digits
+        return "a number of thousands of digits"
+
+
+def brief(text: str, limit: int = 200) -> str:
+    """`text`, without its middle where it is long."""
+    return text if len(text) <= limit else f"{text[: limit // 2]}…{text[-limit // 2 :]}"
+
+
+def printable(text: str) -> str:
+    """`text` on one line that does nothing to a terminal and that every encoding can write."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 @dataclass(frozen=True)
@@ -28,12 +53,15 @@ class Fault:
 
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
-        return ": ".join(part for part in (place, spell(self.path), self.message) if part)
+        return printable(": ".join(part for part in (place, spell(self.path), self.message) if part))
 
 
 class ConfigError(Exception):
     """A configuration that cannot be run; `faults` has one entry per thing to mend."""
 
     def __init__(self, faults: list[Fault]) -> None:
-        super().__init__("\n".join(map(str, faults)))
+        lines = [str(fault) for fault in faults[:_MAX_LINES]]
+        if more := len(faults) - len(lines):
+            lines.append(f"{printable(faults[0].file)}: and {more} more")
+        super().__init__("\n".join(lines))
         self.faults = faults

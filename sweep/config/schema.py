@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
+import sys
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -14,6 +14,7 @@ from pydantic_core import PydanticCustomError
 from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
+from sweep.config.faults import quote
 from sweep.kernels.lanes import MEASURES, TOLERANCE
 from sweep.kernels.methods import METHODS
 from sweep.models import TIERS
@@ -21,9 +22,14 @@ from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
 DEFAULT_MEASURES = ("reversals", "energy_error", "noise_limited")
 
+# Maps are drawn with μ downwards and b across, a panel for each n0; other axes follow as written.
+FIRST_AXES = ("mu", "b", "n0")
+
 MAX_CELLS = 1_000_000_000
 MAX_REFINED_CELLS = 2**24
 """Of a refined run, which holds all its arrays in memory."""
+MAX_AXIS = 1_000_000
+"""Values of one axis, and rows of a table: they are held in memory as Python's numbers."""
 MAX_STEPS = 1e15
 
 
@@ -34,13 +40,14 @@ class _Strict(BaseModel):
 class Range(_Strict):
     start: float
     stop: float
-    num: int = Field(ge=1, le=MAX_CELLS)
+    num: int = Field(ge=1, le=MAX_AXIS)
     spacing: Literal["linear", "log"] = "linear"
 
     def values(self) -> list[float]:
         if self.spacing == "linear":
-            return list(map(float, np.linspace(self.start, self.stop, self.num)))
-        if self.start * self.stop <= 0:
+            with np.errstate(all="ignore"):  # values beyond the largest number are refused with the others
+                return list(map(float, np.linspace(self.start, self.stop, self.num)))
+        if np.sign(self.start) * np.sign(self.stop) <= 0:
             raise _wrong("a log range needs start and stop of one sign, both not zero", "spacing")
         return list(map(float, np.geomspace(self.start, self.stop, self.num)))
 
@@ -88,24 +95,25 @@ def _parse_values(parameter: Parameter, raw: Any) -> Values:
 
 def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
     if isinstance(raw, bool) or not isinstance(raw, int | float):
-        what = "nothing" if raw is None else repr(raw)
+        what = "nothing" if raw is None else quote(raw)
         raise _wrong(
             f"{what} is not a number; allowed: {parameter.allowed}"
             + ("" if at else ", a list of such, or {start, stop, num, spacing: linear|log}"),
             *at,
         )
-    if not math.isfinite(raw) or not parameter.allows(raw):
-        raise _wrong(f"{raw:g} is out of bounds; allowed: {parameter.allowed}", *at)
+    if not (abs(raw) <= sys.float_info.max and parameter.allows(raw)):
+        raise _wrong(f"{quote(raw)} is out of bounds; allowed: {parameter.allowed}", *at)
 
 
 def _step(raw: Any) -> Any:
-    if raw == "auto" or (isinstance(raw, int | float) and not isinstance(raw, bool) and 0 < raw < math.inf):
+    if raw == "auto" or (isinstance(raw, int | float) and not isinstance(raw, bool) and 0 < raw <= sys.float_info.max):
         return raw
-    raise _wrong(f"{raw!r}; allowed: auto, or a finite number > 0 in sqrt(c/g)")
+    raise _wrong(f"{quote(raw)}; allowed: auto, or a finite number > 0 in sqrt(c/g)")
 
 
-def _distinct(names: list[str]) -> list[str]:
-    if len(set(names)) < len(names):
+def _distinct(names: list[Any]) -> list[Any]:
+    words = [name for name in names if isinstance(name, str)]
+    if len(set(words)) < len(words):
         raise _wrong("a name twice; allowed: each once")
     return names
 
@@ -179,14 +187,16 @@ class Config:
 
     def document(self) -> dict[str, Any]:
         """Everything said and defaulted, as plain data."""
-        sections: dict[str, dict[str, Any]] = {}
+        written = [PARAMETERS[name].section for name in self.axes if name not in FIRST_AXES]
+        # In the order of the axes: read again, they are the same.
+        sections: dict[str, dict[str, Any]] = {section: {} for section in (*written, *SECTIONS)}
         for name, value in self.parameters.items():
-            sections.setdefault(PARAMETERS[name].section, {})[name] = value.spec
+            sections[PARAMETERS[name].section][name] = value.spec
         return {
             "name": self.name,
             "model": self.model,
             **({"cases": self.cases_file} if self.cases_file else {}),
-            **{section: sections[section] for section in SECTIONS if section in sections},
+            **{section: values for section, values in sections.items() if values},
             "integrator": self.integrator.model_dump(),
             "measure": list(self.measure),
             "verify": self.verify,
@@ -212,7 +222,7 @@ class Config:
 
 def describe(error: Any) -> tuple[tuple[str | int, ...], str, bool]:
     """Path, message and whether the key itself is at fault, of one of pydantic's errors."""
-    path = tuple(part for part in error["loc"] if not str(part).startswith("literal["))
+    path = error["loc"]
     at = error.get("ctx", {}).get("at", ())
     return (*path, *at), _message(error, _model_at(path[:-1])), error["type"] == "extra_forbidden"
 
@@ -234,4 +244,4 @@ def _message(error: Any, model: Any) -> str:
     given = error["input"]
     if error["type"] == "value":
         return text
-    return f"{given!r}: {text[0].lower()}{text[1:]}" if not isinstance(given, dict) else text
+    return f"{quote(given)}: {text[0].lower()}{text[1:]}" if not isinstance(given, dict) else text

@@ -1,0 +1,32 @@
+"""Files that a user names: only regular ones, and only as much of them as is sensible."""
+
+from __future__ import annotations
+
+import errno
+import stat
+from pathlib import Path
+
+MIB = 1 << 20
+
+
+def read(path: Path, limit: int) -> str:
+    """The text of a file of at most `limit` bytes.
+
+    Raises
+    ------
+    OSError, UnicodeDecodeError
+        where it is none; its `strerror` says why.
+    """
+    try:
+        mode = path.stat().st_mode
+    except ValueError as error:  # a NUL, or half a character, in the name
+        raise OSError(errno.EINVAL, str(error), str(path)) from None
+    # A pipe may never be written to, a device never end.
+    if not stat.S_ISREG(mode):
+        what = "a folder" if stat.S_ISDIR(mode) else "a pipe or device"
+        raise OSError(errno.EINVAL, f"{what}; allowed: a regular file", str(path))
+    with path.open("rb") as stream:
+        data = stream.read(limit + 1)
+    if len(data) > limit:
+        raise OSError(errno.EFBIG, f"too large; allowed: at most {limit // MIB} MiB", str(path))
+    return data.decode("utf-8-sig")

@@ -1,0 +1,163 @@
+"""Whatever a user hands in is accepted or refused in lines that help; nothing else happens.
+
+The inputs and what must hold of them are in tests/fuzzing.py.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import fuzzing
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner, Result
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sweep import ConfigError, load_config
+from sweep.cli import main
+from sweep.config import document
+
+Write = Callable[..., Path]
+
+# Inputs of each kind: as many as a second or a few allow.
+EXAMPLES = {
+    "yaml_tree": 600, "yaml_bytes": 600, "setting": 1000, "value": 600, "at": 2000, "table": 600,
+    "identity": 400, "archive": 200, "dry_run": 30, "foreign": 15, "damaged": 30,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return fuzzing.prepare(tmp_path_factory.mktemp("fuzz"))
+
+
+@pytest.mark.parametrize("kind", fuzzing.KINDS)
+def test_any_input_is_accepted_or_refused(kind: str, folder: Path) -> None:
+    @settings(max_examples=EXAMPLES[kind])
+    @given(st.randoms(use_true_random=False))
+    def hand_in(random: Random) -> None:
+        fuzzing.KINDS[kind](random, folder)
+
+    hand_in()
+
+
+def invoke(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, list(map(str, arguments)), catch_exceptions=False)
+
+
+def refused(result: Result) -> str:
+    assert (result.exit_code, result.stdout) == (2, "")
+    return result.stderr
+
+
+@pytest.mark.parametrize("name", ["fifo", "/dev/zero", "/dev/null", "."])
+def test_what_is_no_file_is_not_waited_for(name: str, folder: Path, write: Write) -> None:
+    special = folder / name
+    assert "allowed: a regular file" in refused(invoke("run", special))
+    assert "allowed: a regular file" in refused(invoke("run", write(f"cases: {special}\n")))
+    for verb in ("info", "plot"):
+        assert "not a file" in refused(invoke(verb, special))
+
+
+def test_large_files_are_not_read(write: Write, tmp_path: Path) -> None:
+    for name in ("large.yaml", "large.csv"):
+        with (tmp_path / name).open("wb") as stream:
+            os.truncate(stream.fileno(), 1 << 40)  # sparse
+    assert "allowed: at most 1 MiB" in refused(invoke("run", tmp_path / "large.yaml"))
+    assert "allowed: at most 32 MiB" in refused(invoke("run", write("cases: large.csv\n")))
+
+
+def test_axes_without_end_are_not_laid_out(write: Write) -> None:
+    said = refused(invoke("run", write(), "--set", "mu={start: 1, stop: 2, num: 1000000000}"))
+    assert "friction.mu.num: 1000000000: input should be less than or equal to 1000000" in said
+
+
+def test_a_million_columns(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "wide.csv").write_text("mu" + ",mu" * 999_999 + "\n", encoding="utf-8")
+    assert len(refused(invoke("run", write("cases: wide.csv\n"))).splitlines()) == 20
+
+
+def test_a_file_that_is_no_table_is_not_told(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("key=" + "s3cret" * 20 + ",more\n,tail\n", encoding="utf-8")
+    said = refused(invoke("run", write("cases: secret\n")))
+    assert len(said.splitlines()) == 1
+    assert "more" not in said
+    assert "tail" not in said
+    assert "s3cret" * 6 not in said
+
+
+@pytest.mark.parametrize("name", ["../../x", "/tmp/x", "a/b", "..", "", '"a\\0b"', '"a\\nb"', "x" * 101, "-x", ".x"])
+def test_names_stay_in_the_folder(name: str, write: Write) -> None:
+    with pytest.raises(ConfigError, match="name: "):
+        load_config(write(f"name: {name}\nfriction: {{mu: 60}}\n"))
+
+
+@pytest.mark.parametrize("stem", ["файл", "-", "x" * 200, ".hidden", "a b", "..%2f"])
+def test_any_file_name_makes_a_name(stem: str, write: Write) -> None:
+    assert load_config(write("friction: {mu: 60}\n", f"{stem}.yaml")).name
+
+
+@pytest.mark.parametrize("tag", ["!!str", "!!int", "!!float", "!", "!!timestamp", "!<tag:yaml.org,2002:str>"])
+def test_plain_tags_are_tags(tag: str, write: Write) -> None:
+    with pytest.raises(ConfigError, match="a YAML tag or anchor"):
+        load_config(write(f"friction: {{mu: {tag} 60}}\n"))
+
+
+def test_nothing_in_a_file_is_run(write: Write, tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    for call in (f"!!python/object/apply:os.mkdir [{mark}]", f"!!python/object/new:os.mkdir [{mark}]"):
+        with pytest.raises(ConfigError, match="a YAML tag or anchor"):
+            load_config(write(f"friction: {{mu: {call}}}\n"))
+        with pytest.raises(ConfigError, match="a YAML tag or anchor"):
+            document.parse_value(call, "--set x")
+    assert not mark.exists()
+
+
+def test_billions_of_laughs_are_not_laughed(write: Write) -> None:
+    text = "l0: &l0 [ha]\n" + "".join(f"l{i}: &l{i} [{', '.join([f'*l{i - 1}'] * 9)}]\n" for i in range(1, 30))
+    with pytest.raises(ConfigError, match="a YAML tag or anchor"):
+        load_config(write(text))
+
+
+def test_messages_do_nothing_to_a_terminal(write: Write, tmp_path: Path) -> None:
+    said = refused(invoke("run", write('"\\e[2J\\n": 1\nfriction: {mu: 60}\n', "a\x1b[2Jb\n.yaml")))
+    assert len(said.splitlines()) == 1
+    assert said.strip().isprintable()
+    xr.Dataset({"status": ("b", [1])}, attrs={"title": "\x1b[2J"}).to_netcdf(tmp_path / "odd.nc")
+    assert "\x1b" not in invoke("info", tmp_path / "odd.nc").stdout
+
+
+def test_axes_keep_their_order_when_read_again(write: Write) -> None:
+    config = load_config(write("start: {x0: [0, 0.01]}\nbody: {delta: [0.01, 0.02]}\nfriction: {mu: 60}\n"))
+    again = load_config(write(config.to_yaml(), "again.yaml"))
+    assert (list(again.axes), again.fingerprint()) == (["x0", "delta"], config.fingerprint())
+
+
+def test_at_has_an_end(write: Write) -> None:
+    pairs = [part for name in ("mu", "b", "n0") for i in range(1, 21) for part in ("--at", f"{name}={i}")]
+    assert "8000 trajectories; allowed: at most 1000" in refused(invoke("trajectory", write(), *pairs))
+
+
+def test_a_dataset_larger_than_memory_is_not_loaded(tmp_path: Path) -> None:
+    import netCDF4
+
+    with netCDF4.Dataset(tmp_path / "vast.nc", "w") as file:
+        file.createDimension("b", 1 << 40)
+        file.createVariable("b", "f8", ("b",), chunksizes=(1 << 20,))
+    assert "GiB of data; allowed" in refused(invoke("info", tmp_path / "vast.nc"))
+
+
+@pytest.mark.parametrize("verb", ["info", "plot"])
+def test_a_dataset_of_another_program(verb: str, tmp_path: Path) -> None:
+    file = tmp_path / "other.nc"
+    xr.Dataset({"status": ("b", np.ones(3)), "reversals": ("c", np.ones(7)), "step_rule": ("b", [1, 2, 3])}).to_netcdf(
+        file
+    )
+    result = invoke(verb, file)
+    assert result.exit_code in (0, 2)
+    assert result.exit_code == 0 or result.stderr.startswith(f"{file}: ")
