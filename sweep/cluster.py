@@ -6,8 +6,13 @@ dies costs the tile it was at, which another one computes again.
 
 from __future__ import annotations
 
+import logging
+import signal
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numba
@@ -15,7 +20,8 @@ import numba
 from sweep.config import Config
 from sweep.grid import Tile
 from sweep.local import Done, run_group
-from sweep.store import StoreError
+from sweep.provenance import identify, sources
+from sweep.store import Identity, StoreError
 
 AHEAD = 3
 """Tiles a worker that are sent out before the first is back."""
@@ -28,30 +34,68 @@ class Cluster:
         self.client = client
 
     def run(self, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Done]:
-        """Run the tiles `todo`, yielding them as they come back."""
-        from distributed import as_completed
+        """Run the tiles `todo`, yielding them as they come back.
 
-        shared = self.client.scatter((config, list(tiles)), broadcast=True)
-        waiting = iter(todo)
-        ahead = AHEAD * max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
+        Raises
+        ------
+        StoreError
+            where workers run other sources, or die of a tile again and again.
+        """
+        from distributed import KilledWorker, as_completed
 
-        def submit(i: int) -> Any:
-            # Bit-identical wherever it runs, so a second go after a worker's death is safe.
-            return self.client.submit(_work, shared, i, pure=False, retries=3)
+        # The result of a task, not scattered data: that would be lost with the workers that hold it.
+        shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
+        waiting, numbers = iter(todo), dict[Any, int]()
+        running = as_completed()
 
-        running = as_completed([submit(i) for _, i in zip(range(ahead), waiting, strict=False)])
+        def send_ahead() -> None:
+            # Workers come and go.
+            while len(numbers) < AHEAD * max(1, len(self.client.scheduler_info(n_workers=-1)["workers"])):
+                if (i := next(waiting, None)) is None:
+                    return
+                future = self.client.submit(_work, shared, i, pure=False)
+                numbers[future] = i
+                running.add(future)
+
+        send_ahead()
         for future in running:
-            done: Done = future.result()
+            try:
+                done: Done = future.result()
+            except KilledWorker as error:
+                deaths = error.allowed_failures + 1
+                raise StoreError(f"tile {numbers[future]}: {deaths} workers died at it; out of memory?") from None
+            del numbers[future]
             future.release()
-            if (i := next(waiting, None)) is not None:
-                running.add(submit(i))
+            send_ahead()
             yield done
 
 
-def _work(shared: tuple[Config, list[Tile]], tile: int) -> Done:
-    numba.set_num_threads(1)
-    config, tiles = shared
-    (done,) = run_group(config, tiles, [tile])
+PATIENCE = "10s"
+"""For the answer of a scheduler."""
+
+Shared = tuple[Config, list[Tile], Identity]
+
+
+def _share(*given: Any) -> Shared:
+    return given  # type: ignore[return-value]
+
+
+_own_sources = cache(sources)
+
+# Kernels of several tasks at once would share threads, which not each of numba's ways allows.
+_one_tile = threading.Lock()
+
+
+def _work(shared: Shared, tile: int) -> Done:
+    from distributed import get_worker
+
+    config, tiles, identity = shared
+    source_hash, versions = _own_sources()
+    if reason := identity.difference(replace(identity, source_hash=source_hash, versions=versions)):
+        raise StoreError(f"{get_worker().address}: the worker has {reason}")
+    with _one_tile:
+        numba.set_num_threads(min(get_worker().state.nthreads, numba.config.NUMBA_NUM_THREADS))
+        (done,) = run_group(config, tiles, [tile])
     return done
 
 
@@ -68,21 +112,35 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
         yield None
         return
     try:
+        import dask
         import distributed
     except ImportError:
         raise StoreError("--workers and --scheduler need: pip install 'rattleback-sweep[cluster]'") from None
+    quiet = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "CRITICAL"}
     if scheduler is None:
+        logging.getLogger("distributed").setLevel("CRITICAL")
         with (
+            dask.config.set(quiet),
             distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="ERROR"
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address=":0",  # any port: the usual one may be taken
+                scheduler_kwargs={"dashboard": False},
+                silence_logs="CRITICAL",
+                preload=__name__,
             ) as cluster,
             distributed.Client(cluster) as client,
         ):
             yield Cluster(client)
         return
     try:
-        client = distributed.Client(scheduler, timeout="10s")
+        client = distributed.Client(scheduler, timeout=PATIENCE)
     except (OSError, ValueError, TimeoutError) as error:
         raise StoreError(f"{scheduler}: no dask scheduler answers ({error})") from None
     with client:
         yield Cluster(client)
+
+
+def dask_setup(worker: Any) -> None:  # noqa: ARG001
+    """Leave Ctrl-C, which a terminal sends to all processes, to the one that started the run."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -26,11 +26,11 @@ class Terminal(Reporter):
         self._task: TaskID | None = None
 
     def __enter__(self) -> Terminal:
-        self._bar.start()
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._bar.stop()
+        if self._task is not None:
+            self._bar.stop()
 
     def compiling(self) -> None:
         self.note("compiling the kernel for this model and machine; the next run finds it in the cache")
@@ -42,5 +42,6 @@ class Terminal(Reporter):
         self.last = progress
         rate = (progress.done - progress.done_before) / progress.seconds
         if self._task is None:
+            self._bar.start()
             self._task = self._bar.add_task("cells", total=progress.cells, failed=0, rate=0.0)
         self._bar.update(self._task, total=progress.cells, completed=progress.done, failed=progress.failed, rate=rate)

@@ -37,13 +37,15 @@ _DECISIVE = tuple(
 
 
 def identify(config: Config) -> Identity:
-    return Identity(config.to_yaml(), config.fingerprint(), fingerprint(*_DECISIVE), _versions())
+    return Identity(config.to_yaml(), config.fingerprint(), *sources())
 
 
-def _versions() -> str:
+def sources() -> tuple[str, str]:
+    """Hash of the decisive sources, and versions of what runs them."""
     own, libraries = metadata.version("rattleback-sweep"), ("numba", "llvmlite", "numpy")
     found = [f"{name} {metadata.version(name)}" for name in libraries]
-    return ", ".join([f"sweep {own}", f"Python {platform.python_version()}", *found])
+    versions = ", ".join([f"sweep {own}", f"Python {platform.python_version()}", *found])
+    return fingerprint(*_DECISIVE), versions
 
 
 def this_cpu() -> str:

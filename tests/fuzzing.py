@@ -340,7 +340,7 @@ def dry_run(random: Random, folder: Path) -> bool:
     return _invoke(folder, "run", str(file), "--dry-run", "--output", str(folder / "out"))
 
 
-IDENTITY = Identity("name: x\n", "0" * 16, "1" * 16)
+IDENTITY = Identity("name: x\n", "0" * 16, "1" * 16, "sweep 0")
 
 
 def identity(random: Random, folder: Path) -> bool:

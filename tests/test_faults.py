@@ -10,7 +10,6 @@ import os
 import random
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import time
@@ -20,12 +19,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import netCDF4
 import numpy as np
 import nursery
 import pytest
 import xarray as xr
 from conftest import ROOT, SMALL
+from same import contents, without_clock
 
 from sweep.store import Checkpoint, Identity, StoreError
 
@@ -103,30 +102,6 @@ def same_values(path: Path, values: xr.Dataset) -> None:
     assert set(found.variables) == set(values.variables)
     for name, variable in values.variables.items():
         assert found[name].values.tobytes() == variable.values.tobytes(), name
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    """All files of a folder, but for the clock in a dataset."""
-    return {
-        path.name: without_clock(path) if path.suffix == ".nc" else path.read_bytes() for path in folder.iterdir()
-    }  # fmt: skip
-
-
-def without_clock(path: Path) -> bytes:
-    """The bytes of a dataset, with those of the attributes that tell the time replaced."""
-    whole = path.read_bytes()
-    with netCDF4.Dataset(path) as dataset:
-        clock = [dataset.created.encode()]
-        clock += [struct.pack("<d", dataset.getncattr(name)) for name in ("wall_time", "trajectories_per_second")]
-    masked = bytearray(whole)
-    for value in clock:
-        at = whole.index(value)
-        assert whole.count(value) == 1
-        masked[at : at + len(value)] = b"#" * len(value)
-        # HDF5 keeps attributes in blocks: signature, version, address of the heap, offset in it, checksum.
-        checksum = whole.rindex(b"FHDB", 0, at) + 4 + 1 + 8 + 5
-        masked[checksum : checksum + 4] = b"####"
-    return bytes(masked)
 
 
 class Watch:

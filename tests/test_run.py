@@ -384,7 +384,7 @@ def test_no_temporary_file_survives_a_failure(tmp_path: Path) -> None:
             temporary.write_text("half")
             raise OSError("full")
 
-    with pytest.raises(StoreError, match=r"x\.nc: cannot be written: full"):
+    with pytest.raises(StoreError, match="cannot be written: full"):
         fill_the_disk()
     assert list(tmp_path.iterdir()) == []
 

@@ -1,0 +1,245 @@
+"""Runs in other processes: the same files, whatever happens to the workers."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import distributed
+import pytest
+import xarray as xr
+from click.testing import CliRunner, Result
+from conftest import ROOT
+from same import contents
+
+import sweep
+from sweep.cli import main
+from sweep.cluster import Cluster, connected
+from sweep.provenance import sources, this_cpu
+from sweep.run import Progress, Reporter
+from sweep.store import StoreError
+
+TEXT = """\
+name: tiles
+body: {b: {start: 2, stop: 6, num: 40}}
+friction: {mu: {start: 40, stop: 60, num: 40}}
+start: {n0: [0.02, 0.05, 0.07]}
+integrator: {t_end: 100}
+verify: 0.01
+"""
+TILES = 5
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("config") / "tiles.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def by_threads(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    out = tmp_path_factory.mktemp("threads")
+    sweep.run(config, out)
+    return contents(out)
+
+
+@pytest.fixture(scope="module")
+def local() -> Iterator[distributed.LocalCluster]:
+    """Two worker processes, of one thread and of two."""
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
+    ) as cluster:
+        cluster.new_spec["options"]["nthreads"] = 2
+        cluster.scale(2)
+        cluster.wait_for_workers(2)
+        yield cluster
+
+
+@pytest.fixture
+def client(local: distributed.LocalCluster) -> Iterator[distributed.Client]:
+    with distributed.Client(local) as client:
+        client.wait_for_workers(2)
+        yield client
+
+
+@contextmanager
+def patched(client: distributed.Client, module: str, name: str, value: Any, **which: Any) -> Iterator[None]:
+    """Another `module.name` in workers."""
+
+    def put() -> None:
+        there = importlib.import_module(module)
+        there.kept = getattr(there, name)
+        setattr(there, name, value)
+
+    def put_back() -> None:
+        there = importlib.import_module(module)
+        setattr(there, name, there.kept)
+
+    client.run(put, **which)
+    yield
+    client.run(put_back, **which)
+
+
+def invoke(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, list(map(str, arguments)), catch_exceptions=False)
+
+
+def refused(result: Result, *words: str) -> None:
+    assert result.exit_code == 2, result.output
+    assert all(word in result.stderr for word in words), result.stderr
+    assert len(result.stderr.splitlines()) == 1, result.stderr
+
+
+def test_workers_of_a_scheduler(
+    config: Path, tmp_path: Path, local: distributed.LocalCluster, by_threads: dict[str, bytes]
+) -> None:
+    result = invoke("run", config, "--output", tmp_path, "--scheduler", local.scheduler_address, "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+    assert contents(tmp_path) == by_threads
+
+
+def worker_pids(client: distributed.Client) -> list[int]:
+    return list(client.run(os.getpid).values())
+
+
+class KillAWorker(Reporter):
+    """Kills one when the first tile is back, and all are in the middle of another."""
+
+    def __init__(self, client: distributed.Client) -> None:
+        self.client, self.killed = client, list[int]()
+
+    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
+        if not self.killed:
+            time.sleep(0.1)
+            self.killed.append(worker_pids(self.client)[0])
+            os.kill(self.killed[0], signal.SIGKILL)
+
+
+def test_a_killed_worker_costs_its_tile(
+    config: Path,
+    tmp_path: Path,
+    client: distributed.Client,
+    local: distributed.LocalCluster,
+    by_threads: dict[str, bytes],
+) -> None:
+    local.scheduler.transition_log.clear()
+    reporter = KillAWorker(client)
+    sweep.run(config, tmp_path, reporter=reporter, cluster=Cluster(client))
+    assert contents(tmp_path) == by_threads
+    assert reporter.killed
+    moves = [(start, end) for key, start, end, *_ in local.scheduler.transition_log if str(key).startswith("_work")]
+    assert TILES <= moves.count(("processing", "memory")) <= TILES + 1
+    assert moves.count(("processing", "released")) >= 1
+
+
+def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> None:
+    first = next(iter(client.scheduler_info(n_workers=-1)["workers"]))
+    with patched(client, "sweep.local", "this_cpu", lambda: "another", workers=[first]):
+        dataset = sweep.run(config, cluster=Cluster(client), t_end=20)
+    assert dataset.attrs["cpu"] == ", ".join(sorted(["another", this_cpu()]))
+
+
+def test_a_worker_of_other_sources_is_refused(config: Path, client: distributed.Client) -> None:
+    _, versions = sources()
+    said = r"tcp://.*: the worker has other sources of the model or kernel"
+    with (
+        patched(client, "sweep.cluster", "_own_sources", lambda: ("0" * 16, versions)),
+        pytest.raises(StoreError, match=said),
+    ):
+        sweep.run(config, cluster=Cluster(client))
+
+
+def test_a_tile_that_kills_its_workers(config: Path, client: distributed.Client, local: Any) -> None:
+    def die() -> None:
+        import sweep.cluster
+
+        sweep.cluster.run_group = lambda *_: os._exit(1)
+
+    allowed, local.scheduler.allowed_failures = local.scheduler.allowed_failures, 0
+    try:
+        client.run(die)
+        with pytest.raises(StoreError, match="workers died at it"):
+            sweep.run(config, cluster=Cluster(client))
+    finally:
+        local.scheduler.allowed_failures = allowed
+
+
+def command(config: Path, out: Path) -> list[str]:
+    return [sys.executable, "-m", "sweep", "run", str(config), "--output", str(out), "--workers", "2"]
+
+
+def test_processes_of_this_machine(config: Path, tmp_path: Path, by_threads: dict[str, bytes]) -> None:
+    done = subprocess.run(
+        [*command(config, tmp_path), "--quiet"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert contents(tmp_path) == by_threads
+
+
+def in_session(leader: int) -> list[str]:
+    """Command lines of the processes of a session."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state, *_, session = (folder / "stat").read_text().rpartition(")")[2].split()[:4]
+            if int(session) == leader and state != "Z":
+                found.append((folder / "cmdline").read_text().replace("\0", " "))
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+    return found
+
+
+@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "terminal"])
+def test_ctrl_c_ends_all_processes(
+    config: Path, tmp_path: Path, by_threads: dict[str, bytes], send: Callable[[int, int], None]
+) -> None:
+    with subprocess.Popen(
+        [*command(config, tmp_path), "--set", "t_end=5000"],
+        cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as process:  # fmt: skip
+        while not list(tmp_path.glob("tiles.checkpoint/identity.json")):
+            assert process.poll() is None
+            time.sleep(0.05)
+        time.sleep(1)
+        assert len(in_session(process.pid)) > 2
+        began = time.monotonic()
+        send(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == 130
+        assert time.monotonic() - began < 8 + 16 * (os.getloadavg()[0] > 3)
+    assert "the same command goes on" in said
+    assert "Traceback" not in said
+    while in_session(process.pid):
+        assert time.monotonic() - began < 30
+    sweep.run(config, tmp_path, fresh=True)
+    assert contents(tmp_path) == by_threads
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "foo://here:1"])
+def test_no_scheduler_answers(address: str, config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.cluster.PATIENCE", "1s")
+    refused(
+        invoke("run", config, "--output", tmp_path, "--scheduler", address, "--quiet"), address, "no dask scheduler"
+    )
+
+
+def test_without_dask(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    refused(invoke("run", config, "--output", tmp_path, "--workers", "2"), "pip install 'rattleback-sweep[cluster]'")
+    with connected(None, None) as cluster:
+        assert cluster is None
+
+
+def test_a_formula_runs_too(config: Path, client: distributed.Client) -> None:
+    asked = {"model": "analytic", "verify": 0}
+    here, there = sweep.run(config, **asked), sweep.run(config, cluster=Cluster(client), **asked)
+    xr.testing.assert_identical(here.drop_attrs(deep=False), there.drop_attrs(deep=False))
