@@ -76,8 +76,8 @@ PATIENCE = "10s"
 Shared = tuple[Config, list[Tile], Identity]
 
 
-def _share(*given: Any) -> Shared:
-    return given  # type: ignore[return-value]
+def _share(config: Config, tiles: list[Tile], identity: Identity) -> Shared:
+    return config, tiles, identity
 
 
 _own_sources = cache(sources)
@@ -94,7 +94,8 @@ def _work(shared: Shared, tile: int) -> Done:
     if reason := identity.difference(replace(identity, source_hash=source_hash, versions=versions)):
         raise StoreError(f"{get_worker().address}: the worker has {reason}")
     with _one_tile:
-        numba.set_num_threads(min(get_worker().state.nthreads, numba.config.NUMBA_NUM_THREADS))
+        launched: Any = numba.config
+        numba.set_num_threads(min(get_worker().state.nthreads, launched.NUMBA_NUM_THREADS))
         (done,) = run_group(config, tiles, [tile])
     return done
 
