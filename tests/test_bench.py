@@ -283,17 +283,20 @@ def test_every_case_has_a_planted_bug() -> None:
 
 
 @pytest.mark.parametrize(
-    ("count", "last", "holds"), [(9, 12916, True), (9, 12800, True), (9, 12251, False), (8, 12916, False)]
+    ("count", "last", "flag", "holds"),
+    [(9, 12916, 0, True), (9, 12800, 0, True), (9, 12251, 0, False), (9, 12251, 1, True), (8, 12916, 1, False)],
 )
-def test_late_reversals_are_judged(count: int, last: float, holds: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_late_reversals_are_judged(
+    count: int, last: float, flag: int, holds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def plant(ends: Ends, _: dict[str, Any]) -> None:
         ends.images[:, ends.kernel.row("reversals")] = count
         ends.images[:, ends.kernel.row("last_reversal")] = last
+        ends.images[:, ends.kernel.row("noise_limited")] = flag
 
     assert [r.holds for r in rows_with(hard.late_reversal, plant, monkeypatch)] == [holds, holds]
 
 
-# Not among them: late_reversal and strong_friction, which report what is known to fail.
 @pytest.mark.parametrize(
     "case",
     [c for c in hard.CASES if c not in (hard.late_reversal, hard.strong_friction)],
