@@ -47,7 +47,7 @@ class Cluster:
         # The result of a task, not scattered data: that would be lost with the workers that hold it.
         shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
         waiting, numbers = iter(todo), dict[Any, int]()
-        running = as_completed()
+        running = as_completed(loop=self.client.loop)
 
         def send_ahead() -> None:
             # Workers come and go.
@@ -139,12 +139,12 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
                 silence_logs="CRITICAL",
                 preload=__name__,
             ) as cluster,
-            distributed.Client(cluster) as client,
+            distributed.Client(cluster, set_as_default=False) as client,
         ):
             yield Cluster(client)
         return
     try:
-        client = distributed.Client(scheduler, timeout=PATIENCE)
+        client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise StoreError(f"{scheduler}: no dask scheduler answers ({error})") from None
     with client:
