@@ -39,14 +39,15 @@ class Cluster:
         Raises
         ------
         StoreError
-            where workers run other sources, or die of a tile again and again.
+            where workers run other sources or die of a tile again and again, or the scheduler goes.
         """
-        from distributed import KilledWorker, as_completed
+        from distributed import CancelledError, KilledWorker, as_completed
+        from distributed.comm import CommClosedError
 
         # The result of a task, not scattered data: that would be lost with the workers that hold it.
         shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
         waiting, numbers = iter(todo), dict[Any, int]()
-        running = as_completed()
+        running = as_completed(loop=self.client.loop)
 
         def send_ahead() -> None:
             # Workers come and go.
@@ -64,11 +65,18 @@ class Cluster:
             except KilledWorker as error:
                 deaths = error.allowed_failures + 1
                 raise StoreError(f"tile {numbers[future]}: {deaths} workers died at it; out of memory?") from None
+            except CancelledError:
+                raise StoreError(LOST) from None
             del numbers[future]
             future.release()
-            send_ahead()
+            try:
+                send_ahead()
+            except CommClosedError:
+                raise StoreError(LOST) from None
             yield done
 
+
+LOST = "the dask scheduler is gone; finished tiles are kept, the same command goes on"
 
 PATIENCE = "10s"
 """For the answer of a scheduler."""
@@ -76,8 +84,8 @@ PATIENCE = "10s"
 Shared = tuple[Config, list[Tile], Identity]
 
 
-def _share(config: Config, tiles: list[Tile], identity: Identity) -> Shared:
-    return config, tiles, identity
+def _share(*given: Any) -> tuple[Any, ...]:
+    return given
 
 
 _own_sources = cache(sources)
@@ -94,8 +102,8 @@ def _work(shared: Shared, tile: int) -> Done:
     if reason := identity.difference(replace(identity, source_hash=source_hash, versions=versions)):
         raise StoreError(f"{get_worker().address}: the worker has {reason}")
     with _one_tile:
-        launched: Any = numba.config
-        numba.set_num_threads(min(get_worker().state.nthreads, launched.NUMBA_NUM_THREADS))
+        most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+        numba.set_num_threads(min(get_worker().state.nthreads, most))
         (done,) = run_group(config, tiles, [tile])
     return done
 
@@ -117,9 +125,10 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
         import distributed
     except ImportError:
         raise StoreError("--workers and --scheduler need: pip install 'rattleback-sweep[cluster]'") from None
+    for logger in ("distributed", "distributed.client"):  # what a user has to know comes as an error
+        logging.getLogger(logger).setLevel("CRITICAL")
     quiet = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "CRITICAL"}
     if scheduler is None:
-        logging.getLogger("distributed").setLevel("CRITICAL")
         with (
             dask.config.set(quiet),
             distributed.LocalCluster(
@@ -130,12 +139,12 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
                 silence_logs="CRITICAL",
                 preload=__name__,
             ) as cluster,
-            distributed.Client(cluster) as client,
+            distributed.Client(cluster, set_as_default=False) as client,
         ):
             yield Cluster(client)
         return
     try:
-        client = distributed.Client(scheduler, timeout=PATIENCE)
+        client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise StoreError(f"{scheduler}: no dask scheduler answers ({error})") from None
     with client:

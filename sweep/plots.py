@@ -30,6 +30,8 @@ _SIMULATED = {
     "reversals", "t_first_reversal", "t_last_reversal", "noise_limited", "spin_mean", "spin_final", "energy_error",
 }  # fmt: skip
 _MAX_COLOURS = 40
+_MAX_VALUES = 1000
+"""Of an axis, evenly taken: more are less than a pixel."""
 
 
 def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
@@ -51,6 +53,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     long = [d for d in dims if dataset.sizes[d] > _PANEL_VALUES]
     long = long or sorted(dims, key=lambda d: -dataset.sizes[d])[:1]
     across = long[:2]
+    dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // _MAX_VALUES)) for d in across})
     rest = [d for d in dims if d not in across]
     if (count := math.prod(dataset.sizes[d] for d in rest)) > _MAX_ROWS:
         shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)

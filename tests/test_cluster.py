@@ -232,6 +232,36 @@ def test_no_scheduler_answers(address: str, config: Path, tmp_path: Path, monkey
     )
 
 
+def test_the_scheduler_goes(config: Path, tmp_path: Path, by_threads: dict[str, bytes]) -> None:
+    program = (
+        "import time, distributed\n"
+        "if __name__ == '__main__':\n"
+        "    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=':0')\n"
+        "    print(cluster.scheduler_address, flush=True)\n"
+        "    time.sleep(600)\n"
+    )
+    (tmp_path / "cluster.py").write_text(program, encoding="utf-8")
+    out = tmp_path / "out"
+    with subprocess.Popen(
+        [sys.executable, tmp_path / "cluster.py"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as scheduler:
+        assert scheduler.stdout
+        address = scheduler.stdout.readline().strip()
+        run = [sys.executable, "-m", "sweep", "run", config, "--output", out, "--quiet"]
+        with subprocess.Popen([*run, "--scheduler", address], cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+            while not list(out.glob("tiles.checkpoint/0*.npz")):
+                assert process.poll() is None
+                time.sleep(0.002)
+            scheduler.kill()
+            _, said = process.communicate(timeout=60)
+    assert (process.returncode, said) == (
+        2,
+        "the dask scheduler is gone; finished tiles are kept, the same command goes on\n",
+    )
+    sweep.run(config, out)
+    assert contents(out) == by_threads
+
+
 def test_without_dask(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     refused(invoke("run", config, "--output", tmp_path, "--workers", "2"), "pip install 'rattleback-sweep[cluster]'")
