@@ -138,7 +138,7 @@ def test_bit_identical_in_any_order_and_alone(expected: np.ndarray) -> None:
 def test_bit_identical_when_interrupted_and_resumed(expected: np.ndarray) -> None:
     table, looks = mixed(), 0
 
-    def stop(_: Any) -> None:
+    def stop() -> None:
         nonlocal looks
         looks += 1
         if looks % 2:
