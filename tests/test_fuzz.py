@@ -157,9 +157,9 @@ def test_measures_are_words(measure: str, write: Write) -> None:
 def test_images_that_are_none_are_not_gone_on_from(odd: dict[str, np.ndarray], tmp_path: Path) -> None:
     arrays = {"tiles": np.arange(2), "seconds": np.array(1.5), "dopri5": np.zeros((3, 4))}
     checkpoint = Checkpoint(tmp_path / "x.checkpoint", fuzzing.IDENTITY, lambda _: None)
-    np.savez(checkpoint.folder / "running.npz", **arrays)
+    checkpoint._write(checkpoint.folder / "running.npz", arrays)
     assert checkpoint.load_running() is not None
-    np.savez(checkpoint.folder / "running.npz", **(arrays | odd))
+    checkpoint._write(checkpoint.folder / "running.npz", arrays | odd)
     assert checkpoint.load_running() is None
 
 
