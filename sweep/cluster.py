@@ -7,6 +7,7 @@ dies costs the tile it was at, which another one computes again.
 from __future__ import annotations
 
 import logging
+import signal
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -136,6 +137,7 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
                 dashboard_address=":0",  # any port: the usual one may be taken
                 scheduler_kwargs={"dashboard": False},
                 silence_logs="CRITICAL",
+                preload=__name__,
             ) as cluster,
             distributed.Client(cluster, set_as_default=False) as client,
         ):
@@ -147,3 +149,8 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
         raise StoreError(f"{scheduler}: no dask scheduler answers ({error})") from None
     with client:
         yield Cluster(client)
+
+
+def dask_setup(worker: Any) -> None:  # noqa: ARG001
+    """Leave Ctrl-C, which a terminal sends to all processes, to the one that started the run."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

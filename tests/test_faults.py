@@ -289,13 +289,15 @@ def test_a_file_finds_no_room(runs: Runs, undisturbed: dict[str, bytes], file: s
 
 def test_the_disk_is_full(runs: Runs, values: xr.Dataset) -> None:
     """A disk that grows, in a name space of its own; files that may grow where there is no such thing."""
-    sizes = {"running.npz": 12, "small.nc": 64, "small.png": 160, "": 4096}
+    # Kilobytes of the disk, or of a file.
+    sizes = {"running.npz": (12, 4), "small.nc": (64, 32), "small.png": (160, 90), "": (4096, 4096)}
     runs.out.mkdir()
     own = subprocess.run(["unshare", "-rm", "mount", "-t", "tmpfs", "x", runs.out], capture_output=True, check=False)
     disk = own.returncode == 0
+    print("a disk of its own" if disk else "no name space: files of limited size instead")
     lines = [f'mount -t tmpfs -o size=4k tmpfs "{runs.out}"'] if disk else []
-    for i, kilobytes in enumerate(sizes.values()):
-        lines.append(f'mount -o remount,size={kilobytes}k "{runs.out}"' if disk else f"ulimit -S -f {kilobytes}")
+    for i, (whole, each) in enumerate(sizes.values()):
+        lines.append(f'mount -o remount,size={whole}k "{runs.out}"' if disk else f"ulimit -S -f {each}")
         command = f'"{sys.executable}" -m sweep run "{runs.config}" --output "{runs.out}" --quiet'
         lines.append(
             f'{command} >"{runs.out}.{i}" 2>&1; echo $? >>"{runs.out}.{i}"; cp -a "{runs.out}" "{runs.out}-{i}"'
