@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -17,8 +18,9 @@ FINER = 100.0
 """By what the tolerance is divided; the step is halved at least."""
 
 
+@cache
 def draw(cells: int, share: float) -> Array:
-    """Indices of the cells to run again, ascending."""
+    """Indices of the cells to run again, ascending.  Every tile asks for its part of the one draw."""
     return np.sort(np.random.default_rng(0).choice(cells, math.ceil(share * cells), replace=False, shuffle=False))
 
 
