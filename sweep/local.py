@@ -22,6 +22,10 @@ GROUP = 32_768
 """Cells in memory together (50 MB of images); lanes idle at the end of a group alone."""
 
 
+Running = tuple[list[int], dict[str, Array], float]
+"""What `Checkpoint.load_running` finds."""
+
+
 @dataclass(frozen=True)
 class Done:
     """A finished tile."""
@@ -38,6 +42,7 @@ def run_group(
     group: Sequence[int],
     *,
     checkpoint: Checkpoint | Memory | None = None,
+    left: Running | None = None,
     compiling: Callable[[], None] = lambda: None,
     after_chunk: Callable[[Array], None] = lambda status: None,  # noqa: ARG005
 ) -> Iterator[Done]:
@@ -45,7 +50,8 @@ def run_group(
 
     Parameters
     ----------
-    checkpoint : keeps the images after each chunk, and may hold some of this group to go on from
+    checkpoint : keeps the images after each chunk
+    left : what it holds of this group, to go on from
     after_chunk : called with the statuses of the group's cells
     """
     grid, cpu = Grid.of(config), this_cpu()
@@ -57,12 +63,7 @@ def run_group(
     for kernel, _ in tables.values():
         kernel.compile()
     images, began = {method: table for method, (_, table) in tables.items()}, time.perf_counter()
-    left = checkpoint.load_running() if checkpoint else None
-    if (
-        left
-        and left[0] == list(group)
-        and {m: t.shape for m, t in left[1].items()} == {m: t.shape for m, t in images.items()}
-    ):
+    if left and {m: t.shape for m, t in left[1].items()} == {m: t.shape for m, t in images.items()}:
         for method, table in left[1].items():
             images[method][:] = table
         began -= left[2]
@@ -83,24 +84,24 @@ def run_group(
 
 def groups(
     grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], checkpoint: Checkpoint | Memory
-) -> Iterator[list[int]]:
-    """Numbers of tiles to run together: first those that the checkpoint has images of."""
+) -> Iterator[tuple[list[int], Running | None]]:
+    """Numbers of tiles to run together: first those that the checkpoint has images of, with these."""
     waiting = list(todo)
     left = checkpoint.load_running()
     if left and set(left[0]) <= set(waiting):
-        yield left[0]
+        yield left[0], left
         waiting = [i for i in waiting if i not in left[0]]
     group: list[int] = []
     cells = 0
     for i in waiting:
         size = grid.part(tiles[i]).size
         if group and cells + size > GROUP:
-            yield group
+            yield group, None
             group, cells = [], 0
         group.append(i)
         cells += size
     if group:
-        yield group
+        yield group, None
 
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:

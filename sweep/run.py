@@ -151,9 +151,15 @@ def _run_tiles(
 def _here(
     config: Config, tiles: Sequence[Tile], todo: Sequence[int], checkpoint: Checkpoint | Memory, count: _Count
 ) -> Iterator[Done]:
-    for group in local.groups(Grid.of(config), tiles, todo, checkpoint):
+    for group, left in local.groups(Grid.of(config), tiles, todo, checkpoint):
         yield from local.run_group(
-            config, tiles, group, checkpoint=checkpoint, compiling=count.reporter.compiling, after_chunk=count.chunk
+            config,
+            tiles,
+            group,
+            checkpoint=checkpoint,
+            left=left,
+            compiling=count.reporter.compiling,
+            after_chunk=count.chunk,
         )
 
 
