@@ -43,8 +43,9 @@ import numba
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
+from sweep.executor import execute
 from sweep.kernels.adams import AdamsKernel
-from sweep.kernels.lanes import BLOCK, TIME_LIMIT, Kernel
+from sweep.kernels.lanes import TIME_LIMIT, Kernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import ellipsoid, slip_split
 from sweep.models.coefficients import rattle_period
@@ -161,12 +162,11 @@ def our_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
 def our_run(problem: Problem, kernel: Kernel, step: float) -> Callable[[], Array]:
     """Whole runs, with the preparation of their images: adams has its start-up there."""
     steps, never_settles = np.full(problem.size, step), np.full((6, problem.size), np.nan)
-    cells, period = np.arange(problem.size), rattle_period(problem.columns)
-    blocks = problem.size * (math.ceil(T_END / step / BLOCK) + 1)
+    period = rattle_period(problem.columns)
 
     def run() -> Array:
         images = kernel.images(problem.columns, steps, T_END, never_settles, period)
-        kernel.advance(images, cells, blocks, False)
+        execute(kernel, images, stop_when_settled=False)
         finished = images[:, kernel.row("status")] == TIME_LIMIT
         return np.where(finished, slip_states(kernel, images), np.nan)
 

@@ -191,7 +191,9 @@ def _draw(axes: Axes, shares: dict[tuple[str, str], Spread]) -> None:
 
 
 def _images(method: str, measure: tuple[str, ...], cells: int) -> tuple[Kernel, Array]:
-    """Kernel and trajectories that run for longer than they are timed."""
+    """Kernel and trajectories that run for longer than they are timed, steps alone."""
     kernel, columns = make_kernel(method, MODELS["slip"], measure), standard(mu=np.full(cells, 60.0))
     images = kernel.images(columns, np.full(cells, 0.02), 1e6, never_stable(cells), rattle_period(columns))
+    if "quiet_after" in kernel.rows:
+        images[:, kernel.row("quiet_after")] = np.inf
     return kernel, images

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from matplotlib.axes import Axes
 
-from sweep.executor import nominal_seconds
+from sweep.executor import execute, nominal_seconds
 from sweep.grid import Array
 from sweep.kernels.lanes import LANES, Kernel
 from sweep.models.coefficients import rattle_period
@@ -119,9 +119,10 @@ class Work:
     step: Array
     t_end: float = T_END
 
-    def __call__(self) -> None:
+    def __call__(self) -> Array:
         images = self._images()
-        self.kernel.advance(images, np.arange(len(images)), 10**12, False)
+        execute(self.kernel, images, stop_when_settled=False)
+        return images
 
     def __len__(self) -> int:
         return len(self.step)
