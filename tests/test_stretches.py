@@ -221,17 +221,34 @@ def test_bit_identical_for_chunks() -> None:
     np.testing.assert_array_equal(finish(table[order]), whole[order])
 
 
-def test_the_wait_is_bounded() -> None:
-    """A stretch that is not worthwhile is not tried again at every look."""
-    tried = 0
+@pytest.fixture
+def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Cells of each look."""
+    cells: list[int] = []
     of = Rattle.of
 
-    def count(*given: Any) -> Rattle:
-        nonlocal tried
-        tried += 1
-        return of(*given)
+    def counted(states: np.ndarray, constants: np.ndarray) -> Rattle:
+        cells.append(states.shape[1])
+        return of(states, constants)
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stretches.Rattle, "of", count)
-        finish(images(ADAMS, 0.05, 9000.0, settle=True, mu=200.0))
-    assert tried <= 20
+    monkeypatch.setattr(stretches.Rattle, "of", counted)
+    return cells
+
+
+def test_the_wait_is_bounded(looks: list[int]) -> None:
+    """A stretch that is not worthwhile is not tried again at every look."""
+    finish(images(ADAMS, 0.05, 9000.0, settle=True, mu=200.0))
+    assert 0 < len(looks) <= 20
+
+
+def test_where_no_stretch_can_be_of_use_nothing_is_looked_at(looks: list[int]) -> None:
+    """A look takes as long as a thousand steps: to t = 400 they were two thirds of the time."""
+    finish(images(ADAMS, 0.1, 400.0, mu=[60.0, 200.0, 1000.0]), settle=False)
+    assert not looks
+    # Nor when there is no more time for that.
+    finish(images(ADAMS, 0.1, 1200.0, mu=60.0), settle=False)
+    assert 0 < len(looks) <= 5
+    # A mode that can sink and come back is looked at, and what has been lifted is let down.
+    assert decide([1e-5, 1e-9], left=10_000).lifts[0, 0] > 0
+    assert decide([1e-5, 1e-9], left=7000).wait[0] == np.inf
+    assert decide([1e-1, 1e-9], lifts=(0.0, 20.0), left=7000).wait[0] < np.inf

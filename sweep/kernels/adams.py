@@ -123,7 +123,10 @@ class AdamsKernel(Kernel):
         images[grown, self.row("status")] = DIVERGED
         images[:, self.row("energy")] = energy
         images[:, self.row("spin")] = spin
-        images[:, self.row("quiet_energy")] = stretches.quiet_energy(linear.fastest_spin(SPLIT, columns))
+        reach, goal = linear.fastest_spin(SPLIT, columns), images[:, self.row("goal")]
+        images[:, self.row("quiet_energy")] = stretches.quiet_energy(reach)
+        time = goal * images[:, self.row("step")]
+        images[:, self.row("quiet_after")] = stretches.first_look(columns, reach, time, goal, self.tolerance)
         images[:, self.row("bending")] = bending(columns)
         if "reversals" in self.measure:
             images[:, self.row("phase")] = begin

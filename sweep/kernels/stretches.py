@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.kernels.lanes import QUIET, RUNNING, Kernel
-from sweep.models.model import Array
-from sweep.models.modes import RATTLE, Rattle
+from sweep.models.model import Array, Columns
+from sweep.models.modes import RATTLE, Rattle, fastest_growth
 from sweep.models.slip_split import SPLIT
 
 # Largest sizes of a rattle that leaps and of a lifted mode, without and with a fast mode that decays
@@ -73,6 +73,18 @@ def quiet_energy(reach: Array) -> Array:
     `reach` is the largest spin at hand, shape (cells,).
     """
     return np.asarray((2 * _LATE * _LARGEST[1] * reach) ** 2)
+
+
+def first_look(columns: Columns, reach: Array, time: Array, steps: Array, tolerance: float) -> Array:
+    """Steps after which looks are of use in a run of `time` and so many `steps`: 0 or infinity, shape (cells,)."""
+    with np.errstate(divide="ignore"):
+        share = np.log(tolerance / reach)
+    return np.where(_brief(fastest_growth(columns, reach), share, time, steps), np.inf, 0.0)
+
+
+def _brief(rate: Array, share: Array, time: Array, steps: Array) -> Array:
+    """Whether no leap is worth a look any more, nor a mode has the time to sink (see `_sinks`) and to come back."""
+    return np.asarray((steps < _WORTHWHILE) & (rate * time < 2 * (share - np.log(_ROUND_OFF))))
 
 
 def carry(kernel: Kernel, images: Array, history: int, tolerance: float) -> None:
@@ -148,6 +160,10 @@ def plan(
         swings = np.where(seen.rate_g > 0, np.maximum(-np.where(now, largest, seen.log_g), 1) / seen.rate_g, np.inf)
         falls = np.where(rates < 0, (logs - largest[:, None]) / -rates, 0).max(axis=1)
         wait = np.where(small & use & ~now, unclear, np.where(small | (falls <= 0), swings, falls))
+        left = left - np.where(now, steps, 0)
+        fastest = np.abs(np.stack([rates, rates - 2 * rattle.slopes * spin[:, None]])).max(axis=(0, 2))
+        ends = _brief(fastest, share, left * step, left) & (after == 0).all(axis=1) & (now | (lifts == 0).all(axis=1))
+        wait = np.where(ends, np.inf, wait)
     return Stretch(now, steps, after, np.where(rattle.sound, wait, np.inf))
 
 

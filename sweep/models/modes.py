@@ -11,11 +11,12 @@ What stays out of account is of the order α⁴ d in spin, and α_j³ where mode
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 
-from sweep.models import ellipsoid, linear, slip
+from sweep.models import averaged, ellipsoid, linear, slip
 from sweep.models.model import Array, Columns, stack
 from sweep.models.slip_split import SPLIT, momentum, slip_constants, slow
 
@@ -43,12 +44,14 @@ class Rattle:
     """z = readings (u1, u2, M1, M2): without the slip, which a history does not keep.  Shape (cells, 2, 4)."""
     amplitudes: Array
     """z, shape (cells, 2)."""
-    turning: Array
-    """B, over modes and conjugates (R_1, R_2, R_1*, R_2*), shape (cells, 4, 4)."""
     unit_energies: Array
     """2 E_k / I3 of z_k = 1, averaged over a period, in units of spin², shape (cells, 2)."""
     slopes: Array
     """d Re λ_k / dn by the turning alone (the form (abdot) gives it), shape (cells, 2)."""
+    upright: Array
+    """M3, shape (cells,)."""
+    constants: Array
+    """Of the model, shape (cells, constants)."""
 
     @classmethod
     def of(cls, states: Array, constants: Array) -> Rattle:
@@ -61,14 +64,17 @@ class Rattle:
         readings = np.linalg.inv(pairs)[:, :2]
         amplitudes = (readings @ states[list(RATTLE[:4])].T[..., None])[..., 0]
         upright = -inertia * spin
-        turning = _turning(modes, upright, constants)
-        unit = _unit_energies(modes, upright, constants)
-        cells = np.arange(len(spin))
-        slopes = np.stack([2 * turning[cells, k, k + 2].real for k in (0, 1)], axis=1) / (unit * inertia[:, None])
-        return cls(sound, rates, modes, readings, amplitudes, turning, unit, slopes)
+        unit, turn = _unit_energies_and_turns(modes, upright, constants)
+        slopes = turn / (unit * inertia[:, None])
+        return cls(sound, rates, modes, readings, amplitudes, unit, slopes, upright, constants.T)
 
     def select(self, cells: Array) -> Rattle:
-        return Rattle(**{name: values[cells] for name, values in vars(self).items()})
+        return Rattle(**{field.name: getattr(self, field.name)[cells] for field in fields(self)})
+
+    @cached_property
+    def turning(self) -> Array:
+        """B, over modes and conjugates (R_1, R_2, R_1*, R_2*), shape (cells, 4, 4)."""
+        return _turning(self.modes, self.upright, self.constants.T)
 
     def distances(self) -> Array:
         """Of the spin from each mode's critical spin, infinite for a mode that does not turn it, shape (cells, 2)."""
@@ -103,6 +109,12 @@ def bending(columns: Columns) -> Array:
     a, b, c = columns["a"], columns["b"], columns["c"]
     I1, I2, I3 = ellipsoid.inertia(columns)
     return np.asarray(I3 / c * np.maximum((a**2 - c**2) / (I2 + c**2), (b**2 - c**2) / (I1 + c**2)))
+
+
+def fastest_growth(columns: Columns, reach: Array) -> Array:
+    """Largest |Re λ| of the modes at spins up to `reach` by (abdot), in sqrt(g/c), shape (cells,)."""
+    k1, k4, m1, m4, _ = averaged.constants(columns)
+    return np.asarray(np.maximum(np.abs(k1) * reach + np.abs(m1), np.abs(k4) * reach + np.abs(m4)))
 
 
 def _rocking(constants: Array, spin: Array) -> tuple[Array, Array, Array]:
@@ -140,13 +152,15 @@ def _turning(modes: Array, upright: Array, constants: Array) -> Array:
     return np.asarray(np.moveaxis((forms[0] - forms[1]) / (4 * _SMALL**2), -1, 0))
 
 
-def _unit_energies(modes: Array, upright: Array, constants: Array) -> Array:
-    total = np.zeros((modes.shape[2], len(upright)))
+def _unit_energies_and_turns(modes: Array, upright: Array, constants: Array) -> tuple[Array, Array]:
+    """2 E / I3 and M3' of each mode at z = 1, averaged over a period, shape (cells, 2)."""
+    energies = turns = np.zeros((modes.shape[2], len(upright)))
     for part in (modes.real, modes.imag):
         states = np.insert(np.moveaxis(part, 0, -1) * _SMALL, 4, upright, axis=0)
         _, rattle, inertia = SPLIT.energy(states, constants)
-        total += 4 * rattle / inertia / _SMALL**2
-    return total.T
+        energies = energies + 4 * rattle / inertia / _SMALL**2
+        turns = turns + 2 * slow(*states, constants)[0][4] / _SMALL**2
+    return energies.T, turns.T
 
 
 def _form(matrix: Array, amplitudes: Array) -> Array:
