@@ -248,7 +248,8 @@ def test_where_no_stretch_can_be_of_use_nothing_is_looked_at(looks: list[int]) -
     # Nor when there is no more time for that.
     finish(images(ADAMS, 0.1, 1200.0, mu=60.0), settle=False)
     assert 0 < len(looks) <= 5
-    # A mode that can sink and come back is looked at, and what has been lifted is let down.
-    assert decide([1e-5, 1e-9], left=10_000).lifts[0, 0] > 0
-    assert decide([1e-5, 1e-9], left=7000).wait[0] == np.inf
+    for sizes in ([1e-5, 1e-9], [1e-1, 1e-9]):
+        assert decide(sizes, left=7000).wait[0] == np.inf
+        assert decide(sizes, left=70_000).wait[0] < np.inf
+    # What has been lifted is let down.
     assert decide([1e-1, 1e-9], lifts=(0.0, 20.0), left=7000).wait[0] < np.inf

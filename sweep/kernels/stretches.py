@@ -162,8 +162,8 @@ def plan(
         wait = np.where(small & use & ~now, unclear, np.where(small | (falls <= 0), swings, falls))
         left = left - np.where(now, steps, 0)
         fastest = np.abs(np.stack([rates, rates - 2 * rattle.slopes * spin[:, None]])).max(axis=(0, 2))
-        ends = _brief(fastest, share, left * step, left) & (after == 0).all(axis=1) & (now | (lifts == 0).all(axis=1))
-        wait = np.where(ends, np.inf, wait)
+        over = _brief(fastest, share, left * step, left) & (after == 0).all(axis=1) & (now | (lifts == 0).all(axis=1))
+        wait = np.where(over, np.inf, wait)
     return Stretch(now, steps, after, np.where(rattle.sound, wait, np.inf))
 
 
