@@ -67,10 +67,11 @@ def test_half_planes(case: tuple[tuple[int, ...], int, np.ndarray], x: float, y:
 @given(maps(2, 60), st.floats(1.01, 3))
 def test_discs_wider_than_the_largest_blocks(case: tuple[tuple[int, ...], int, np.ndarray], radius: float) -> None:
     shape, depth, centre = case
-    distance = np.linalg.norm(lattice(shape) - centre[:, None, None], axis=0)
-    full = np.where(distance < radius * 2**depth, 7, 3)
+    distance = np.linalg.norm(lattice(shape) - centre[:, None, None], axis=0) - radius * 2**depth
+    full = np.where(distance < 0, 7, 3)
     inferred, _ = refine(full, depth)
-    np.testing.assert_array_equal(inferred, full)
+    # Between two nodes outside the line may come in by 1/8 of its curvature times their distance squared.
+    assert (abs(distance[inferred != full]) < 0.5).all()
 
 
 @given(st.integers(1, 4), st.lists(st.integers(1, 40), min_size=1, max_size=5))
@@ -78,17 +79,19 @@ def test_stretches_longer_than_the_largest_blocks(depth: int, lengths: list[int]
     full = np.repeat(np.arange(len(lengths)), [2**depth + n for n in lengths])
     inferred, simulated = refine(full, depth)
     np.testing.assert_array_equal(inferred, full)
-    # Each change is found by halving: a node a level, and as many in the blocks beside it.
-    assert simulated.sum() <= len(full) / 2**depth + 2 + (len(lengths) - 1) * (3 * 2**depth + depth)
+    # Each change is found by halving: a node a level.
+    assert simulated.sum() <= len(full) / 2**depth + 2 + (len(lengths) - 1) * (2 * depth + 1)
 
 
 @given(maps(3, 17), directions, directions, st.floats(1.01, 2))
 def test_three_axes(case: tuple[tuple[int, ...], int, np.ndarray], x: float, y: float, radius: float) -> None:
     shape, depth, place = case
     away = lattice(shape) - place[:, None, None, None]
-    inside = np.linalg.norm(away, axis=0) < radius * 2**depth
-    for full in (inside.astype(np.int32), (np.tensordot([x, y, 1.0], away, 1) > 0).astype(np.int32)):
-        np.testing.assert_array_equal(refine(full, depth)[0], full)
+    half = (np.tensordot([x, y, 1.0], away, 1) > 0).astype(np.int32)
+    np.testing.assert_array_equal(refine(half, depth)[0], half)
+    distance = np.linalg.norm(away, axis=0) - radius * 2**depth
+    ball = (distance < 0).astype(np.int32)
+    assert (abs(distance[refine(ball, depth)[0] != ball]) < 0.75).all()
 
 
 @given(maps(3, 20), st.floats(0.1, 2))
@@ -132,9 +135,23 @@ def test_a_change_that_shows_late_halves_the_blocks_it_reaches() -> None:
     assert simulated.mean() < 0.4
 
 
-def test_a_change_halves_the_large_blocks_beside_it() -> None:
-    full = np.repeat([0, 1, 2, 1], [10, 9, 3, 12])  # the third stretch lies inside the block after that of a change
-    assert np.array_equal(refine(full, 3)[0], full)
+@given(st.integers(1, 3), st.floats(0.1, 0.9), st.booleans())
+def test_lines_one_cell_wide_are_followed(depth: int, slope: float, upright: bool) -> None:
+    columns = np.arange(65)
+    at = np.round(slope * columns).astype(int)
+    full = np.zeros((65, 65), np.int32)
+    full[at, columns] = full[at[1:], columns[:-1]] = 1  # from a coarse node on, without diagonal gaps
+    full = full.T if upright else full
+    np.testing.assert_array_equal(refine(full, depth)[0], full)
+
+
+@pytest.mark.parametrize(("slope", "most"), [(0, 870), (0.37, 1135), (1, 1442)])
+def test_lines_cost_little(slope: float, most: int) -> None:
+    """Along a line of the map, and nothing ahead of an answer that makes it needless: then it would be twice that."""
+    x, y = lattice((257, 257))
+    inferred, simulated = refine((x - 101 + slope * (y - 128) > 0.05).astype(np.int32), 4)
+    assert simulated.sum() <= most
+    assert 0 < inferred.mean() < 1
 
 
 MAP = """\
