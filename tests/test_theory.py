@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import numba
 import numpy as np
 import pytest
 from conftest import columns
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sweep.grid import Grid
 from sweep.models import MODELS, analytic, linear, slip
 from sweep.models.coefficients import coefficients, rattle_period
 from sweep.models.model import stack
+from sweep.prediction import predict
 
 SLIP = MODELS["slip"]
 
@@ -84,6 +87,21 @@ def by_inequalities(n0: float, upper: float, lower: float) -> int:
         n_r += 1
         K += rho if n_r % 2 else 1
     return n_r
+
+
+def test_stability_is_the_same_on_any_number_of_threads() -> None:
+    bodies = columns(mu=np.linspace(20, 200, 11), b=np.linspace(1.2, 9.8, 11), n0=0.3)
+    most, found = numba.get_num_threads(), []
+    for threads in {1, most}:
+        numba.set_num_threads(threads)
+        stability = predict(slip.MODEL, Grid({}, {}, bodies)).stability
+        assert stability
+        found.append(stability.ranges)
+    numba.set_num_threads(most)
+    np.testing.assert_array_equal(found[0], found[-1])
+    upper, lower = linear.critical_spins(slip.MODEL, bodies, analytic.critical_spins(bodies))
+    np.testing.assert_array_equal(found[0][:2], [lower, upper])
+    assert np.isfinite(found[0][2:]).any()
 
 
 @given(
