@@ -90,7 +90,7 @@ def by_inequalities(n0: float, upper: float, lower: float) -> int:
 
 
 def test_stability_is_the_same_on_any_number_of_threads() -> None:
-    bodies = columns(mu=np.linspace(20, 200, 11), b=np.linspace(1.2, 9.8, 11), n0=0.3)
+    bodies = columns(mu=np.linspace(20, 200, 601), b=np.linspace(1.2, 9.8, 601), n0=0.3)
     most, found = numba.get_num_threads(), []
     for threads in {1, most}:
         numba.set_num_threads(threads)

@@ -122,9 +122,9 @@ class Integrator(_Strict):
     method: Literal[(*METHODS, "auto")] = "dopri5"  # type: ignore[valid-type]
     """`auto` is for each cell the one that reaches `t_end` to `tolerance` in the least time."""
     step: Annotated[float | Literal["auto"], BeforeValidator(_step)] = "auto"
-    tolerance: float = Field(default=TOLERANCE, gt=0, lt=1)
+    tolerance: float = Field(default=TOLERANCE, ge=1e-14, lt=1)
     """Error in spin that an automatic step keeps to, at t = 400."""
-    t_end: float = Field(default=30_000.0, gt=0)
+    t_end: float = Field(default=30_000.0, gt=0, le=1e12)
     stop_when_settled: bool = True
 
 
