@@ -1,4 +1,4 @@
-"""A map of 1024 × 1024 cells over μ and b, most of them inferred: what it costs, and how many cells are wrong.
+"""A map over μ and b, most of its cells inferred: what it costs, and how many cells are wrong.
 
 Runs the map with `refine`, then some blocks of its cells in full, drawn at random, and compares.
 Run as `python scripts/refined_map.py`; `--help` tells how to ask for less.  Interrupted, the same
@@ -33,7 +33,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=1024, help="cells along each axis (default 1024)")
     parser.add_argument("--t-end", type=float, default=30_000.0, help="time limit in sqrt(c/g) (default 30000)")
     parser.add_argument("--depth", type=int, default=4, help="refine: (default 4)")
-    parser.add_argument("--blocks", type=int, default=6, help="blocks run in full (default 6)")
+    parser.add_argument("--blocks", type=int, default=36, help="blocks run in full (default 36)")
     parser.add_argument("--side", type=int, default=64, help="cells along each axis of these (default 64)")
     parser.add_argument("--seed", type=int, default=0, help="of the draw of blocks (default 0)")
     parser.add_argument(

@@ -183,7 +183,7 @@ def reproduce(output: Path) -> None:
 def bench(output: Path) -> None:
     """Speed against error of each method and model, and cases that are hard to get right.
 
-    Takes about five minutes on two cores; writes bench.html, bench.png and bench.csv.
+    Takes about three minutes on two cores; writes bench.html, bench.png and bench.csv.
 
     Exit code 1 if a hard case does not hold, else 0: no time, and no error at a tolerance, fails.
     """

@@ -12,9 +12,9 @@ from sweep.grid import Array, Grid
 from sweep.models import analytic, linear
 from sweep.models.model import Columns, Model, Tier, stack
 
-# Bodies a thread.  Numpy takes eigenvalues on one thread, 0.5 ms a body, where a trajectory takes 1 ms; two
-# threads are 0.8 times as fast for 300 bodies, 1.2, 1.5, 1.9 times for 600, 1000, 8000.
-_FEWEST = 300
+# Bodies that a thread takes at a time.  Numpy takes eigenvalues on one thread, 0.5 ms a body, where a trajectory
+# takes 1 ms.  With fewer the calls take longer than the numbers; with more Ctrl-C waits longer.
+_PART = 1000
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def _stability(model: Model, columns: Columns, bodies: Columns, body: Array, for
         below, above = (linear.outer_range(model, some, n, reach[part]) for n in (lower, upper))
         return stack((lower, upper, *below[::-1], *above))
 
-    threads = min(numba.get_num_threads(), max(1, cells // _FEWEST))
-    with ThreadPoolExecutor(threads) as pool:
-        found = np.concatenate(list(pool.map(ranges, np.array_split(np.arange(cells), threads))), axis=1)
+    parts = np.array_split(np.arange(cells), max(1, round(cells / _PART)))
+    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
+        found = np.concatenate(list(pool.map(ranges, parts)), axis=1)
     return Stability((found[1], found[0]), found)

@@ -3,10 +3,10 @@
 The nodes of the refined axes are cut into blocks of 2^depth intervals a side; a block shares the nodes
 of its sides with its neighbours, and the last of an axis may be shorter.  Of a block the corners are
 simulated.  It is halved where the outcomes known in it or on its sides differ.  Inside a block of two
-intervals a side that differs, a node is inferred where two opposite neighbours agree; so of a line
-every second node is simulated, and where it turns.  Lines one cell wide get lost by that: a node
-simulated whose neighbours for the most part differ has these simulated too.  Along the other axes
-there are as many maps.
+intervals a side that differs, a node is inferred where two opposite neighbours agree, and no other two
+on another outcome; so of a line every second node is simulated, and where it turns.  Lines one cell
+wide get lost by that: a node simulated whose neighbours for the most part differ has these simulated
+too.  Along the other axes there are as many maps.
 
 All follows from the outcomes known so far: a search can go on from these alone.
 """
@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 Outcomes = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
-Mesh = tuple[Any, ...]
 
 UNKNOWN = -1
 """Outcome of a node that is not simulated; those of the others are not negative."""
@@ -78,7 +77,7 @@ def _infer_between(outcome: Outcomes, refined: Sequence[int], wanted: Flags, sou
         places = [np.arange(1, n - 1, 2) if i in axes else _corner_places(n, 2) for i, n in enumerate(outcome.shape)]
         here = _mesh(outcome, refined, places)
         origin, open_ = source[here], outcome[here] == UNKNOWN
-        ready, agreed = np.ones_like(open_), np.zeros_like(open_)
+        ready, agreed, clash = np.ones_like(open_), np.zeros_like(open_), np.zeros_like(open_)
         for axis in axes:
             below, above = (
                 source[_mesh(outcome, refined, [at + side * (i == axis) for i, at in enumerate(places)])]
@@ -86,14 +85,15 @@ def _infer_between(outcome: Outcomes, refined: Sequence[int], wanted: Flags, sou
             )
             ready &= (outcomes[below] != UNKNOWN) & (outcomes[above] != UNKNOWN)
             agree = outcomes[below] == outcomes[above]
+            clash |= agree & agreed & (outcomes[below] != outcomes[origin])
             np.copyto(origin, below, where=agree & open_)
             agreed |= agree
-        wanted[here] |= open_ & ready & ~agreed
-        source[here] = origin
+        wanted[here] |= open_ & ready & (clash | ~agreed)
+        source[here] = np.where(clash, source[here], origin)
 
 
 def _beside_tips(outcome: Outcomes, refined: Sequence[int], value: Outcomes) -> Flags:
-    """Neighbours of the nodes simulated that share the outcome of less than half of theirs: ends of thin lines.
+    """Neighbours of the nodes simulated that share the outcome of fewer than half an inner node's: ends of thin lines.
 
     `value` has the outcomes that are inferred too.
     """
@@ -119,7 +119,7 @@ def _corner_places(nodes: int, size: int) -> Nodes:
     return np.append(np.arange(0, nodes - 1, size), nodes - 1)
 
 
-def _mesh(outcome: Outcomes, refined: Sequence[int], places: Sequence[Any]) -> Mesh:
+def _mesh(outcome: Outcomes, refined: Sequence[int], places: Sequence[Any]) -> tuple[Any, ...]:
     """Index with `places` along the refined axes and everything along the others."""
     return np.ix_(*(at if i in refined else range(outcome.shape[i]) for i, at in enumerate(places)))
 
@@ -160,9 +160,6 @@ def _pairs(function: np.ufunc, values: Any, axis: int) -> Any:
 def _corners(blocks: Flags, refined: Sequence[int]) -> Flags:
     """Nodes of the level that are corners of `blocks`."""
     for axis in refined:
-        blocks = _pairs(np.logical_or, _framed(blocks, axis), axis)
+        framed = np.pad(blocks, [(int(i == axis),) * 2 for i in range(blocks.ndim)])
+        blocks = _pairs(np.logical_or, framed, axis)
     return blocks
-
-
-def _framed(blocks: Flags, axis: int) -> Flags:
-    return np.pad(blocks, [(int(i == axis),) * 2 for i in range(blocks.ndim)])

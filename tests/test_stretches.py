@@ -242,7 +242,7 @@ def test_the_wait_is_bounded(looks: list[int]) -> None:
 
 
 def test_where_no_stretch_can_be_of_use_nothing_is_looked_at(looks: list[int]) -> None:
-    """A look takes as long as a thousand steps: to t = 400 they were two thirds of the time."""
+    """A look takes as long as two thousand steps: to t = 400 they were two thirds of the time."""
     finish(images(ADAMS, 0.1, 400.0, mu=[60.0, 200.0, 1000.0]), settle=False)
     assert not looks
     # Nor when there is no more time for that.
@@ -251,5 +251,8 @@ def test_where_no_stretch_can_be_of_use_nothing_is_looked_at(looks: list[int]) -
     for sizes in ([1e-5, 1e-9], [1e-1, 1e-9]):
         assert decide(sizes, left=7000).wait[0] == np.inf
         assert decide(sizes, left=70_000).wait[0] < np.inf
+    # One that is on its way down already needs less time.
+    assert decide([1e-1, 1e-1], left=8000, spin=0.05).wait[0] == np.inf
+    assert decide([1e-1, 1e-9], left=8000, spin=0.05).wait[0] < np.inf
     # What has been lifted is let down.
     assert decide([1e-1, 1e-9], lifts=(0.0, 20.0), left=7000).wait[0] < np.inf

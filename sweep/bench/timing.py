@@ -33,7 +33,7 @@ STEEPEST = 1e4
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured; by default what takes about five minutes on two cores."""
+    """How much is measured; by default what takes about three minutes on two cores."""
 
     trajectories: int = 512
     repeats: int = 5

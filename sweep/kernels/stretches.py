@@ -40,7 +40,7 @@ _PRODUCTS, _ROUND_OFF = 0.3, 1e-14
 # A lifted mode of this many times the largest size was let down too late.
 _LATE = 1.5
 
-# Resolving a rattle into modes takes about as long as this many steps of it.
+# Steps that are worth a leap: resolving a rattle into modes takes as long as two thousand, and most looks find nothing.
 _WORTHWHILE = 20_000
 
 # The share of a mode that may be products or round-off where there is no waiting any more.
@@ -76,15 +76,22 @@ def quiet_energy(reach: Array) -> Array:
 
 
 def first_look(columns: Columns, reach: Array, time: Array, steps: Array, tolerance: float) -> Array:
-    """Steps after which looks are of use in a run of `time` and so many `steps`: 0 or infinity, shape (cells,)."""
-    with np.errstate(divide="ignore"):
+    """Steps after which looks are of use in a run of `time` and so many `steps`: 0 or infinity, shape (cells,).
+
+    Takes it that no mode is tiny beside the other at the start.
+    """
+    with np.errstate(divide="ignore", over="ignore"):
         share = np.log(tolerance / reach)
-    return np.where(_brief(fastest_growth(columns, reach), share, time, steps), np.inf, 0.0)
+        return np.where(_brief(fastest_growth(columns, reach), share, 0.0, time, steps), np.inf, 0.0)
 
 
-def _brief(rate: Array, share: Array, time: Array, steps: Array) -> Array:
-    """Whether no leap is worth a look any more, nor a mode has the time to sink (see `_sinks`) and to come back."""
-    return np.asarray((steps < _WORTHWHILE) & (rate * time < 2 * (share - np.log(_ROUND_OFF))))
+def _brief(rate: Array, share: Array, lowest: Array | float, time: Array, steps: Array) -> Array:
+    """Whether no leap is worth a look any more, nor a mode has the time to sink (see `_sinks`) and to come back.
+
+    `lowest` is the logarithm of the smaller mode.
+    """
+    below = np.log(_ROUND_OFF) - share
+    return np.asarray((steps < _WORTHWHILE) & (rate * time < -2 * below + np.minimum(lowest, 0)))
 
 
 def carry(kernel: Kernel, images: Array, history: int, tolerance: float) -> None:
@@ -162,7 +169,8 @@ def plan(
         wait = np.where(small & use & ~now, unclear, np.where(small | (falls <= 0), swings, falls))
         left = left - np.where(now, steps, 0)
         fastest = np.abs(np.stack([rates, rates - 2 * rattle.slopes * spin[:, None]])).max(axis=(0, 2))
-        over = _brief(fastest, share, left * step, left) & (after == 0).all(axis=1) & (now | (lifts == 0).all(axis=1))
+        over = _brief(fastest, share, logs.min(axis=1), left * step, left)
+        over &= (after == 0).all(axis=1) & (now | (lifts == 0).all(axis=1))
         wait = np.where(over, np.inf, wait)
     return Stretch(now, steps, after, np.where(rattle.sound, wait, np.inf))
 
