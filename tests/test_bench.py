@@ -25,7 +25,7 @@ TIMES = (25.0, 50.0)
 TINY = Effort(
     trajectories=4, repeats=1, tolerances=(1e-5, 1e-6, 1e-7, 1e-8), rungs=2, sizes=(16,), ends=(50,), frictions=(10,)
 )
-BODIES = [{"mu": 60.0}, {"mu": 60.0, "b": 5.0}]
+BODIES = [{"mu": 60.0}, {"mu": 60.0, "b": 5.0, "c": 0.7}]
 
 
 @pytest.fixture(scope="module")
@@ -82,8 +82,8 @@ def test_references_are_read() -> None:
     spins = read_spins()
     assert set(spins) == set(MODELS)
     assert list(spins["slip"].times) == list(TIMES)
-    assert [spins["slip"].name(i) for i in (0, 1)] == ["μ = 60", "b = 5, μ = 60"]
-    assert [spins["noslip"].name(i) for i in (0, 1)] == ["standard", "b = 5"]
+    assert [spins["slip"].name(i) for i in (0, 1)] == ["μ = 60", "b = 5, c = 0.7, μ = 60"]
+    assert [spins["noslip"].name(i) for i in (0, 1)] == ["standard", "b = 5, c = 0.7"]
     assert spins["noslip"].spins.shape == (2, 2)
     counts = read_counts()
     assert list(counts.firm) == [True, True, True, False]

@@ -62,16 +62,14 @@ def read_spins() -> dict[str, Spins]:
     """The reference spins by model."""
     found: dict[str, dict[tuple[float, ...], dict[float, float]]] = {}
     for line in _lines(SPINS):
-        names = [name for name in MODELS[line["model"]].parameters if name != "c"]
-        body = tuple(float(line[name]) for name in names)
+        body = tuple(float(line[name]) for name in MODELS[line["model"]].parameters)
         found.setdefault(line["model"], {}).setdefault(body, {})[float(line["t"])] = float(line["spin"])
     spins = {}
     for model, bodies in found.items():
-        names = [name for name in MODELS[model].parameters if name != "c"]
-        columns = dict(zip(names, np.array(list(bodies)).T, strict=True)) | {"c": np.ones(len(bodies))}
+        columns = dict(zip(MODELS[model].parameters, np.array(list(bodies)).T, strict=True))
         times = sorted(next(iter(bodies.values())))
         values = np.array([[series[t] for t in times] for series in bodies.values()])
-        spins[model] = Spins({n: columns[n] for n in MODELS[model].parameters}, np.array(times), values)
+        spins[model] = Spins(columns, np.array(times), values)
     return spins
 
 
