@@ -17,9 +17,9 @@ from statistics import median
 import numba
 
 from sweep import load_config
-from sweep.cluster import Cluster, connected
 from sweep.config import Config
-from sweep.run import run
+from sweep.engine.cluster import Cluster, connected
+from sweep.engine.run import run
 
 ROOT = Path(__file__).parent.parent
 

@@ -43,8 +43,8 @@ import numba
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from sweep.executor import execute
-from sweep.kernels.adams import AdamsKernel
+from sweep.engine.executor import execute
+from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.lanes import TIME_LIMIT, Kernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import ellipsoid, slip_split

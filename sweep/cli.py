@@ -72,9 +72,9 @@ def run(
             return
         if workers and scheduler:
             raise ConfigError([Fault("--workers", None, None, (), "beside --scheduler; allowed: one of the two")])
-        from sweep.cluster import connected
+        from sweep.engine.cluster import connected
+        from sweep.engine.run import run as run_sweep
         from sweep.progress import Terminal
-        from sweep.run import run as run_sweep
 
         with Terminal(quiet) as terminal:
             try:
@@ -107,10 +107,10 @@ def trajectory(config: Path, cells: tuple[str, ...], output: Path | None, settin
     normal force, energy and the work of friction.  Several trajectories are laid over each other.
     """
     with _explained():
-        from sweep import trajectory_plot
         from sweep.config import load_config
-        from sweep.store import RunFiles
-        from sweep.trajectory import trajectory as follow
+        from sweep.plots import trajectories as trajectory_plot
+        from sweep.results.store import RunFiles
+        from sweep.studies.trajectory import trajectory as follow
 
         checked = load_config(config, _parse_settings(settings))
         at: dict[str, Any] = {}
@@ -138,10 +138,10 @@ def critical(config: Path, width: float, output: Path | None, settings: tuple[st
     Writes NAME_critical.nc and .png.
     """
     with _explained():
-        from sweep import plots
         from sweep.config import load_config
-        from sweep.critical import critical as search
-        from sweep.store import RunFiles
+        from sweep.plots import maps as plots
+        from sweep.results.store import RunFiles
+        from sweep.studies.critical import critical as search
 
         checked = load_config(config, _parse_settings(settings))
         result = search(checked, width, lambda message: None if quiet else click.echo(message, err=True))
@@ -202,8 +202,8 @@ def bench(output: Path) -> None:
 def plot(file: Path, variable: str | None, output: Path | None) -> None:
     """Draw the maps of a dataset again."""
     with _explained():
-        from sweep import plots
-        from sweep.store import open_dataset, replacing
+        from sweep.plots import maps as plots
+        from sweep.results.store import open_dataset, replacing
 
         dataset = open_dataset(file)
         with _about(file):
@@ -219,7 +219,7 @@ def plot(file: Path, variable: str | None, output: Path | None) -> None:
 def info(file: Path) -> None:
     """Tell what is in a dataset: axes, counts by status, agreement with the prediction, provenance."""
     with _explained():
-        from sweep.store import StoreError, open_dataset
+        from sweep.results.store import StoreError, open_dataset
 
         dataset = open_dataset(file)
         if "status" not in dataset:
@@ -241,7 +241,7 @@ def _say(text: str, *, err: bool = False) -> None:
 @contextmanager
 def _about(file: Path) -> Iterator[None]:
     """Whatever a dataset of another program makes of what reads it is a fault of the file."""
-    from sweep.store import StoreError
+    from sweep.results.store import StoreError
 
     try:
         yield
@@ -262,7 +262,7 @@ class _explained:
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         if error is None:
             return
-        from sweep.store import StoreError
+        from sweep.results.store import StoreError
 
         if isinstance(error, ConfigError | StoreError):
             _say(str(error), err=True)
@@ -298,11 +298,11 @@ def _parse_pair(text: str, option: str) -> tuple[str, float]:
 
 def _estimate(config: Config) -> str:
     """What a run would take, from a sample of its cells."""
-    from sweep.executor import nominal_seconds
+    from sweep.engine.executor import nominal_seconds
+    from sweep.engine.local import GROUP
+    from sweep.engine.plan import plan
     from sweep.grid import Grid
-    from sweep.local import GROUP
     from sweep.models import MODELS
-    from sweep.plan import plan
 
     grid = Grid.of(config)
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one cell"
@@ -326,7 +326,7 @@ def _estimate(config: Config) -> str:
 
 
 def _failed_fraction(dataset: xr.Dataset) -> float:
-    from sweep.executor import FAILURES
+    from sweep.kernels.lanes import FAILURES
 
     return float(dataset["status"].isin(FAILURES).mean())
 
@@ -334,7 +334,7 @@ def _failed_fraction(dataset: xr.Dataset) -> float:
 def _summary(dataset: xr.Dataset) -> str:
     import numpy as np
 
-    from sweep.dataset import STATUSES, STEP_RULES
+    from sweep.results.dataset import STATUSES, STEP_RULES
 
     status = np.ravel(dataset["status"].values)
     dims = " × ".join(f"{d} {n}" for d, n in dataset["status"].sizes.items()) or "one cell"

@@ -32,7 +32,7 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FASTMATH}
 # called the other's loop, with other rows: wrong numbers, or a crash.
 FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(5), "little"))
 
-_NUMERIC_SOURCES = ("jit.py", "models/*.py", "kernels/*.py")
+_NUMERIC_SOURCES = ("jit.py", "models/**/*.py", "kernels/**/*.py")
 
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -77,7 +77,8 @@ def fingerprint(*modules: str) -> str:
     files = [path for pattern in _NUMERIC_SOURCES for path in sorted(root.glob(pattern))]
     digest = hashlib.sha256()
     for path in [*files, *map(Path, modules)]:
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+        name = path.relative_to(root) if path.is_relative_to(root) else Path(path.name)
+        digest.update(name.as_posix().encode() + b"\0" + path.read_bytes())
     for version in (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__):
         digest.update(version.encode())
     return digest.hexdigest()[:16]

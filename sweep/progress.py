@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from sweep.run import Progress as Done
-from sweep.run import Reporter
+from sweep.engine.run import Progress as Done
+from sweep.engine.run import Reporter
 
 
 class Terminal(Reporter):

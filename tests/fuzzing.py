@@ -28,8 +28,8 @@ from sweep import cli
 from sweep.config import ConfigError, load_config
 from sweep.config.document import parse_value
 from sweep.parameters import PARAMETERS
-from sweep.store import Checkpoint, Identity, StoreError
-from sweep.trajectory import _choose
+from sweep.results.store import Checkpoint, Identity, StoreError
+from sweep.studies.trajectory import _choose
 
 
 class Violation(AssertionError):

@@ -20,8 +20,8 @@ from unittest.mock import patch
 
 import numba
 
-from sweep import executor
 from sweep.cli import main
+from sweep.engine import executor
 
 TILE = 3
 """Cells a tile; of twelve cells there are then six tiles in two groups."""
@@ -59,8 +59,8 @@ def command(
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
     executor.CHUNK_SECONDS = 0.004
-    sys.modules["sweep.run"].tile_size = lambda cells: TILE  # noqa: ARG005
-    sys.modules["sweep.local"].GROUP = 2 * TILE
+    sys.modules["sweep.engine.run"].tile_size = lambda cells: TILE  # noqa: ARG005
+    sys.modules["sweep.engine.local"].GROUP = 2 * TILE
     if versions:
         true_version = metadata.version
         metadata.version = lambda name: versions.get(name) or true_version(name)

@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 
 import sweep
 from sweep import ConfigError
-from sweep.executor import execute
-from sweep.kernels import adams
-from sweep.kernels.adams import AdamsKernel, accurate_step
-from sweep.kernels.adams_step import BDF, BDF_GAMMA, CORRECTOR_NODES, EXTRAPOLATE, HISTORY, PREDICTOR_NODES
+from sweep.engine.executor import execute
+from sweep.kernels.adams import kernel as adams
+from sweep.kernels.adams.kernel import AdamsKernel, accurate_step
+from sweep.kernels.adams.step import BDF, BDF_GAMMA, CORRECTOR_NODES, EXTRAPOLATE, HISTORY, PREDICTOR_NODES
+from sweep.kernels.adams.weights import fitted_weights, plain_weights
 from sweep.kernels.lanes import DIVERGED, LANES, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT, Kernel
 from sweep.kernels.tableau import DOPRI5
-from sweep.kernels.weights import fitted_weights, plain_weights
 from sweep.models import MODELS, analytic, linear, slip, slip_split
 from sweep.models.coefficients import rattle_period
 from sweep.models.model import stack

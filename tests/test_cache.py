@@ -13,7 +13,7 @@ from conftest import ROOT
 
 SCRIPT = """
 import sweep
-from sweep.plan import plan
+from sweep.engine.plan import plan
 told = []
 plan(sweep.load_config("c.yaml"), compiling=lambda: told.append(True))
 print("compiled" if told else "found")

@@ -22,10 +22,10 @@ from same import contents
 
 import sweep
 from sweep.cli import main
-from sweep.cluster import Cluster, connected
-from sweep.provenance import sources
-from sweep.run import Progress, Reporter
-from sweep.store import StoreError
+from sweep.engine.cluster import Cluster, connected
+from sweep.engine.run import Progress, Reporter
+from sweep.results.provenance import sources
+from sweep.results.store import StoreError
 
 TEXT = """\
 name: tiles
@@ -142,7 +142,7 @@ def test_a_killed_worker_costs_its_tile(
 def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> None:
     # One worker may take all tiles, so each says both.
     types = iter(["one", "another"] * TILES)
-    with patched(client, "sweep.local", "this_cpu", lambda: next(types)):
+    with patched(client, "sweep.engine.local", "this_cpu", lambda: next(types)):
         dataset = sweep.run(config, cluster=Cluster(client), t_end=20)
     assert dataset.attrs["cpu"] == "another, one"
 
@@ -151,7 +151,7 @@ def test_a_worker_of_other_sources_is_refused(config: Path, client: distributed.
     _, versions = sources()
     said = r"tcp://.*: the worker has other sources of the model or kernel"
     with (
-        patched(client, "sweep.cluster", "_own_sources", lambda: ("0" * 16, versions)),
+        patched(client, "sweep.engine.cluster", "_own_sources", lambda: ("0" * 16, versions)),
         pytest.raises(StoreError, match=said),
     ):
         sweep.run(config, cluster=Cluster(client))
@@ -159,9 +159,9 @@ def test_a_worker_of_other_sources_is_refused(config: Path, client: distributed.
 
 def test_a_tile_that_kills_its_workers(config: Path, client: distributed.Client, local: Any) -> None:
     def die() -> None:
-        import sweep.cluster
+        import sweep.engine.cluster
 
-        sweep.cluster.run_group = lambda *_: os._exit(1)
+        sweep.engine.cluster.run_group = lambda *_: os._exit(1)
 
     allowed, local.scheduler.allowed_failures = local.scheduler.allowed_failures, 0
     try:
@@ -225,7 +225,7 @@ def test_ctrl_c_ends_all_processes(
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "foo://here:1"])
 def test_no_scheduler_answers(address: str, config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.cluster.PATIENCE", "1s")
+    monkeypatch.setattr("sweep.engine.cluster.PATIENCE", "1s")
     refused(
         invoke("run", config, "--output", tmp_path, "--scheduler", address, "--quiet"), address, "no dask scheduler"
     )

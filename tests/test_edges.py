@@ -13,7 +13,7 @@ import sweep
 from sweep import ConfigError
 from sweep.cli import main
 from sweep.kernels.lanes import DIVERGED
-from sweep.trajectory import trajectory
+from sweep.studies.trajectory import trajectory
 
 Write = Callable[..., Path]
 TEXT = "name: odd\nfriction: {mu: 60}\nintegrator: {t_end: 30}\n"

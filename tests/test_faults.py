@@ -26,7 +26,7 @@ import xarray as xr
 from conftest import ROOT, SMALL
 from same import contents, without_clock
 
-from sweep.store import Checkpoint, Identity, StoreError
+from sweep.results.store import Checkpoint, Identity, StoreError
 
 TEXT = SMALL + "verify: 0.3\n"
 

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from sweep import ConfigError, load_config
 from sweep.cli import main
 from sweep.config import document
-from sweep.store import Checkpoint
+from sweep.results.store import Checkpoint
 
 Write = Callable[..., Path]
 

@@ -10,7 +10,7 @@ import pytest
 from conftest import columns
 from scipy.integrate import solve_ivp
 
-from sweep.executor import execute
+from sweep.engine.executor import execute
 from sweep.kernels import methods
 from sweep.kernels.lanes import (
     BLOCK,

@@ -13,10 +13,11 @@ from test_adams import images
 import sweep
 from sweep import ConfigError
 from sweep.config.schema import DEFAULT_MEASURES
-from sweep.executor import execute
-from sweep.kernels import noise, stretches
-from sweep.kernels.adams import AdamsKernel, accurate_step
+from sweep.engine.executor import execute
+from sweep.kernels.adams import stretches
+from sweep.kernels.adams.kernel import AdamsKernel, accurate_step
 from sweep.kernels.lanes import QUIET, RUNNING, Kernel
+from sweep.kernels.measures import noise
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS, slip_split

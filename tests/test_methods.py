@@ -14,11 +14,11 @@ from conftest import SMALL, columns
 import sweep
 from sweep import ConfigError
 from sweep.cli import main
-from sweep.executor import execute
+from sweep.engine.executor import execute
+from sweep.engine.plan import plan
+from sweep.engine.verification import verify
 from sweep.kernels import methods
 from sweep.models import MODELS
-from sweep.plan import plan
-from sweep.verification import verify
 
 Write = Callable[..., Path]
 
@@ -52,7 +52,7 @@ def test_auto_is_each_cell_by_its_own_method(write: Write) -> None:
 def test_auto_goes_on_from_a_checkpoint(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from test_run import Stop, same_numbers
 
-    monkeypatch.setattr("sweep.executor.CHUNK_SECONDS", 1e-4)
+    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 1e-4)
     file, interrupted = write(MIXED.replace("60}\n", "600}\n") + "name: mixed\n"), 0
     whole = sweep.run(file)
     while True:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from sweep.executor import execute
+from sweep.engine.executor import execute
 from sweep.kernels.lanes import TIME_LIMIT, Kernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS

@@ -16,12 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sweep
-from sweep import ConfigError, local
+from sweep import ConfigError
 from sweep.cli import main
-from sweep.dataset import STATUSES, VARIABLES
-from sweep.local import Done
-from sweep.refinement import UNKNOWN, missing, sources
-from sweep.run import Progress, Reporter
+from sweep.engine import local
+from sweep.engine.local import Done
+from sweep.engine.refinement import UNKNOWN, missing, sources
+from sweep.engine.run import Progress, Reporter
+from sweep.results.dataset import STATUSES, VARIABLES
 
 Write = Callable[..., Path]
 
@@ -247,7 +248,7 @@ def test_resumes_and_recomputes_nothing(
 
     monkeypatch.setattr(local, "run_group", counted)
     monkeypatch.setattr(local, "GROUP", 20)
-    monkeypatch.setattr(sys.modules["sweep.run"], "tile_size", lambda cells: 20)  # noqa: ARG005
+    monkeypatch.setattr(sys.modules["sweep.engine.run"], "tile_size", lambda cells: 20)  # noqa: ARG005
     interruptions = 0
     while True:
         try:
@@ -275,7 +276,7 @@ def test_command_tells_the_share(file: Path, refined: xr.Dataset, tmp_path: Path
 
 def test_in_other_processes(file: Path, refined: xr.Dataset) -> None:
     pytest.importorskip("distributed")
-    from sweep.cluster import connected
+    from sweep.engine.cluster import connected
 
     with connected(1, None) as cluster:
         same_numbers(sweep.run(file, cluster=cluster), refined)

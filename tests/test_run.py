@@ -17,12 +17,13 @@ from click.testing import CliRunner, Result
 from conftest import ROOT, SMALL
 
 import sweep
-from sweep import executor, plots
 from sweep.cli import main
-from sweep.dataset import STATUSES, VARIABLES
-from sweep.plan import plan
-from sweep.run import Progress, Reporter
-from sweep.store import RunFiles, StoreError, open_dataset, replacing
+from sweep.engine import executor
+from sweep.engine.plan import plan
+from sweep.engine.run import Progress, Reporter
+from sweep.plots import maps as plots
+from sweep.results.dataset import STATUSES, VARIABLES
+from sweep.results.store import RunFiles, StoreError, open_dataset, replacing
 
 Write = Callable[..., Path]
 
@@ -208,7 +209,7 @@ def test_refuses_another_configuration(write: Write, interrupted: Path) -> None:
 
 
 def test_refuses_other_sources(write: Write, interrupted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["sweep.provenance"], "fingerprint", lambda *_: "0" * 16)
+    monkeypatch.setattr(sys.modules["sweep.results.provenance"], "fingerprint", lambda *_: "0" * 16)
     with pytest.raises(StoreError, match="other sources"):
         sweep.run(write(), interrupted)
 
@@ -258,8 +259,8 @@ def test_a_damaged_identity_is_refused(write: Write, interrupted: Path) -> None:
 def test_tiles_do_not_touch_the_numbers(
     write: Write, tmp_path: Path, small: xr.Dataset, size: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys.modules["sweep.run"], "tile_size", lambda cells: size)  # noqa: ARG005
-    monkeypatch.setattr(sys.modules["sweep.local"], "GROUP", 2)
+    monkeypatch.setattr(sys.modules["sweep.engine.run"], "tile_size", lambda cells: size)  # noqa: ARG005
+    monkeypatch.setattr(sys.modules["sweep.engine.local"], "GROUP", 2)
     same_numbers(sweep.run(write()), small)
     with pytest.raises(KeyboardInterrupt):
         sweep.run(write(), tmp_path / "out", reporter=Stop(3))

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from conftest import columns
 
-from sweep.executor import execute
-from sweep.kernels import start_up
-from sweep.kernels.adams import AdamsKernel, accurate_step
-from sweep.kernels.adams_step import HISTORY
+from sweep.engine.executor import execute
+from sweep.kernels.adams import start_up
+from sweep.kernels.adams.kernel import AdamsKernel, accurate_step
+from sweep.kernels.adams.step import HISTORY
 from sweep.kernels.lanes import LANES, LIFT_OFF, RUNNING, Kernel
 from sweep.kernels.stepper import compile_lanes
 from sweep.kernels.tableau import DOPRI5

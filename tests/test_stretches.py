@@ -10,9 +10,9 @@ from conftest import columns
 from scipy.integrate import solve_ivp
 from test_adams import images
 
-from sweep.executor import execute
-from sweep.kernels import stretches
-from sweep.kernels.adams import AdamsKernel
+from sweep.engine.executor import execute
+from sweep.kernels.adams import stretches
+from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.lanes import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models import analytic, linear, slip, slip_split
 from sweep.models.model import stack

@@ -13,8 +13,8 @@ from click.testing import CliRunner
 import sweep
 from sweep import ConfigError
 from sweep.cli import main
-from sweep.critical import critical
-from sweep.trajectory_plot import reversal_times
+from sweep.plots.trajectories import reversal_times
+from sweep.studies.critical import critical
 
 Write = Callable[..., Path]
 STANDARD = "name: standard\nfriction: {mu: [60, 75]}\nintegrator: {t_end: 1500}\n"

@@ -15,7 +15,7 @@ from independent import contact
 
 import sweep
 from sweep import ConfigError
-from sweep.executor import execute
+from sweep.engine.executor import execute
 from sweep.kernels.lanes import TIME_LIMIT, Kernel
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.tableau import DOPRI5

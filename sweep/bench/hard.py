@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sweep.dataset import STATUSES
 from sweep.grid import Array
 from sweep.kernels.lanes import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
 from sweep.kernels.methods import METHODS, automatic_step
@@ -15,6 +14,7 @@ from sweep.models import MODELS, linear, slip, slip_split
 from sweep.models.model import Columns, stack
 from sweep.report.cells import Ends, simulate, standard
 from sweep.report.rows import Row, Section, against, below, states
+from sweep.results.dataset import STATUSES
 
 LONG = 1e6
 """t_end of the longest run, in sqrt(c/g)."""

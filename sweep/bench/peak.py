@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from sweep.bench.timing import COLOURS, Effort, Measurement, Part, Spread, in_turn
 from sweep.grid import Array
 from sweep.jit import OPTIONS
-from sweep.kernels.adams_step import BDF, PREDICTOR_NODES
+from sweep.kernels.adams.step import BDF, PREDICTOR_NODES
 from sweep.kernels.lanes import BLOCK, LANES, Kernel
 from sweep.kernels.methods import METHODS
 from sweep.kernels.stepper import step_source

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sweep.executor import execute
+from sweep.engine.executor import execute
 from sweep.grid import Array
 from sweep.kernels.lanes import TIME_LIMIT, Kernel
 from sweep.models import MODELS
@@ -16,7 +16,7 @@ from sweep.models.coefficients import rattle_period
 from sweep.models.model import Columns
 from sweep.parameters import PARAMETERS
 from sweep.report.cells import never_stable
-from sweep.store import StoreError
+from sweep.results.store import StoreError
 
 DATA = Path(__file__).parents[2] / "data"
 SPINS, COUNTS = DATA / "reference_spins.csv", DATA / "reference_counts_500.csv"

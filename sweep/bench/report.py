@@ -25,7 +25,7 @@ from sweep.models import MODELS
 from sweep.report import page
 from sweep.report.cells import MEASURE, simulate, standard
 from sweep.report.rows import Row, Section
-from sweep.store import replacing
+from sweep.results.store import replacing
 
 PARTS: tuple[Callable[[Effort], Part], ...] = (work_precision, tolerance, wrong_counts, peak, cost)
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from matplotlib.axes import Axes
 
-from sweep.executor import execute, nominal_seconds
+from sweep.engine.executor import execute, nominal_seconds
 from sweep.grid import Array
 from sweep.kernels.lanes import LANES, Kernel
 from sweep.models.coefficients import rattle_period

@@ -21,7 +21,7 @@ import numba
 import numpy as np
 
 from sweep.jit import inline, is_cached, parallel
-from sweep.kernels import noise
+from sweep.kernels.measures import noise
 from sweep.kernels.stepper import make_load, make_rest, make_step, make_store
 from sweep.kernels.tableau import Tableau
 from sweep.models.model import Array, Columns, Model, stack
@@ -35,6 +35,8 @@ BLOCK = 128
 
 # Ends of a trajectory; `dataset` gives them their meanings for the user.
 RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX = range(6)
+
+FAILURES = (LIFT_OFF, DIVERGED, PARADOX)
 
 # Not an end: the rattle is so small that the kernel's `carry` may have a shorter way than steps.
 QUIET = 6

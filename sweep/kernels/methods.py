@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sweep.kernels import adams
-from sweep.kernels.adams import AdamsKernel
+from sweep.kernels.adams import kernel as adams
+from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.lanes import TOLERANCE, Kernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import linear

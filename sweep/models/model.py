@@ -69,7 +69,7 @@ class Model(Tier):
     and 1e-8; they fall as its fifth power."""
     observe: Callable[[Array, Array], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
     """States (n, samples) and constants (k, 1) -> what a trajectory shows beside spin and energy,
-    by names that `sweep.dataset` explains."""
+    by names that `sweep.results.dataset` explains."""
 
 
 def stack(columns: tuple[Array, ...]) -> Array:

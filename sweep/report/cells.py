@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.dataset import measured
-from sweep.executor import execute
+from sweep.engine.executor import execute
 from sweep.grid import Array, Grid
 from sweep.kernels import lanes, methods
 from sweep.kernels.lanes import Kernel
@@ -19,6 +18,7 @@ from sweep.models.coefficients import rattle_period
 from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
 from sweep.prediction import predict
+from sweep.results.dataset import measured
 
 MEASURE = ("reversals", "energy_error")
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from sweep.config import document
 from sweep.report.rows import Row, against
-from sweep.store import StoreError
+from sweep.results.store import StoreError
 
 DATA = Path(__file__).parents[2] / "data" / "takano2011.yaml"
 

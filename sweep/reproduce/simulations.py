@@ -10,15 +10,15 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sweep.config import Config, Integrator, Values
+from sweep.engine.run import run
 from sweep.grid import Array
 from sweep.models import MODELS, TIERS, analytic
 from sweep.parameters import PARAMETERS
+from sweep.plots.trajectories import draw_spin
 from sweep.report.cells import standard
 from sweep.report.rows import Section, against, states
 from sweep.reproduce.rows import against_paper
-from sweep.run import run
-from sweep.trajectory import trajectory
-from sweep.trajectory_plot import draw_spin
+from sweep.studies.trajectory import trajectory
 
 
 def configure(model: str = "slip", t_end: float = 30_000.0, measure: Any = ("reversals",), **parameters: Any) -> Config:

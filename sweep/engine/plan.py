@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 
-from sweep import dataset
 from sweep.config import Config
 from sweep.grid import Array, Grid
 from sweep.kernels import methods
@@ -17,6 +16,7 @@ from sweep.kernels.lanes import Kernel
 from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
 from sweep.prediction import Prediction, predict
+from sweep.results import dataset
 
 # One of each in a process: its machine code takes a second to load.
 _kernel = cache(methods.make_kernel)

@@ -15,8 +15,8 @@ from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, N
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from sweep.executor import FAILURES
 from sweep.grid import Array
+from sweep.kernels.lanes import FAILURES
 from sweep.models.analytic import best_b
 
 SYMBOLS = {"mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀", "case": "case"}

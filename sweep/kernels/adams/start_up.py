@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from sweep.jit import OPTIONS, parallel
-from sweep.kernels.adams_step import (
+from sweep.kernels.adams.step import (
     BDF_GAMMA,
     CORRECTOR_NODES,
     HISTORY,
@@ -25,10 +25,10 @@ from sweep.kernels.adams_step import (
     step_lines,
     store_lines,
 )
+from sweep.kernels.adams.weights import plain_weights
 from sweep.kernels.lanes import DIVERGED, LANES, LIFT_OFF, PARADOX, RUNNING, count_constants
 from sweep.kernels.stepper import compile_lanes, make_step
 from sweep.kernels.tableau import DOPRI5
-from sweep.kernels.weights import plain_weights
 from sweep.models import slip
 from sweep.models.model import Array
 from sweep.models.slip_split import SPLIT, implicit, momentum, newton, slow

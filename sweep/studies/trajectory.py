@@ -12,17 +12,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep import dataset, executor
 from sweep.config import Config, ConfigError, Fault
+from sweep.engine import executor
+from sweep.engine.plan import plan
+from sweep.engine.run import as_config, simulated, with_dopri5
 from sweep.grid import Array, off_the_body
 from sweep.kernels.lanes import RUNNING, Kernel
 from sweep.models import TIERS
 from sweep.models.linear import fastest_motion
 from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
-from sweep.plan import plan
-from sweep.provenance import provenance
-from sweep.run import as_config, simulated, with_dopri5
+from sweep.results import dataset
+from sweep.results.provenance import provenance
 
 SAMPLES_A_RADIAN = 3
 """Samples in a radian of the fastest motion: nearly twenty a period."""

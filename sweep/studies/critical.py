@@ -8,20 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from sweep import dataset, executor
 from sweep.config import Config, ConfigError, Fault, Values
-from sweep.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
+from sweep.engine import executor
+from sweep.engine.plan import plan
+from sweep.engine.run import simulated, with_dopri5
 from sweep.grid import Array, Grid
-from sweep.kernels.lanes import RUNNING, Kernel
+from sweep.kernels.lanes import FAILURES, RUNNING, Kernel
 from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
 from sweep.models.linear import growth_rate
 from sweep.models.model import stack
 from sweep.parameters import START
-from sweep.plan import plan
 from sweep.prediction import Prediction, predict
-from sweep.provenance import provenance
-from sweep.run import simulated, with_dopri5
+from sweep.results import dataset
+from sweep.results.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
+from sweep.results.provenance import provenance
 
 WIDTH = 1e-3
 """Relative width to which simulation brackets a critical spin."""
@@ -135,7 +136,7 @@ def _reverses(config: Config, columns: dict[str, Array]) -> Array:
     executor.execute(kernel, images, stop_when_settled=True)
     reverses = images[:, kernel.row("reversals")] > 0
     # A body that leaves the plane is not one that stays below its critical spin.
-    return np.asarray(reverses | np.isin(images[:, kernel.row("status")], executor.FAILURES))
+    return np.asarray(reverses | np.isin(images[:, kernel.row("status")], FAILURES))
 
 
 def _rattle_grows(config: Config, columns: dict[str, Array]) -> Array:

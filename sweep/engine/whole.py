@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep import dataset
 from sweep.config import Config
 from sweep.grid import Array, Grid, Tile
-from sweep.provenance import provenance
-from sweep.store import Checkpoint, Memory, RunFiles
+from sweep.results import dataset
+from sweep.results.provenance import provenance
+from sweep.results.store import Checkpoint, Memory, RunFiles
 
 
 def attributes(config: Config, cells: int, tiles: Iterable[Mapping[str, Array]]) -> dict[str, Any]:

@@ -17,23 +17,22 @@ from sweep.config import Config
 from sweep.jit import fingerprint
 from sweep.kernels import methods
 from sweep.models import MODELS
-from sweep.store import Identity
+from sweep.results.store import Identity
 
-# Beside the numeric sources: they fill the images, and turn them into results.
-_DECISIVE = tuple(
-    str(Path(__file__).parent / name)
-    for name in (
-        "grid.py",
-        "prediction.py",
-        "plan.py",
-        "dataset.py",
-        "verification.py",
-        "local.py",
-        "refinement.py",
-        "refined.py",
-        "run.py",
-    )
-)
+_PACKAGE = Path(__file__).parent.parent
+
+# All that lies above the engine shows numbers, or asks for them, but decides none.  Whatever is not named here is
+# taken to decide them: a new file that is forgotten makes a run start anew, not go on from other numbers.
+_ABOVE_THE_ENGINE = {
+    "__init__.py", "__main__.py", "api.py", "cli.py", "progress.py",
+    "plots", "studies", "report", "reproduce", "bench",
+}  # fmt: skip
+
+
+def decisive_sources() -> list[Path]:
+    """The files of the package that the numbers of a dataset depend on."""
+    files = sorted(_PACKAGE.rglob("*.py"))
+    return [path for path in files if path.relative_to(_PACKAGE).parts[0] not in _ABOVE_THE_ENGINE]
 
 
 def identify(config: Config) -> Identity:
@@ -45,7 +44,7 @@ def sources() -> tuple[str, str]:
     own, libraries = metadata.version("rattleback-sweep"), ("numba", "llvmlite", "numpy")
     found = [f"{name} {metadata.version(name)}" for name in libraries]
     versions = ", ".join([f"sweep {own}", f"Python {platform.python_version()}", *found])
-    return fingerprint(*_DECISIVE), versions
+    return fingerprint(*map(str, decisive_sources())), versions
 
 
 def this_cpu() -> str:
@@ -88,7 +87,7 @@ def _integrator_words(config: Config) -> str:
 
 def _git_commit() -> str:
     """The commit of the checkout that the package runs from; "unknown" for an installed one."""
-    root = Path(__file__).parent.parent
+    root = _PACKAGE.parent
     if not (root / ".git").exists():
         return "unknown"
     try:

@@ -7,12 +7,13 @@ from functools import cache
 
 import numpy as np
 
-from sweep import dataset, executor
+from sweep.engine import executor
+from sweep.engine.plan import Part, Plan
 from sweep.grid import Array
 from sweep.kernels import methods
 from sweep.kernels.lanes import SETTLED, TIME_LIMIT
 from sweep.models.coefficients import rattle_period
-from sweep.plan import Part, Plan
+from sweep.results import dataset
 
 FINER = 100.0
 """By what the tolerance is divided; the step is halved at least."""

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from sweep.grid import Array
 from sweep.models.coefficients import rattle_period
-from sweep.plots import SYMBOLS
+from sweep.plots.maps import SYMBOLS
 
 # title, unit, series drawn together
 _PANELS = (

@@ -9,13 +9,14 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
-from sweep import dataset, refinement
 from sweep.config import Config
+from sweep.engine import refinement
+from sweep.engine.whole import attributes
 from sweep.grid import Array, Grid, Tile
 from sweep.models import TIERS
 from sweep.prediction import formulas
-from sweep.store import Checkpoint, Memory, RunFiles
-from sweep.whole import attributes
+from sweep.results import dataset
+from sweep.results.store import Checkpoint, Memory, RunFiles
 
 _TILE = 1 << 18
 """Cells of which the formulas are evaluated together."""

@@ -9,14 +9,12 @@ import numba
 import numpy as np
 
 from sweep.grid import Array
-from sweep.kernels.lanes import BLOCK, DIVERGED, LANES, LIFT_OFF, PARADOX, RUNNING, Kernel
+from sweep.kernels.lanes import BLOCK, LANES, RUNNING, Kernel
 
 CHUNK_SECONDS = 0.7
 """Progress, checkpoints and Ctrl-C wait for a chunk at the most."""
 
 _MOST_BLOCKS = 2**40
-
-FAILURES = (LIFT_OFF, DIVERGED, PARADOX)
 
 
 def execute(

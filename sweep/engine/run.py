@@ -11,19 +11,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep import dataset, executor, local
-from sweep.cluster import Cluster
 from sweep.config import Config, ConfigError, Fault, load_config
+from sweep.engine import local
+from sweep.engine.cluster import Cluster
+from sweep.engine.local import Done
+from sweep.engine.refined import Refined
+from sweep.engine.whole import Whole
 from sweep.grid import Array, Grid, Tile
-from sweep.kernels.lanes import RUNNING
-from sweep.local import Done
+from sweep.kernels.lanes import FAILURES, RUNNING
 from sweep.models import MODELS, TIERS
 from sweep.models.model import Model
 from sweep.prediction import predict as predict_grid
-from sweep.provenance import identify
-from sweep.refined import Refined
-from sweep.store import Checkpoint, Memory, RunFiles, open_dataset
-from sweep.whole import Whole
+from sweep.results import dataset
+from sweep.results.provenance import identify
+from sweep.results.store import Checkpoint, Memory, RunFiles, open_dataset
 
 LARGE = 2_000_000
 """Cells of a dataset that is not loaded into memory by itself."""
@@ -176,12 +177,12 @@ class _Count:
         self.cells, self.before, self.done = cells, self.before + there, self.done + there
 
     def chunk(self, status: Array) -> None:
-        done, failed = int((status != RUNNING).sum()), int(np.isin(status, executor.FAILURES).sum())
+        done, failed = int((status != RUNNING).sum()), int(np.isin(status, FAILURES).sum())
         self._tell(self.done + done, self.failed + failed)
 
     def tile(self, status: Array) -> None:
         self.done += len(status)
-        self.failed += int(np.isin(status, executor.FAILURES).sum())
+        self.failed += int(np.isin(status, FAILURES).sum())
         self._tell(self.done, self.failed)
 
     def _tell(self, done: int, failed: int) -> None:
@@ -191,7 +192,7 @@ class _Count:
 
 def draw(result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
     """The maps of a run, beside its dataset, unless they are there."""
-    from sweep import plots  # matplotlib: a third of the time that `import sweep` would take
+    from sweep.plots import maps as plots  # matplotlib: a third of the time that `import sweep` would take
 
     if files.picture.exists():
         return

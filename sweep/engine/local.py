@@ -8,15 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sweep import dataset, executor, verification
 from sweep.config import Config
+from sweep.engine import executor, verification
+from sweep.engine.plan import Plan, plan, pool
 from sweep.grid import Array, Grid, Tile
 from sweep.kernels.lanes import SETTLED
 from sweep.models import MODELS, TIERS
-from sweep.plan import Plan, plan, pool
 from sweep.prediction import predict
-from sweep.provenance import this_cpu
-from sweep.store import Checkpoint, Memory
+from sweep.results import dataset
+from sweep.results.provenance import this_cpu
+from sweep.results.store import Checkpoint, Memory
 
 GROUP = 32_768
 """Cells in memory together (50 MB of images); lanes idle at the end of a group alone."""

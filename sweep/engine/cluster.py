@@ -18,10 +18,10 @@ from typing import Any
 import numba
 
 from sweep.config import Config
+from sweep.engine.local import Done, run_group
 from sweep.grid import Tile
-from sweep.local import Done, run_group
-from sweep.provenance import identify, sources
-from sweep.store import Identity, StoreError
+from sweep.results.provenance import identify, sources
+from sweep.results.store import Identity, StoreError
 
 AHEAD = 3
 """Tiles a worker that are sent out before the first is back."""

@@ -22,8 +22,9 @@ import numba
 import numpy as np
 
 from sweep.jit import OPTIONS, inline
-from sweep.kernels import stretches
-from sweep.kernels.adams_step import (
+from sweep.kernels.adams import stretches
+from sweep.kernels.adams.start_up import POINT, ROWS, count_levels, duration, start_up
+from sweep.kernels.adams.step import (
     BDF_GAMMA,
     CORRECTOR_NODES,
     HISTORY,
@@ -33,6 +34,7 @@ from sweep.kernels.adams_step import (
     step_lines,
     store_lines,
 )
+from sweep.kernels.adams.weights import fitted_weights
 from sweep.kernels.lanes import (
     BLOCK,
     DIVERGED,
@@ -43,9 +45,7 @@ from sweep.kernels.lanes import (
     make_watch_spin,
     watch_nothing,
 )
-from sweep.kernels.start_up import POINT, ROWS, count_levels, duration, start_up
 from sweep.kernels.stepper import compile_inline
-from sweep.kernels.weights import fitted_weights
 from sweep.models import linear, slip, slip_split
 from sweep.models.ellipsoid import inertia
 from sweep.models.model import Array, Columns, stack
