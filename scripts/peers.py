@@ -1,20 +1,19 @@
-"""Speed against error of the kernel beside what one would take instead.
+"""Speed against error of the kernel beside other tools.
 
-The task is that of a small sweep: trajectories of the slip model with slightly different n0, nothing
-shared between them, from t = 0 to T.  Compared on it are
+The task is a small sweep: trajectories of the slip model from t = 0 to T with slightly different n0, which share
+nothing.  Compared are
 
-* the kernel itself with dopri5, bare and with all it can measure in every step,
-* heyoka.py: Taylor series in batches of the machine's SIMD width, a thread each for two halves,
+* the kernel itself with dopri5 and adams, with and without measurements,
+* heyoka.py: Taylor series in batches of the machine's SIMD width, half of them in each of two threads,
 * numbalsoda: compiled LSODA and DOP853 on the compiled right-hand side, in two threads,
 * diffrax: jitted and vmapped, adaptive and with constant steps, on XLA's own threads,
 * SciPy: DOP853 and LSODA on the compiled right-hand side, in one process, on a few trajectories.
 
-All tools integrate the one right-hand side in `sweep.models.slip`, in double precision and on two
-processors.  Compilation is outside of all times; runs of the tools take turns, so that what else the
-machine does hits them alike.  The error is that of the spin at T, the largest over the trajectories,
-against heyoka's Taylor series in 80-bit arithmetic, which SciPy's DOP853 at its tightest tolerance
-checks.  Speed alone says little: a setting's speed is given relative to heyoka's at one fixed
-tolerance, and to the fastest of heyoka's settings that are at least as accurate.
+All tools integrate the same right-hand side, that of `sweep.models.slip`, in double precision and on two processors.
+Compilation is not timed, and the tools' runs take turns, so that other work on the machine affects all alike.  The
+error is that of the spin at T, the largest over the trajectories, against heyoka's Taylor series in 80-bit arithmetic,
+which is checked by SciPy's DOP853 at its tightest tolerance.  A setting's speed is given relative to heyoka's at one
+fixed tolerance, and to the fastest of heyoka's settings that are at least as accurate.
 
     pip install -e .[peers]
     pip install numbalsoda        # optional: from source, needs cmake, a C++ and a Fortran compiler
@@ -36,21 +35,22 @@ from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
-from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numba
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
+from tracing import traced_rhs
 
 from sweep.engine.executor import execute
 from sweep.kernels.adams.kernel import AdamsKernel
-from sweep.kernels.lanes import TIME_LIMIT, Kernel
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.status import TIME_LIMIT
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import ellipsoid, slip_split
 from sweep.models.coefficients import rattle_period
 from sweep.models.model import Array, stack
 from sweep.models.slip import MODEL
+from sweep.report.cells import slip_states
 
 THREADS = 2
 T_END = 400.0
@@ -58,13 +58,13 @@ T_END = 400.0
 ADAMS_STEPS = (0.125, 0.1, 0.08, 0.0667, 0.05)
 
 SLOW_SECONDS, SLOW_REPEATS = 3.0, 3
-"""Runs longer than this are repeated no more often than that."""
+"""Runs that take longer than `SLOW_SECONDS` are repeated no more than `SLOW_REPEATS` times."""
 
 HEYOKA = "heyoka batch"
 BASE_TOLERANCE = 1e-5
 HEYOKA_TOLERANCES = (1e-2, 1e-3, 1e-4, BASE_TOLERANCE, 1e-6, 1e-8, 1e-10)
 STEPS = (0.04, 0.0333, 0.0286, 0.025, 0.02)
-"""For mu = 60; stronger friction shortens them as an explicit method's stability asks."""
+"""For mu = 60; stronger friction shortens them, as the stability of an explicit method requires."""
 
 DOP853_TOLERANCES, LSODA_TOLERANCES = (1e-3, 1e-5, 1e-7), (1e-7, 1e-9, 1e-11)
 SCIPY_TRAJECTORIES = 2
@@ -84,7 +84,7 @@ class Problem:
         fixed = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": mu, "x0": 0.01, "y0": 0.01}
         columns = {name: np.full(trajectories, value) for name, value in fixed.items()}
         columns["n0"] = 0.05 * (1 + 1e-3 * np.arange(trajectories) / trajectories)
-        return cls(columns, stack(MODEL.start(columns)), stack(MODEL.constants(columns)))
+        return cls(columns, stack(MODEL.start(columns)), MODEL.constants.of(columns))
 
     @property
     def size(self) -> int:
@@ -98,18 +98,18 @@ class Problem:
         return Problem(columns, self.states[:, which], self.constants[:, which])
 
     def spin(self, states: Array) -> Array:
-        """Of states of shape (states, trajectories)."""
+        """The spins of states of shape (states, trajectories)."""
         return np.asarray(MODEL.rhs(states, self.constants)[1][0])
 
 
 @dataclass
 class Entry:
-    """One setting of one tool, and what was measured of it."""
+    """One setting of one tool, and what was measured."""
 
     tool: str
     setting: str
     solve: Callable[[], Array]
-    """Runs it all; returns the states at T, shape (states, trajectories)."""
+    """Runs all trajectories and returns their states at T, shape (states, trajectories)."""
     problem: Problem
     error: float = math.nan
     seconds: list[float] = field(default_factory=list)
@@ -121,15 +121,8 @@ class Entry:
 
     @property
     def milliseconds(self) -> float:
-        """A trajectory's share of the median run."""
+        """Per trajectory, of the median run."""
         return 1e3 * statistics.median(self.seconds) / self.problem.size
-
-
-def traced_rhs(sqrt: Callable[[Any], Any]) -> Callable[..., Any]:
-    """Our right-hand side for another tool's numbers, which know another square root than numpy's."""
-    numbers = SimpleNamespace(sqrt=sqrt)
-    contact = FunctionType(ellipsoid.contact.__code__, {"np": numbers})
-    return FunctionType(MODEL.rhs.__code__, {"np": numbers, "contact": contact})
 
 
 def count_constants() -> int:
@@ -160,7 +153,7 @@ def our_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
 
 
 def our_run(problem: Problem, kernel: Kernel, step: float) -> Callable[[], Array]:
-    """Whole runs, with the preparation of their images: adams has its start-up there."""
+    """Whole runs, including the preparation of the images, where adams has its start-up."""
     steps, never_settles = np.full(problem.size, step), np.full((6, problem.size), np.nan)
     period = rattle_period(problem.columns)
 
@@ -171,12 +164,6 @@ def our_run(problem: Problem, kernel: Kernel, step: float) -> Callable[[], Array
         return np.where(finished, slip_states(kernel, images), np.nan)
 
     return run
-
-
-def slip_states(kernel: Kernel, images: Array) -> Array:
-    """States (u1, u2, ω1, ω2, ω3, v1, v2), whatever the method's own."""
-    states, constants = kernel.unpack(images)
-    return slip_split.velocities(states, constants) if isinstance(kernel, AdamsKernel) else states
 
 
 # --- heyoka.py --------------------------------------------------------------------------------
@@ -202,12 +189,12 @@ def heyoka_system() -> list[tuple[Any, Any]]:
 
     states = heyoka.make_vars(*MODEL.states)
     parameters = tuple(heyoka.par[i] for i in range(count_constants()))
-    slopes, _ = traced_rhs(heyoka.sqrt)(tuple(states), parameters)
+    slopes, _ = traced_rhs(MODEL, heyoka.sqrt)(tuple(states), parameters)
     return list(zip(states, slopes, strict=True))
 
 
 def textbook_system() -> list[tuple[Any, Any]]:
-    """The equations as a user would copy them from a paper, vector by vector, without our algebra."""
+    """The equations as a user would copy them from the paper, vector by vector, without our algebra."""
     import heyoka
 
     def cross(a: Any, b: Any) -> list[Any]:
@@ -252,7 +239,7 @@ def textbook_system() -> list[tuple[Any, Any]]:
 def heyoka_run(
     problem: Problem, system: list[tuple[Any, Any]], tolerance: float, size: int, compact: bool = False
 ) -> Callable[[], Array]:
-    """Batches of `size` trajectories, the last filled up with copies of the last trajectory."""
+    """Batches of `size` trajectories; the last batch is filled up with copies of the last trajectory."""
     import heyoka
 
     batches = np.minimum(np.arange(problem.size + -problem.size % size), problem.size - 1).reshape(-1, size)
@@ -406,7 +393,7 @@ def diffrax_run(problem: Problem, solver: Any, controller: Any, first_step: floa
     import jax.numpy as jnp
 
     jax.config.update("jax_enable_x64", True)
-    rhs = traced_rhs(jnp.sqrt)
+    rhs = traced_rhs(MODEL, jnp.sqrt)
     term = diffrax.ODETerm(lambda _t, y, p: jnp.stack(rhs(tuple(y), tuple(p))[0]))
 
     def solve(y: Any, p: Any) -> Any:
@@ -415,7 +402,7 @@ def diffrax_run(problem: Problem, solver: Any, controller: Any, first_step: floa
             stepsize_controller=controller, max_steps=None, adjoint=diffrax.ForwardMode(), throw=False,
         ).ys[0]  # fmt: skip
 
-    # In one call: two Python threads with a half each are no faster.
+    # In one call: two Python threads with half the trajectories each are no faster.
     solve_all = jax.jit(jax.vmap(solve))
     states, constants = jnp.asarray(problem.states.T), jnp.asarray(problem.constants.T)
     return lambda: np.asarray(solve_all(states, constants)).T
@@ -430,11 +417,11 @@ TOOLS: dict[str, Callable[[Problem, bool], Iterator[Entry]]] = {
     "diffrax": diffrax_entries,
     "scipy": scipy_entries,
 }
-"""Makers of entries, by the module each needs."""
+"""Functions that make the entries, by the module that each needs."""
 
 
 def reference_spins(problem: Problem) -> Array:
-    """Spins at T, with a word on how far two independent ways to them agree."""
+    """Spins at T; prints how well two independent methods agree on them."""
     few = problem.part(slice(0, SCIPY_TRAJECTORIES))
     by_taylor = problem.spin(taylor_reference(problem))
     by_scipy = few.spin(scipy_states(few, "DOP853", 1e-13, 1e-16))
@@ -444,7 +431,7 @@ def reference_spins(problem: Problem) -> Array:
 
 
 def prepare(problem: Problem, quick: bool, reference: Array) -> list[Entry]:
-    """Entries of the installed tools, compiled by an untimed run that also gives their errors."""
+    """Entries of the installed tools, compiled by an untimed run, which also gives their errors."""
     sound = []
     for module, make in TOOLS.items():
         if find_spec(module) is None:
@@ -463,7 +450,7 @@ def prepare(problem: Problem, quick: bool, reference: Array) -> list[Entry]:
 
 
 def measure(entries: list[Entry], repeats: int) -> None:
-    """Time all entries in turns, and those again and again that are quick."""
+    """Time all entries in turns, the slow ones less often."""
     for _ in range(repeats):
         for entry in entries:
             if len(entry.seconds) < SLOW_REPEATS or statistics.median(entry.seconds) < SLOW_SECONDS:
@@ -509,7 +496,7 @@ def draw(entries: list[Entry], mu: float, output: Path) -> None:
 
 
 def keep_stdout() -> None:
-    """Leave standard output to Python: numbalsoda's Fortran prints there wherever it finds stiffness."""
+    """Keep standard output for Python: numbalsoda's Fortran prints there whenever it detects stiffness."""
     own = os.dup(sys.stdout.fileno())
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
@@ -527,7 +514,7 @@ def main() -> None:
     if find_spec("heyoka") is None or find_spec("scipy") is None:
         parser.error("the reference needs heyoka and scipy: pip install -e .[peers]")
 
-    if hasattr(os, "sched_setaffinity"):  # XLA has no other way to be held to some of the processors.
+    if hasattr(os, "sched_setaffinity"):  # XLA cannot be limited to some of the processors otherwise.
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
     numba.set_num_threads(THREADS)
     keep_stdout()

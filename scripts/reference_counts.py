@@ -1,6 +1,6 @@
-"""Reference counts of spin reversals, independent of the package, for the tests to compare with.
+"""Reference counts of spin reversals, computed without the package, for the tests to compare with.
 
-The model is the paper's (Takano 2011, Ldot … visf), set up a second way.  The state is the upward
+The model is the paper's (Takano 2011, Ldot … visf), derived a second way.  The state is the upward
 normal u, the angular velocity ω and the velocity v_g of the centre of mass, nine components in the body.
 At each moment ω', v_g' and the normal force R solve one linear system of seven equations,
 
@@ -8,10 +8,10 @@ At each moment ω', v_g' and the normal force R solve one linear system of seven
     v_g' - R (u - μ v_p)       = -u - ω × v_g
     u · v_g' - (u × x_p) · ω'  = (x_p' × ω) · u - v_p · u'     from (v_p · u)' = 0, v_p = v_g - x_p × ω
 
-and SciPy's DOP853 follows it at tight tolerances with the integral of the spin n as a tenth state.  Where a
-count hangs on a hair (see `Trajectory.fault` and `reference`), the cell is left out.
+and SciPy's DOP853 integrates it at tight tolerances, with the integral of the spin n as a tenth state.  A cell whose
+count a tiny change could alter (see `Trajectory.fault` and `reference`) is left out.  One process takes half an hour.
 
-Run as `python scripts/reference_counts.py data/reference_counts.csv`: one process, about half an hour.
+    python scripts/reference_counts.py data/reference_counts.csv
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 # Random cells: (seed, how many, fewest reversals by the paper's estimate).
 DRAWS = [(20111221, 95, 0.0), (20111222, 24, 4.0)]
 T_END = 30_000.0
-# Steps allowed to one trajectory, about 25 s, and to one of the cells in `PAPER` and `LONG`.
+# Steps allowed for a trajectory (about 25 s), and for one of the cells in `PAPER` and `LONG`.
 MAX_STEPS, MAX_STEPS_LONG = 300_000, 3_000_000
 # Random cells expected to take more steps are not tried.
 MAX_EXPECTED_STEPS = 80_000
@@ -40,9 +40,9 @@ MAX_EXPECTED_STEPS = 80_000
 # u, ω, v_g and the integral of n.  All but u3, ω3 and the integral vanish in upright spin.
 ATOL = np.array([1e-18, 1e-18, 1e-14, 1e-18, 1e-18, 1e-16, 1e-18, 1e-18, 1e-18, 1e-12])
 
-# A count is in doubt where window averages of the spin turn round, or end, this close to zero.
+# A count is in doubt if the window averages of the spin turn back, or end, this close to zero.
 GRAZING = 1e-4
-# Rattle energy, in units of I3 n²/2, at which a trajectory may count as settled.
+# Rattle energy, in units of I3 n²/2, below which a trajectory may count as settled.
 SETTLED_RATTLE = 1e-6
 # Settled spin must be stable with this factor to spare; then Δn <= (rattle)/(I3 · distance) = 1e-5 n.
 SETTLED_MARGIN = 1.05
@@ -90,7 +90,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Spin averaged over successive windows, and how the integration ended."""
+    """The spin averaged over successive windows, and how the integration ended."""
 
     period: float
     averages: Array
@@ -101,7 +101,7 @@ class Trajectory:
         return len(self._before())
 
     def last_reversal(self) -> float:
-        """Where the line between two averages, each at its window's centre, crosses zero; NaN for none."""
+        """Zero of the line between the last averages of opposite sign, each at its window's centre; NaN for none."""
         if not self.reversals():
             return float("nan")
         k = self._before()[-1]
@@ -171,7 +171,7 @@ def growth_rate(n: float, shape: Array, inertia: Array, mu: float) -> float:
 
 
 def has_settled(state: Array, average: float, shape: Array, inertia: Array, mu: float) -> bool:
-    """Whether the spin is stable and the rattle too weak to move it, or a mode out of its decay."""
+    """Whether the spin is stable and the rattle too weak to move it, so that every mode goes on decaying."""
     n = float(state[0:3] @ state[3:6])
     u, omega, v_g = state[0:2], state[3:5], state[6:8]
     rattle = 0.5 * (inertia[:2] @ omega**2 + v_g @ v_g + u @ (shape[:2, :2] - np.eye(2)) @ u)
@@ -181,7 +181,7 @@ def has_settled(state: Array, average: float, shape: Array, inertia: Array, mu: 
 
 
 def simulate(cell: Cell, rtol: float, max_steps: int) -> Trajectory:
-    """Follow one cell to its end: settled, lifted off, time limit or step limit."""
+    """Integrate one cell until it settles, lifts off, or reaches the time or step limit."""
     shape, inertia, period = cell.shape(), cell.inertia(), cell.period()
     solver = DOP853(
         lambda _t, state: motion(state, shape, inertia, cell.mu)[0], 0.0, cell.start(), T_END, rtol=rtol, atol=ATOL
@@ -206,7 +206,7 @@ def simulate(cell: Cell, rtol: float, max_steps: int) -> Trajectory:
 
 
 def reference(cell: Cell, max_steps: int) -> tuple[Trajectory, str]:
-    """A trajectory and why its count is in doubt: itself, or a looser run from a start 1e-9 away."""
+    """A trajectory and why its count is in doubt, empty if it is not: its own fault, or that of a looser run nearby."""
     first = simulate(cell, 1e-11, max_steps)
     if fault := first.fault():
         return first, fault
@@ -222,7 +222,7 @@ STARTS = [(0.05, 0.05), (0.05, -0.02), (-0.01, 0.03), (0.001, 0.01)]
 
 
 def expected_steps(cell: Cell) -> float:
-    """Steps it takes the rattle to settle: stability bounds the step, the slower mode's friction the time."""
+    """Steps until the rattle settles: stability bounds the step, and the friction of the slower mode sets the time."""
     step = 5.5 / (cell.mu * (1 + 5 / (cell.b**2 + 1)))
     decay = 25 / ((cell.a**2 + 6) * cell.mu)
     return float(-np.log(SETTLED_RATTLE) / decay / step)
@@ -238,7 +238,7 @@ def expected_reversals(cell: Cell) -> float:
 
 
 def random_cells(seed: int, count: int, fewest: float) -> list[Cell]:
-    """Cells of many shapes, spins and frictions, of those that are not expected to take too long."""
+    """Random cells of many shapes, spins and frictions that are not expected to take too long."""
     random = np.random.default_rng(seed)
     cells: list[Cell] = []
     while len(cells) < count:
@@ -255,7 +255,7 @@ def random_cells(seed: int, count: int, fewest: float) -> list[Cell]:
 
 
 def main(output: Path) -> None:
-    """Write the unambiguous cells to `output` and a line for every candidate to the terminal."""
+    """Write the cells with a firm count to `output`, and a line for every candidate to the terminal."""
     candidates = [(cell, MAX_STEPS_LONG) for cell in PAPER]
     candidates += [(cell, MAX_STEPS) for draw in DRAWS for cell in random_cells(*draw)]
     candidates += [(cell, MAX_STEPS_LONG) for cell in LONG]

@@ -1,16 +1,16 @@
-"""Reference reversal counts of 500 random cells of the slip model, firm or marked as not.
+"""Reference reversal counts of 500 random cells of the slip model, each marked as firm or not.
 
-A fixed random sample of the parameters a sweep covers, with no cell left out, so that shares of right counts
-mean something.  The equations are the package's own, traced into heyoka.py's Taylor series (errors of
-the derivation are for `scripts/reference_counts.py` to find).
+The cells are a fixed random sample of the parameters that a sweep covers.  None is left out, so shares of right counts
+are meaningful.  The equations are the package's own, traced into heyoka.py's Taylor series;
+`scripts/reference_counts.py` looks for errors in their derivation.
 
-The contact and slip states are divided by `UNIT`: heyoka's tolerance is relative to the largest state, and in
-these units that is the rattle's, however small it gets, and not ω3.  The integral of the spin is an
-eighth state.  Each cell is followed in double precision, then from a start 1e-9 away at another tolerance;
-where these two do not agree on when the last reversal comes, it grew out of round-off, and 80-bit
-arithmetic takes over (which delays it, and may not be enough: `noise_limited`).
+All states but ω3 are in multiples of `UNIT`: heyoka's tolerance is relative to the largest state, which in these
+units belongs to the rattle, however small it gets.  The integral of the spin is an eighth state.  Each cell is
+integrated in double precision, then from a start 1e-9 away at another tolerance.  If the two disagree on the time of
+the last reversal, it grew out of round-off, and 80-bit arithmetic takes over.  That delays the reversal, and may not
+be enough: `noise_limited`.
 
-    python scripts/reference_counts_500.py data/reference_counts_500.csv
+    python scripts/reference_counts_500.py sweep/bench/data/reference_counts_500.csv
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from reference_spins import traced_rhs
+from tracing import traced_rhs
 
 from sweep.models import linear, slip
 from sweep.models.coefficients import rattle_period
@@ -40,19 +40,19 @@ TOLERANCE, OTHER_TOLERANCE, EXTENDED_TOLERANCE = 1e-16, 1e-15, 1.1e-19
 NUDGE = 1 + 1e-9
 
 WINDOWS, SAMPLES = 32, 16
-"""Windows between two looks at a cell, and samples of a window, at which the normal force is seen."""
+"""Windows between two checks of a cell, and samples in a window, at which the normal force is seen."""
 
 MARGIN = 2.0
-"""A cell has settled when even this many times the rattle's `reach` would change nothing."""
+"""A cell has settled if even this many times the rattle's `reach` would change nothing."""
 
 LINEAR = 1e-6
-"""Reach of a rattle that is taken as linear: the spin it shifts, LINEAR² / 2d, is 1e-9 at a usual distance d = 5e-4."""
+"""Reach below which a rattle is taken as linear: it shifts the spin by LINEAR² / 2d, 1e-9 at a usual d = 5e-4."""
 
 SAME_TIME, ROUGHLY_SAME_TIME = 1e-5, 1e-2
-"""Times that do not hang on round-off agree to 1e-7; two that do may meet by chance: one pair agreed to 1e-3 where
+"""Times that do not depend on round-off agree to 1e-7.  Two that do may agree by chance: one pair agreed to 1e-3 where
 80 bits delay the reversal by 10 %."""
 LEAST_FORCE = 0.1
-"""Between two samples the normal force may be somewhat lower: below this, lift-off is in doubt."""
+"""Between two samples the normal force may be somewhat lower: below this, lift-off cannot be excluded."""
 
 SPIN = slip.MODEL.spin_state
 RATTLE = [i for i in range(len(slip.MODEL.states)) if i != SPIN]
@@ -82,13 +82,14 @@ def system() -> list[tuple[Any, Any]]:
     """Equations of the slip model in multiples of `SCALE`, and of the spin's integral."""
     *states, integral = heyoka.make_vars(*slip.MODEL.states, "integral")
     parameters = tuple(heyoka.par[i] for i in range(count_constants()))
-    slopes, (spin, *_) = traced_rhs(slip.MODEL)(tuple(s * k for s, k in zip(states, SCALE, strict=True)), parameters)
+    unscaled = tuple(state * k for state, k in zip(states, SCALE, strict=True))
+    slopes, (spin, *_) = traced_rhs(slip.MODEL, heyoka.sqrt)(unscaled, parameters)
     scaled = [slope * (1 / k) for slope, k in zip(slopes, SCALE, strict=True)]
     return list(zip([*states, integral], [*scaled, spin], strict=True))
 
 
 def count_constants() -> int:
-    return len(slip.constants({name: np.ones(1) for name in slip.MODEL.parameters}))
+    return len(slip.Constants.of({name: np.ones(1) for name in slip.MODEL.parameters}))
 
 
 Advance = Callable[[Array, Array, Array], Array]
@@ -125,11 +126,11 @@ def extended_precision() -> Advance:
 
 @dataclass
 class Run:
-    """One cell followed to its end."""
+    """One cell integrated to its end."""
 
     period: float
     integrals: list[Any] = field(default_factory=lambda: [0.0])
-    """Of the spin, at successive halves of windows."""
+    """Integral of the spin, after each half window."""
     least_force: float = np.inf
     status: str = "running"
 
@@ -137,7 +138,7 @@ class Run:
         return min(self.period / 2 * (len(self.integrals) - 1), T_END)
 
     def averages(self, shift: int) -> Array:
-        """Of the spin over the windows, which begin `shift` half windows after the start."""
+        """Averages of the spin over windows that begin `shift` half windows after the start."""
         last = int(2 * T_END / self.period)
         return np.diff(np.array(self.integrals[: last + 1])[shift::2]) / self.period
 
@@ -158,9 +159,9 @@ def sign_changes(averages: Array) -> Array:
 
 
 def follow(columns: dict[str, Array], advance: Advance, lanes: int, real: Any) -> list[Run]:
-    """All cells, `lanes` at a time; a lane whose cell has ended takes the next of similar stiffness."""
+    """Integrate all cells, `lanes` at a time.  A lane whose cell has ended takes the next, of similar stiffness."""
     columns = {name: column.astype(real) for name, column in columns.items()}
-    period, constants = rattle_period(columns), stack(slip.constants(columns))
+    period, constants = rattle_period(columns), slip.Constants.of(columns)
     start = np.vstack([stack(slip.start(columns)) / SCALE[:, None], np.zeros((1, len(period)))])
     runs = [Run(float(p)) for p in period]
     waiting: Iterator[int] = iter(np.argsort(slip.fastest_decay(columns) * period))
@@ -177,7 +178,7 @@ def follow(columns: dict[str, Array], advance: Advance, lanes: int, real: Any) -
             if runs[held[lane]].status == "running" and lane == first_lane(held, held[lane]):
                 leap(runs[held[lane]], states[:, lane], constants[:, held[lane]])
         for lane in np.flatnonzero([runs[cell].status != "running" for cell in held]):
-            # With no cell left, a lane shadows another.
+            # If no cell is left, the lane repeats another one.
             if (cell := next(waiting, None)) is not None:
                 held[lane], states[:, lane] = cell, start[:, cell]
             else:
@@ -187,7 +188,7 @@ def follow(columns: dict[str, Array], advance: Advance, lanes: int, real: Any) -
 
 
 def look(runs: list[Run], held: Array, path: Array, constants: Array) -> None:
-    """Enter a stretch of all lanes' paths, shape (samples, 8, lanes), and end the cells that are done."""
+    """Record a stretch of all lanes' paths, shape (samples, 8, lanes), and end the cells that are done."""
     states = np.moveaxis(path[:, :-1] * SCALE[:, None], 1, 0)
     _, (_, _, force, _) = slip.rhs(tuple(states), tuple(constants))
     settled = have_settled(states[:, -1].astype(float), constants.astype(float))
@@ -206,7 +207,7 @@ def look(runs: list[Run], held: Array, path: Array, constants: Array) -> None:
 
 
 def first_lane(held: Array, cell: int) -> int:
-    """The lane whose cell it is; later ones shadow it."""
+    """The lane that holds `cell`; later lanes may repeat it."""
     return int(np.argmax(held == cell))
 
 
@@ -221,7 +222,7 @@ def reach(states: Array, constants: Array) -> Array:
 
 
 def have_settled(states: Array, constants: Array) -> Array:
-    """Whether the rattle decays at all spins that it can reach, with a margin, all of one sign.  Shape (lanes,)."""
+    """Whether the rattle decays at all spins within reach and a margin, and these have one sign.  Shape (lanes,)."""
     spin, *_ = slip.energy(states, constants)
     within = MARGIN * reach(states, constants)
     near = [spin + share * within for share in np.linspace(-1, 1, 5)]
@@ -233,7 +234,7 @@ def have_settled(states: Array, constants: Array) -> Array:
 
 
 def leap(run: Run, states: Array, constants: Array) -> None:
-    """Carry each mode by its own exponential, at constant spin, until the rattle matters; in place."""
+    """Advance each mode by its own exponential, at constant spin, until the rattle matters; in place."""
     values, modes = eigenpairs(jacobian(constants, -states[SPIN]))
     amplitudes = solve(modes, states[RATTLE][:, None].astype(np.clongdouble))[:, 0]
     halves = np.arange(1, 2 * WINDOWS + 1) / 2
@@ -248,7 +249,7 @@ def leap(run: Run, states: Array, constants: Array) -> None:
 
 
 def jacobian(constants: Array, spin: Any) -> Array:
-    """Of the rattle at upright spin, in 80-bit arithmetic by complex steps, shape (6, 6)."""
+    """Jacobian of the rattle at upright spin, in 80-bit arithmetic by complex steps, shape (6, 6)."""
     step, columns = np.longdouble(1e-30), []
     for i in RATTLE:
         states = np.array(slip.MODEL.upright(spin)).astype(np.clongdouble)
@@ -272,7 +273,7 @@ def eigenpairs(matrix: Array) -> tuple[Array, Array]:
 def solve(matrix: Array, right: Array) -> Array:
     """matrix⁻¹ right in 80-bit arithmetic, by refinement of double precision's."""
     inverse = np.linalg.inv(matrix.astype(complex))
-    # Products in 80 bits: columns of very different sizes keep their own precision.
+    # Products in 80 bits, so that columns of very different sizes all keep their precision.
     result = inverse @ right
     for _ in range(3):
         result = result + inverse @ (right - matrix @ result)
@@ -283,14 +284,14 @@ def solve(matrix: Array, right: Array) -> Array:
 
 
 def differ(one: Run, other: Run, tolerance: float) -> bool:
-    """In count, end or the time of the last reversal."""
+    """Whether two runs differ in count, end or the time of the last reversal."""
     if (one.reversals(), one.status) != (other.reversals(), other.status):
         return True
     return abs(one.last_reversal() - other.last_reversal()) > tolerance * other.last_reversal()
 
 
 def row(columns: dict[str, Array], cell: int, runs: list[Run]) -> dict[str, Any]:
-    """Of the runs of one cell, the last is taken for the best."""
+    """The table's row for a cell.  The last of its runs is taken as the best."""
     best, limited = runs[-1], any(differ(run, runs[-1], ROUGHLY_SAME_TIME) for run in runs[:-1])
     counts = {run.reversals(shift) for run in runs for shift in (0, 1)}
     ends = {run.status for run in runs}
@@ -309,7 +310,7 @@ def row(columns: dict[str, Array], cell: int, runs: list[Run]) -> dict[str, Any]
 
 
 def all_runs(columns: dict[str, Array]) -> list[list[Run]]:
-    """Of each cell: in double precision, from the nudged start and to the first start again, at need in 80 bits."""
+    """Runs of each cell: in double precision from the nudged and the true start, and in 80 bits if they differ."""
     nudged = columns | {"x0": columns["x0"] * NUDGE}
     doubled = [
         follow(nudged, double_precision(OTHER_TOLERANCE), LANES, float),

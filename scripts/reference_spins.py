@@ -3,14 +3,14 @@
 The equations are the package's own right-hand sides, traced into other arithmetic: the table checks
 integration, not derivation.  Two methods share nothing but the equations:
 
-* Taylor series (heyoka.py) in 128-bit arithmetic, and in 80-bit arithmetic to compare with;
-* a nine-stage Radau IIA collocation in 80-bit arithmetic on the slip model.  Where friction leaves the
-  128-bit series steps too short (`STIFF`), the table has the spins of this one, else it is compared with.
+* Taylor series (heyoka.py) in 128-bit arithmetic, and in 80-bit arithmetic for comparison;
+* nine-stage Radau IIA collocation in 80-bit arithmetic on the slip model.  It gives the spins of the table where
+  friction makes the steps of the 128-bit series too short (`STIFF`), and serves for comparison elsewhere.
 
-Parameters are the double-precision numbers nearest to the decimals in the table, and everything computed
-from them (constants, starts) is computed in the arithmetic of the integration.
+Parameters are the double-precision numbers nearest to the decimals in the table.  Everything computed from them
+(constants, starts) is computed in the arithmetic of the integration.
 
-    python scripts/reference_spins.py data/reference_spins.csv
+    python scripts/reference_spins.py sweep/bench/data/reference_spins.csv
 """
 
 from __future__ import annotations
@@ -21,15 +21,16 @@ import time
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
-from types import FunctionType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
 import heyoka
 import numpy as np
 from numpy.polynomial import legendre
+from tracing import traced_rhs
 
-from sweep.models import MODELS, coefficients, ellipsoid, slip
+from sweep.models import MODELS, coefficients, slip
 from sweep.models.model import Array, Model
 
 Case = dict[str, float]
@@ -56,25 +57,25 @@ SLIPPING_BODIES = [body | {"mu": mu} for body in BODIES for mu in (20.0, 100.0)]
 CASES = {"slip": SLIP + STIFF, "noslip": BODIES, "effective": SLIPPING_BODIES, "averaged": SLIPPING_BODIES}
 
 EXTENDED_TOLERANCE, QUADRUPLE_TOLERANCES = 1.1e-19, (1e-24, 1e-27)
-"""Of the Taylor series: 80-bit arithmetic's ε, and far beyond the digits written."""
+"""Tolerances of the Taylor series: the ε of 80-bit arithmetic, and far beyond the digits written."""
 
 STAGES, RADAU_STEPS = 9, (0.1, 0.125)
 
 LARGEST_DIFFERENCE = 1e-16
-"""Between the two tolerances or steps of the method whose spins are written."""
+"""Allowed between the two tolerances, or steps, of the method whose spins are written."""
 
 
 def typed(x: Array) -> Array:
-    """Of the type of its elements: numpy makes objects of 128-bit numbers where they meet its own."""
+    """`x` with the type of its elements: numpy makes object arrays when 128-bit numbers meet its own."""
     return np.array(list(x))
 
 
 def arctan(x: Array) -> Array:
-    """To the last digit in any arithmetic that has a sine: one Newton step from double precision."""
+    """The arctangent to the last digit, in any arithmetic that has a sine: one Newton step from double precision."""
     x = typed(x)
     guess = np.array([x.dtype.type(np.arctan(float(value))) for value in x])
     sin, cos = np.sin(guess), np.cos(guess)
-    # As objects these can be multiplied by Python's numbers.
+    # As objects, these can be multiplied by Python's numbers.
     return np.asarray(guess + (x * cos - sin) / (cos + x * sin)).astype(object)
 
 
@@ -88,7 +89,7 @@ def problem(model: Model, case: Case, real: Any) -> tuple[list[Any], list[Any]]:
 
 
 def check_contact(model: Model, states: Any, constants: Any) -> Any:
-    """The spin, of a state in which the body touches the plane."""
+    """The spin, after checking that the body touches the plane."""
     _, (spin, _, R, denominator) = model.rhs(tuple(states), tuple(constants))
     assert R > 0
     assert denominator > 0
@@ -98,18 +99,11 @@ def check_contact(model: Model, states: Any, constants: Any) -> Any:
 # --- Taylor series ----------------------------------------------------------------------------
 
 
-def traced_rhs(model: Model) -> Any:
-    """The right-hand side for heyoka's symbols, which know another square root than numpy's."""
-    numbers = SimpleNamespace(sqrt=heyoka.sqrt)
-    contact = FunctionType(ellipsoid.contact.__code__, {"np": numbers})
-    return FunctionType(model.rhs.__code__, {"np": numbers, "contact": contact})
-
-
 def taylor_spins(model: Model, case: Case, real: Any, tolerance: float) -> list[Any]:
     """Spins at `TIMES`."""
     states, constants = problem(model, case, real)
     symbols = heyoka.make_vars(*model.states)
-    slopes, _ = traced_rhs(model)(tuple(symbols), tuple(heyoka.par[i] for i in range(len(constants))))
+    slopes, _ = traced_rhs(model, heyoka.sqrt)(tuple(symbols), tuple(heyoka.par[i] for i in range(len(constants))))
     integrator = heyoka.taylor_adaptive(
         list(zip(symbols, slopes, strict=True)),
         state=states,
@@ -139,8 +133,8 @@ def legendre_values(x: Array, count: int) -> Array:
 def radau(stages: int) -> Array:
     """Coefficients A of Radau IIA in 80-bit arithmetic; the last row holds the weights.
 
-    Its nodes on [-1, 1] are the zeros of P_s - P_(s-1).  Its quadrature is exact to degree 2s - 2, so
-    that it projects on Legendre's polynomials, whose integrals are known.
+    The nodes on [-1, 1] are the zeros of P_s - P_(s-1).  The quadrature is exact to degree 2s - 2, so it projects on
+    Legendre polynomials, whose integrals are known.
     """
     difference = np.zeros(stages + 1)
     difference[-2:] = -1, 1
@@ -170,7 +164,7 @@ def full_jacobian(states: Array, constants: Array) -> Array:
 
 
 def radau_step(A: Array, states: Array, constants: Array, step: Any) -> Array:
-    """One step; Newton's matrix is in double precision, what it solves in 80 bits."""
+    """One step.  Newton's matrix is in double precision, the residual in 80 bits."""
     s, n = len(A), len(states)
     jacobian = full_jacobian(states.astype(float), constants.astype(float))
     inverse = np.linalg.inv(np.eye(s * n) - np.kron(float(step) * A.astype(float), jacobian))
@@ -185,7 +179,7 @@ def radau_step(A: Array, states: Array, constants: Array, step: Any) -> Array:
 
 
 def first_times(case: Case, longest: float) -> list[Any]:
-    """Ends of steps that resolve how the slip sets in: from a fifth of its decay time, growing to `longest`."""
+    """Ends of steps that resolve the onset of slip, growing from a fifth of its decay time to `longest`."""
     step = Extended(0.2 / slip.fastest_decay({name: np.array([value]) for name, value in case.items()})[0])
     times = [Extended(0)]
     while step < longest:
@@ -212,7 +206,7 @@ def radau_spins(case: Case, longest: float) -> list[Any]:
 
 
 def reference(model: Model, case: Case) -> tuple[list[Any], dict[str, float]]:
-    """Spins at `TIMES`, and their largest difference from the same `again` and from other ways to them."""
+    """Spins at `TIMES`, and their largest differences: from the same method `again`, and from the other methods."""
     if case in STIFF:
         best, again = (radau_spins(case, step) for step in RADAU_STEPS)
     else:
@@ -225,7 +219,7 @@ def reference(model: Model, case: Case) -> tuple[list[Any], dict[str, float]]:
 
 
 def as_decimals(spins: list[Any]) -> list[Decimal]:
-    """What 80 and 128 bits have in common."""
+    """The spins as decimals, in which 80 and 128 bits can be compared."""
     return [Decimal(str(spin)) for spin in spins]
 
 

@@ -1,4 +1,4 @@
-"""The cells of a sweep: one row a trajectory, in the C order of the axes."""
+"""The cells of a sweep, each one trajectory, in the C order of the axes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from sweep.parameters import START
 Array = NDArray[Any]
 
 Tile = tuple[slice, ...]
-"""A block of the cells of a grid: a range of each of its dimensions."""
+"""A block of cells of a grid: a range of each of its dimensions."""
 
 
 class Sweepable(Protocol):
-    """What a grid is made from: `sweep.config.Config` is one."""
+    """What a grid is made from, such as a `sweep.config.Config`."""
 
     @property
     def parameters(self) -> Mapping[str, Any]: ...
@@ -39,6 +39,7 @@ class Grid:
 
     @classmethod
     def of(cls, config: Sweepable) -> Grid:
+        """The grid of all cells of a configuration."""
         values = config.parameters
         return cls(
             axes={name: np.array(v.numbers) for name, v in values.items() if v.is_axis},
@@ -61,7 +62,7 @@ class Grid:
         return prod(self.shape)
 
     def columns(self) -> dict[str, Array]:
-        """All parameters, each as an array of shape (size,)."""
+        """Values of all parameters, axes and constants, each of shape (size,)."""
         if self.cases is not None:
             varying = self.cases
         else:
@@ -70,7 +71,7 @@ class Grid:
         return varying | {name: np.full(self.size, value) for name, value in self.constants.items()}
 
     def tiles(self, cells: int) -> list[Tile]:
-        """Blocks of about `cells` cells that cover the grid, each contiguous in C order."""
+        """Blocks of about `cells` cells that cover the grid; each is contiguous in C order."""
         block, inner = [1] * len(self.shape), self.size
         for position, length in enumerate(self.shape):
             inner //= length
@@ -85,13 +86,13 @@ class Grid:
         ]
 
     def part(self, tile: Tile) -> Grid:
-        """The grid of a block of the cells."""
+        """The grid of the cells of a tile."""
         if self.cases is not None:
             return Grid({}, self.constants, {name: values[tile[0]] for name, values in self.cases.items()})
         return Grid({n: v[at] for (n, v), at in zip(self.axes.items(), tile, strict=True)}, self.constants)
 
     def sample(self, cells: int) -> Grid:
-        """About `cells` of the cells, evenly over each axis, its ends included; all if there are no more."""
+        """About `cells` of the cells, spread evenly over each axis with both its ends; all if there are no more."""
         if self.size <= cells:
             return self
         each = max(2, int(cells ** (1 / sum(n > 1 for n in self.shape))))
@@ -109,7 +110,7 @@ class Grid:
         return int(np.ravel_multi_index([at.start for at in tile], self.shape)) if tile else 0
 
     def bodies(self) -> tuple[Grid, Array]:
-        """The grid without the parameters of the start, and for each cell its place in that."""
+        """The grid of the bodies, without the start parameters, and for each cell the index of its body in it."""
         if self.cases is not None:
             return self, np.arange(self.size)
         kept = {name: values for name, values in self.axes.items() if name not in START}
@@ -122,19 +123,19 @@ class Grid:
 
 
 _TILE = 1 << 18
-"""Cells looked at together where something is asked of all."""
+"""Cells examined at a time, when all cells are."""
 
 BODY = ("a", "b", "c", "delta")
 _PLACE = (*BODY, "x0", "y0")
 
 
 def off_the_body(config: Sweepable) -> str:
-    """What is wrong with the first cell whose start point lies off the ellipsoid; "" if none does."""
+    """What is wrong with the first cell whose start point lies off the ellipsoid; "" if no cell's does."""
     return next(filter(None, map(_off_the_body, distinct(Grid.of(config), _PLACE))), "")
 
 
 def distinct(grid: Grid, names: tuple[str, ...]) -> Iterator[dict[str, Array]]:
-    """Columns in which each combination of the parameters `names` occurs, a bounded number of cells at a time."""
+    """Columns of cells that have every combination of the parameters `names`, a bounded number of cells at a time."""
     grid = Grid({n: v if n in names else v[:1] for n, v in grid.axes.items()}, grid.constants, grid.cases)
     return (grid.part(tile).columns() for tile in grid.tiles(_TILE))
 
@@ -143,7 +144,7 @@ def _off_the_body(p: Mapping[str, Array]) -> str:
     if "x0" not in p:
         return ""
     cos, sin = np.cos(p["delta"]), np.sin(p["delta"])
-    with np.errstate(over="ignore"):  # infinity is off the body as well
+    with np.errstate(over="ignore"):  # infinity lies off the body as well
         x, y = p["x0"] * cos - p["y0"] * sin, p["x0"] * sin + p["y0"] * cos
         outside = np.flatnonzero((x / p["a"]) ** 2 + (y / p["b"]) ** 2 >= 1)
     if not len(outside):

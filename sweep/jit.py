@@ -1,4 +1,4 @@
-"""Every Numba option of the project, and the cache that makes a compiled kernel safe to reuse."""
+"""All Numba options of the project, and the on-disk cache that makes compiled kernels safe to reuse."""
 
 from __future__ import annotations
 
@@ -18,46 +18,49 @@ from numba.core.caching import FunctionCache
 from numba.core.registry import cpu_target
 from numba.extending import register_jitable
 
-# contract: fuse a*b + c into one FMA; nsz, arcp: free on the values met here.
-# Not nnan/ninf: they turn `x > 0` and isfinite(x) into constants for the very states to be caught.
-# Not reassoc: 4 % faster on the slip model, but it may undo (1 - u1^2) - u2^2 and the energy's
-# differences, and ties the last bits to the compiler's mood.
+# contract: fuse a*b + c into one FMA.  nsz, arcp: harmless on the values met here.
+# Not nnan or ninf: these let the compiler assume that no NaN or infinity occurs, so tests such as `x > 0`
+# and isfinite(x) become constants for exactly the states that they have to catch.
+# Not reassoc: 4 % faster on the slip model, but it may rearrange (1 - u1^2) - u2^2 and the differences in
+# the energy, and the last bits then depend on choices of the optimiser.
 FASTMATH = {"contract", "nsz", "arcp"}
 
-# error_model="python" puts a branch in front of each division, which stops vectorisation.
+# error_model="python" would put a branch in front of each division, which prevents vectorisation.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FASTMATH}
 
-# Numba numbers the functions of a process from 1, and only that number tells the symbols of two closures
-# of one name apart.  Two kernels compiled by two processes and loaded by a third then shared symbols, and one
-# called the other's loop, with other rows: wrong numbers, or a crash.
+# Numba numbers the functions of each process from 1, and only that number distinguishes the symbols of two
+# closures with the same name.  When one process loaded two kernels that two others had compiled, these shared
+# symbols, and one called the loop of the other, made for another layout: wrong numbers, or a crash.  So each
+# process starts from a random number.
 FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(5), "little"))
 
 _NUMERIC_SOURCES = ("jit.py", "models/**/*.py", "kernels/**/*.py")
 
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Let `function` dissolve into compiled code that calls it.
+    """Mark `function` to be inlined into the compiled code that calls it.
 
-    Called from Python it stays Python, all the way down: on arrays, real or complex, it compiles nothing.
+    Called from Python, it remains plain Python, and so do the inline functions that it calls: it takes arrays,
+    real or complex, and nothing is compiled.
     """
     jitable: Callable[..., Any] = register_jitable(forceinline=True, **OPTIONS)(function)
     return jitable
 
 
 def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -> Any:
-    """Compile `function` with prange, cached on disk under `specialisation` and all its sources.
+    """Compile `function` with prange; cache the result on disk under `specialisation` and a hash of all sources.
 
-    Numba's own cache looks at the file that defines a function and at its closure.  Here the
-    closure holds compiled functions from other files (Numba sees a new one in every process and
-    would never hit) whose edits it cannot see.  The key used instead names the specialisation and
-    carries a hash of every numeric source, of the `modules` (files of models from outside the
-    package) and of the libraries that compile them.
+    Numba's own cache depends on the file that defines a function and on the function's closure.  Here the
+    closure holds compiled functions from other files.  Numba takes these for new ones in every process, so its
+    cache would never hit, and it does not notice when those files are edited.  The key used instead consists of
+    the specialisation and of a hash: of every numeric source, of the `modules` (files of models from outside
+    the package), and of the versions of the libraries that compile them.
     """
     return _cached(numba.njit(function, parallel=True, **OPTIONS), specialisation, *modules)
 
 
 def serial(function: Callable[..., Any], specialisation: str) -> Any:
-    """As `parallel`, for work not worth sharing out: threads take their time to come in on a busy machine."""
+    """As `parallel`, but on one thread, for short tasks: on a busy machine threads are slow to start."""
     return _cached(numba.njit(function, **OPTIONS), specialisation)
 
 
@@ -72,7 +75,7 @@ def is_cached(dispatcher: Any, signature: tuple[Any, ...]) -> bool:
 
 
 def fingerprint(*modules: str) -> str:
-    """Hash of all sources a kernel can be built from, and of what compiles them."""
+    """Hash of all sources from which a kernel can be built, and of the versions of what compiles them."""
     root = Path(__file__).parent
     files = [path for pattern in _NUMERIC_SOURCES for path in sorted(root.glob(pattern))]
     digest = hashlib.sha256()
@@ -85,6 +88,8 @@ def fingerprint(*modules: str) -> str:
 
 
 class _SpecialisedCache(FunctionCache):
+    """Numba's cache, in which `key` (the specialisation and the hash of the sources) replaces the closure."""
+
     def __init__(self, function: Callable[..., Any], key: tuple[str, str]) -> None:
         super().__init__(function)  # type: ignore[no-untyped-call]
         self._key = key

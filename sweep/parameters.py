@@ -1,6 +1,6 @@
-"""The physical parameters: names, meanings, units, defaults and bounds, said here alone.
+"""The physical parameters: names, meanings, units, defaults and bounds, stated here and nowhere else.
 
-The configuration schema, the dataset's attributes and the documentation are made from this table.
+The schema of the configuration, the attributes of the dataset and the documentation are made from this table.
 """
 
 from __future__ import annotations
@@ -11,16 +11,21 @@ from math import inf, pi
 
 @dataclass(frozen=True)
 class Parameter:
+    """A physical parameter of a trajectory."""
+
     name: str
     section: str
-    """Where the configuration has it."""
+    """Section of the configuration in which it stands."""
     units: str
     long_name: str
     default: float | None
-    """The paper's standard case; None where a configuration has to say."""
+    """Value of the paper's standard case; None if the configuration has to give one."""
     above: float = -inf
+    """Exclusive lower bound."""
     below: float = inf
+    """Exclusive upper bound."""
     at_least: float = -inf
+    """Inclusive lower bound."""
 
     @property
     def path(self) -> str:
@@ -31,7 +36,7 @@ class Parameter:
 
     @property
     def allowed(self) -> str:
-        """The bounds in words."""
+        """The bounds in words, for messages to the user."""
         bounds = [
             f"{sign} {bound:.6g}"
             for sign, bound in ((">", self.above), (">=", self.at_least), ("<", self.below))
@@ -60,4 +65,4 @@ PARAMETERS: dict[str, Parameter] = {
 SECTIONS: tuple[str, ...] = tuple(dict.fromkeys(p.section for p in PARAMETERS.values()))
 
 START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")
-"""Parameters of the start alone: critical spins and form factor do not depend on them."""
+"""Names of the parameters of the start, on which the critical spins and the form factor do not depend."""

@@ -1,4 +1,4 @@
-"""What theory says of every cell: the paper's formulas and a model's eigenvalues."""
+"""What theory predicts for every cell: the paper's formulas, and stability by a model's eigenvalues."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 
 from sweep.grid import Array, Grid
 from sweep.models import analytic, linear
-from sweep.models.model import Columns, Model, Tier, stack
+from sweep.models.model import FORMULAS, Columns, Model, Tier, stack
 
-# Bodies that a thread takes at a time.  Numpy takes eigenvalues on one thread, 0.5 ms a body, where a trajectory
-# takes 1 ms.  With fewer the calls take longer than the numbers; with more Ctrl-C waits longer.
+# Bodies that a thread handles at a time.  NumPy computes eigenvalues on one thread, in 0.5 ms a body, which counts
+# beside the 1 ms of a trajectory; so the bodies are shared among threads.  With fewer bodies at a time the calls
+# take longer than the arithmetic; with more, Ctrl-C has to wait longer.
 _PART = 1000
 
 
@@ -22,32 +23,36 @@ class Formulas:
     """The paper's predictions for bodies with friction."""
 
     reversals: Array
-    """Over the cells."""
+    """Predicted number of reversals n_r, over the cells."""
     n_c1: tuple[Array, Array]
-    """Plus and minus, over the bodies; n_c2 is twice that."""
+    """n_c1+ and n_c1-, over the bodies; n_c2± is twice n_c1±."""
 
 
 @dataclass(frozen=True)
 class Stability:
-    """Where a model's rattle decays, over the bodies: the cells without their start."""
+    """The spins at which a model's rattle decays, over the bodies."""
 
     n_c1: tuple[Array, Array]
-    """Plus and minus; infinite where the rattle decays at every spin, NaN where at none."""
+    """n_c1+ and n_c1- by the eigenvalues, as `sweep.models.linear.critical_spins` gives them: infinite where the
+    rattle decays at every spin, NaN where it does not decay at rest.  NaN too for a model without formulas."""
     ranges: Array
-    """Shape (6, bodies), as `Kernel.images` takes them."""
+    """Bounds of the ranges of spin in which the rattle decays, shape (6, bodies), as `Kernel.images` takes them."""
 
 
 @dataclass(frozen=True)
 class Prediction:
+    """Everything that is predicted for the cells and bodies of a grid."""
+
     form_factor: Array
-    """Over the bodies."""
+    """L(f), over the bodies."""
     formulas: Formulas | None
-    """None for a tier without friction: it reverses for ever."""
+    """None for a tier to which they do not apply, because without friction the spin reverses for ever."""
     stability: Stability | None
-    """None for a tier that is not simulated, and where the eigenvalues are not asked for."""
+    """None for a tier that is not simulated, and where the eigenvalues were not asked for."""
 
 
 def predict(tier: Tier, grid: Grid) -> Prediction:
+    """The whole prediction, with the eigenvalues where the tier is simulated."""
     prediction = formulas(tier, grid)
     if not isinstance(tier, Model):
         return prediction
@@ -57,10 +62,10 @@ def predict(tier: Tier, grid: Grid) -> Prediction:
 
 
 def formulas(tier: Tier, grid: Grid) -> Prediction:
-    """What costs next to nothing: all but the eigenvalues."""
+    """The prediction without the eigenvalues: what is left costs next to nothing."""
     bodies = grid.bodies()[0].columns()
     found = None
-    if "mu" in tier.parameters:
+    if FORMULAS in tier.offers:
         found = Formulas(analytic.reversal_count(grid.columns()), analytic.critical_spins(bodies))
     return Prediction(analytic.form_factor(bodies), found, None)
 

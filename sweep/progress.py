@@ -5,12 +5,12 @@ from __future__ import annotations
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from sweep.engine.run import Progress as Done
-from sweep.engine.run import Reporter
+from sweep.engine.reporter import Progress as Done
+from sweep.engine.reporter import Reporter
 
 
 class Terminal(Reporter):
-    """A bar with cells done, failures so far, trajectories a second and time left."""
+    """A bar with the cells done, failures so far, trajectories per second and time left."""
 
     def __init__(self, quiet: bool = False) -> None:
         self.console = Console(stderr=True, quiet=quiet, highlight=False)
@@ -33,7 +33,7 @@ class Terminal(Reporter):
             self._bar.stop()
 
     def compiling(self) -> None:
-        self.note("compiling the kernel for this model and machine; the next run finds it in the cache")
+        self.note("compiling the kernel for this model and machine; later runs find it in the cache")
 
     def note(self, message: str) -> None:
         self.console.print(message, soft_wrap=True, markup=False)

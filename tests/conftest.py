@@ -1,37 +1,73 @@
-"""What several tests need: the paper's standard case and configurations on disk."""
+"""Fixtures of all rooms, and the kernels that the tests of every room need, compiled ahead of them."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
-import numpy as np
+import numba
 import pytest
+import xarray as xr
 from hypothesis import settings
+from support import ROOT, SMALL, STANDARD, columns
+from support.kernels import default_measures, kernel
+
+import sweep
+from sweep.kernels.build import build
+
+__all__ = ["ROOT", "SMALL", "STANDARD", "columns"]
 
 # Compiling takes longer than any deadline; the same examples on every machine.
 settings.register_profile("sweep", deadline=None, derandomize=True, max_examples=200)
 settings.load_profile("sweep")
 
-ROOT = Path(__file__).parent.parent
+# Several processes share the cores; what a test says of threads, it sets.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    numba.set_num_threads(1)
 
-STANDARD = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 60.0, "n0": 0.05, "x0": 0.01, "y0": 0.01}
+# The longest first.
+KERNELS = [
+    ("adams", "slip", default_measures("slip")),
+    ("dopri5", "slip", default_measures("slip")),
+    ("dopri5", "noslip", default_measures("noslip")),
+    ("dopri5", "effective", default_measures("effective")),
+    ("dopri5", "averaged", default_measures("averaged")),
+    ("dopri5", "slip", ()),
+    ("dopri5", "slip", ("reversals",)),
+    ("dopri5", "slip", ("reversals", "first_reversal")),
+    ("dopri5", "averaged", ()),
+    ("dopri5", "averaged", ("reversals",)),
+]
+"""Method, model and measurements of the kernels that several files of tests run."""
 
 
-def columns(**parameters: Any) -> dict[str, np.ndarray]:
-    """The standard case with some parameters replaced, as columns over cells."""
-    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (STANDARD | parameters).values()))
-    return {name: array.copy() for name, array in zip(STANDARD | parameters, arrays, strict=True)}
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the kernels on all cores before processes that share the tests wait for the same ones."""
+    config = session.config
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and not config.option.collectonly
+    if hasattr(config, "workerinput") or not whole:
+        return
+    missing = [each for each in KERNELS if not kernel(*each).is_compiled()]
+    if missing:
+        config.get_terminal_writer().line(f"compiling {len(missing)} kernels", flush=True)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(lambda each: build(*each), missing))
 
 
-SMALL = """\
-name: small
-body: {a: 10.0, b: [2.0, 3.0, 5.0], delta: 0.03}
-friction: {mu: [40, 60]}
-start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
-integrator: {t_end: 1500}
-"""
+@pytest.fixture(scope="session")
+def small(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """The dataset of the sweep of twelve cells."""
+    path = tmp_path_factory.mktemp("small") / "small.yaml"
+    path.write_text(SMALL, encoding="utf-8")
+    return sweep.run(path)
+
+
+@pytest.fixture
+def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chunks of twenty blocks on any machine; twelve cells take some twenty of them."""
+    monkeypatch.setattr("sweep.engine.executor._rescale", lambda *_: 20)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The bench: its error measure, what it writes, and that each hard case sees its bug."""
+"""The bench: its error measure, what it writes, and that each hard case catches a planted bug."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ from sweep.bench.reference import read_counts, read_spins, spin_errors, whole_st
 from sweep.bench.timing import Effort, Part, Spread, Work, in_turn
 from sweep.cli import main
 from sweep.kernels import methods
-from sweep.kernels.lanes import DIVERGED, LIFT_OFF, TIME_LIMIT
+from sweep.kernels.status import DIVERGED, LIFT_OFF, TIME_LIMIT
 from sweep.models import MODELS
 from sweep.report.cells import Ends, make_kernel, simulate, standard
 from sweep.report.rows import Row, Section, states
+
+pytestmark = pytest.mark.campaign
 
 TIMES = (25.0, 50.0)
 TINY = Effort(
@@ -30,7 +32,7 @@ BODIES = [{"mu": 60.0}, {"mu": 60.0, "b": 5.0, "c": 0.7}]
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """References of two bodies a model and four cells, in the place of the project's."""
+    """References of two bodies for each model and of four cells, in place of the package's."""
     folder = tmp_path_factory.mktemp("data")
     with (folder / "spins.csv").open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream)
@@ -57,7 +59,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.mark.usefixtures("data")
 @pytest.mark.parametrize("method", ["dopri5", "adams"])
-def test_error_is_the_distance_from_the_reference(method: str) -> None:
+def test_error_is_the_largest_difference_from_the_reference(method: str) -> None:
     spins = read_spins()["slip"]
     step = whole_steps(spins, np.full(2, 0.02))
     kernel = make_kernel(method, MODELS["slip"], ("reversals", "energy_error"))
@@ -71,14 +73,14 @@ def test_error_is_the_distance_from_the_reference(method: str) -> None:
 
 
 @pytest.mark.usefixtures("data")
-def test_what_does_not_arrive_is_off_by_infinity() -> None:
+def test_error_of_a_failed_trajectory_is_infinite() -> None:
     spins = read_spins()["slip"]
     kernel = make_kernel("dopri5", MODELS["slip"], ("reversals", "energy_error"))
     assert list(spin_errors(kernel, spins, np.full(2, 0.1))[0]) == [np.inf, np.inf]
 
 
 @pytest.mark.usefixtures("data")
-def test_references_are_read() -> None:
+def test_references_are_read_by_model_and_body() -> None:
     spins = read_spins()
     assert set(spins) == set(MODELS)
     assert list(spins["slip"].times) == list(TIMES)
@@ -90,14 +92,7 @@ def test_references_are_read() -> None:
     assert list(counts.columns["mu"]) == [40, 60, 75, 100]
 
 
-def test_a_missing_reference_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reference, "SPINS", tmp_path / "none.csv")
-    monkeypatch.setattr(report, "compile_kernels", lambda: None)
-    result = CliRunner().invoke(main, ["bench", "--output", str(tmp_path / "o")])
-    assert (result.exit_code, "none.csv: no such file" in result.stderr) == (2, True)
-
-
-def test_steps_meet_the_references_times() -> None:
+def test_times_of_the_reference_are_multiples_of_the_step() -> None:
     spins = reference.Spins({}, np.array([25.0, 50.0]), np.zeros((3, 2)))
     steps = whole_steps(spins, np.array([0.3, 0.25, 30.0]))
     assert 25 / steps == pytest.approx(np.round(25 / steps), rel=1e-14)
@@ -105,7 +100,7 @@ def test_steps_meet_the_references_times() -> None:
     assert steps[1] == 0.25
 
 
-def test_works_take_turns_and_slow_ones_fewer() -> None:
+def test_works_take_turns_and_slow_ones_run_less_often() -> None:
     order: list[str] = []
     works = {name: (lambda name=name: order.append(name)) for name in "ab"}
     spreads = in_turn(works, Effort(repeats=4))
@@ -116,7 +111,7 @@ def test_works_take_turns_and_slow_ones_fewer() -> None:
 
 
 @pytest.mark.usefixtures("data")
-def test_a_tiny_run_writes_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tiny_run_writes_all_files_and_sections(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hard, "CASES", (hard.equilibrium,))
     said: list[str] = []
     assert report.bench(tmp_path, said.append, TINY) == []
@@ -147,7 +142,7 @@ def test_a_tiny_run_writes_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("method", methods.METHODS)
-def test_what_is_timed_goes_to_the_end(method: str) -> None:
+def test_timed_runs_reach_the_end(method: str) -> None:
     work = Work(make_kernel(method, MODELS["slip"], ()), standard(mu=[60.0, 75.0]), np.full(2, 0.01), 50.0)
     states = work.kernel.unpack(work())[0]
     np.testing.assert_array_equal(states, simulate(standard(mu=[60.0, 75.0]), 50.0, method=method, step=0.01).states)
@@ -163,7 +158,7 @@ def test_methods_are_compared_at_equal_error() -> None:
 
 
 @pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
-def test_exit_code_is_that_of_the_hard_cases(
+def test_exit_code_tells_whether_the_hard_cases_hold(
     holds: bool, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(report, "PARTS", (lambda _: Part(Section("Nothing"), panels=[lambda _: None]),))
@@ -181,7 +176,7 @@ Bug = Callable[[Ends, dict[str, Any]], None]
 
 
 def remembered(columns: dict[str, np.ndarray], t_end: float, **options: Any) -> Ends:
-    """`simulate`, each run once; what it returns may be spoilt."""
+    """`simulate`, which runs each case once; a test may change what it returns."""
     key = tuple(
         (name, np.asarray(value).tobytes() if isinstance(value, np.ndarray) else value)
         for name, value in (*columns.items(), ("t_end", t_end), *options.items())
@@ -204,7 +199,7 @@ def rows_with(case: Callable[[], list[Row]], bug: Bug | None, monkeypatch: pytes
 
 
 def row(name: str, value: float, when: Callable[[dict[str, Any]], bool] = lambda _: True) -> Bug:
-    """Sets a row of the images to a value."""
+    """A bug that sets a row of the images to a value."""
 
     def bug(ends: Ends, options: dict[str, Any]) -> None:
         if when(options):
@@ -222,7 +217,7 @@ def one_more_reversal(when: Callable[[dict[str, Any]], bool] = lambda _: True) -
 
 
 def scaled(states: slice, factor: float, when: Callable[[dict[str, Any]], bool] = lambda _: True) -> Bug:
-    """Multiplies some of the states."""
+    """A bug that multiplies some of the states."""
 
     def bug(ends: Ends, options: dict[str, Any]) -> None:
         if when(options):
@@ -232,12 +227,13 @@ def scaled(states: slice, factor: float, when: Callable[[dict[str, Any]], bool] 
 
 
 def earlier(ends: Ends, options: dict[str, Any]) -> None:
+    """Trajectories that end too early."""
     if "step" not in options:
         ends.images[:, ends.kernel.row("done")] *= 0.9
 
 
 def undetected(ends: Ends, options: dict[str, Any]) -> None:
-    """A divergence that no one flags."""
+    """A divergence without its status."""
     if "step" in options:
         ends.images[:, ends.kernel.row("status")] = TIME_LIMIT
 
@@ -294,7 +290,7 @@ def test_every_case_has_a_planted_bug() -> None:
     ("count", "last", "flag", "holds"),
     [(9, 12916, 0, True), (9, 12800, 0, True), (9, 12251, 0, False), (9, 12251, 1, True), (8, 12916, 1, False)],
 )
-def test_late_reversals_are_judged(
+def test_verdict_on_late_reversals(
     count: int, last: float, flag: int, holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def plant(ends: Ends, _: dict[str, Any]) -> None:

@@ -1,6 +1,6 @@
-"""Whatever a user hands in is accepted or refused in lines that help; nothing else happens.
+"""Any input is either accepted or refused in lines that help; nothing else happens.
 
-The inputs and what must hold of them are in tests/fuzzing.py.
+The inputs, and what must hold for each, are in tests/fuzzing/.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from hypothesis import strategies as st
 from sweep import ConfigError, load_config
 from sweep.cli import main
 from sweep.config import document
-from sweep.results.store import Checkpoint
+from sweep.results.checkpoint import Checkpoint
 
 Write = Callable[..., Path]
 
-# Inputs of each kind: as many as a second or a few allow.
+# Inputs of each kind: what a few seconds allow.
 EXAMPLES = {
     "yaml_tree": 600, "yaml_bytes": 600, "setting": 1000, "value": 600, "at": 2000, "table": 600,
     "identity": 400, "archive": 200, "dry_run": 30, "foreign": 15, "damaged": 80,
@@ -33,7 +33,7 @@ EXAMPLES = {
 
 
 SLOW = {"dry_run", "foreign", "damaged"}
-"""Kinds whose failing inputs are told as they are: to make them small takes minutes."""
+"""Kinds whose failing inputs are reported unshrunk: shrinking them takes minutes."""
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def refused(result: Result) -> str:
 
 
 @pytest.mark.parametrize("name", ["fifo", "/dev/zero", "/dev/null", "."])
-def test_what_is_no_file_is_not_waited_for(name: str, folder: Path, write: Write) -> None:
+def test_pipes_devices_and_folders_are_refused_at_once(name: str, folder: Path, write: Write) -> None:
     special = folder / name
     assert "allowed: a regular file" in refused(invoke("run", special))
     assert "allowed: a regular file" in refused(invoke("run", write(f"cases: {special}\n")))
@@ -69,7 +69,7 @@ def test_what_is_no_file_is_not_waited_for(name: str, folder: Path, write: Write
         assert "not a file" in refused(invoke(verb, special))
 
 
-def test_large_files_are_not_read(write: Write, tmp_path: Path) -> None:
+def test_oversized_files_are_refused_unread(write: Write, tmp_path: Path) -> None:
     for name in ("large.yaml", "large.csv"):
         with (tmp_path / name).open("wb") as stream:
             os.truncate(stream.fileno(), 1 << 40)  # sparse
@@ -77,17 +77,17 @@ def test_large_files_are_not_read(write: Write, tmp_path: Path) -> None:
     assert "allowed: at most 32 MiB" in refused(invoke("run", write("cases: large.csv\n")))
 
 
-def test_axes_without_end_are_not_laid_out(write: Write) -> None:
+def test_oversized_axes_are_refused(write: Write) -> None:
     said = refused(invoke("run", write(), "--set", "mu={start: 1, stop: 2, num: 1000000000}"))
     assert "friction.mu.num: 1000000000: input should be less than or equal to 1000000" in said
 
 
-def test_a_million_columns(write: Write, tmp_path: Path) -> None:
+def test_a_table_with_a_million_columns_is_refused_in_a_few_lines(write: Write, tmp_path: Path) -> None:
     (tmp_path / "wide.csv").write_text("mu" + ",mu" * 999_999 + "\n", encoding="utf-8")
     assert len(refused(invoke("run", write("cases: wide.csv\n"))).splitlines()) == 20
 
 
-def test_a_file_that_is_no_table_is_not_told(write: Write, tmp_path: Path) -> None:
+def test_refusals_do_not_quote_a_file_that_is_no_table(write: Write, tmp_path: Path) -> None:
     (tmp_path / "secret").write_text("key=" + "s3cret" * 20 + ",more\n,tail\n", encoding="utf-8")
     said = refused(invoke("run", write("cases: secret\n")))
     assert len(said.splitlines()) == 1
@@ -97,23 +97,23 @@ def test_a_file_that_is_no_table_is_not_told(write: Write, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", ["../../x", "/tmp/x", "a/b", "..", "", '"a\\0b"', '"a\\nb"', "x" * 101, "-x", ".x"])
-def test_names_stay_in_the_folder(name: str, write: Write) -> None:
+def test_a_name_cannot_leave_the_output_folder(name: str, write: Write) -> None:
     with pytest.raises(ConfigError, match="name: "):
         load_config(write(f"name: {name}\nfriction: {{mu: 60}}\n"))
 
 
 @pytest.mark.parametrize("stem", ["файл", "-", "x" * 200, ".hidden", "a b", "..%2f"])
-def test_any_file_name_makes_a_name(stem: str, write: Write) -> None:
+def test_any_file_name_gives_a_valid_name(stem: str, write: Write) -> None:
     assert load_config(write("friction: {mu: 60}\n", f"{stem}.yaml")).name
 
 
 @pytest.mark.parametrize("tag", ["!!str", "!!int", "!!float", "!", "!!timestamp", "!<tag:yaml.org,2002:str>"])
-def test_plain_tags_are_tags(tag: str, write: Write) -> None:
+def test_standard_yaml_tags_are_refused(tag: str, write: Write) -> None:
     with pytest.raises(ConfigError, match="a YAML tag or anchor"):
         load_config(write(f"friction: {{mu: {tag} 60}}\n"))
 
 
-def test_nothing_in_a_file_is_run(write: Write, tmp_path: Path) -> None:
+def test_no_code_in_a_file_is_executed(write: Write, tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     for call in (f"!!python/object/apply:os.mkdir [{mark}]", f"!!python/object/new:os.mkdir [{mark}]"):
         with pytest.raises(ConfigError, match="a YAML tag or anchor"):
@@ -123,13 +123,13 @@ def test_nothing_in_a_file_is_run(write: Write, tmp_path: Path) -> None:
     assert not mark.exists()
 
 
-def test_billions_of_laughs_are_not_laughed(write: Write) -> None:
+def test_nested_yaml_aliases_are_refused(write: Write) -> None:
     text = "l0: &l0 [ha]\n" + "".join(f"l{i}: &l{i} [{', '.join([f'*l{i - 1}'] * 9)}]\n" for i in range(1, 30))
     with pytest.raises(ConfigError, match="a YAML tag or anchor"):
         load_config(write(text))
 
 
-def test_messages_do_nothing_to_a_terminal(write: Write, tmp_path: Path) -> None:
+def test_messages_contain_no_control_characters(write: Write, tmp_path: Path) -> None:
     said = refused(invoke("run", write('"\\e[2J\\n": 1\nfriction: {mu: 60}\n', "a\x1b[2Jb\n.yaml")))
     assert len(said.splitlines()) == 1
     assert said.strip().isprintable()
@@ -137,14 +137,14 @@ def test_messages_do_nothing_to_a_terminal(write: Write, tmp_path: Path) -> None
     assert "\x1b" not in invoke("info", tmp_path / "odd.nc").stdout
 
 
-def test_axes_keep_their_order_when_read_again(write: Write) -> None:
+def test_axes_keep_their_order_in_a_round_trip(write: Write) -> None:
     config = load_config(write("start: {x0: [0, 0.01]}\nbody: {delta: [0.01, 0.02]}\nfriction: {mu: 60}\n"))
     again = load_config(write(config.to_yaml(), "again.yaml"))
     assert (list(again.axes), again.fingerprint()) == (["x0", "delta"], config.fingerprint())
 
 
 @pytest.mark.parametrize("measure", ["[[reversals]]", "[{a: 1}]", "[1, 1]", "{a: 1}"])
-def test_measures_are_words(measure: str, write: Write) -> None:
+def test_measure_must_be_a_list_of_names(measure: str, write: Write) -> None:
     with pytest.raises(ConfigError, match="measure"):
         load_config(write(f"measure: {measure}\nfriction: {{mu: 60}}\n"))
 
@@ -154,7 +154,7 @@ def test_measures_are_words(measure: str, write: Write) -> None:
     [{"tiles": np.array([], np.int64)}, {"tiles": np.array(1)}, {"tiles": np.array([0, 0])}, {"tiles": np.array(["x"])},
      {"seconds": np.ones(2)}, {"seconds": np.array("x")}, {"dopri5": np.array([["x"]])}],
 )  # fmt: skip
-def test_images_that_are_none_are_not_gone_on_from(odd: dict[str, np.ndarray], tmp_path: Path) -> None:
+def test_invalid_images_are_not_resumed(odd: dict[str, np.ndarray], tmp_path: Path) -> None:
     arrays = {"tiles": np.arange(2), "seconds": np.array(1.5), "dopri5": np.zeros((3, 4))}
     checkpoint = Checkpoint(tmp_path / "x.checkpoint", fuzzing.IDENTITY, lambda _: None)
     checkpoint._write(checkpoint.folder / "running.npz", arrays)
@@ -163,12 +163,12 @@ def test_images_that_are_none_are_not_gone_on_from(odd: dict[str, np.ndarray], t
     assert checkpoint.load_running() is None
 
 
-def test_at_has_an_end(write: Write) -> None:
+def test_the_number_of_trajectories_is_limited(write: Write) -> None:
     pairs = [part for name in ("mu", "b", "n0") for i in range(1, 21) for part in ("--at", f"{name}={i}")]
     assert "8000 trajectories; allowed: at most 1000" in refused(invoke("trajectory", write(), *pairs))
 
 
-def test_a_dataset_larger_than_memory_is_not_loaded(tmp_path: Path) -> None:
+def test_a_dataset_larger_than_memory_is_refused(tmp_path: Path) -> None:
     import netCDF4
 
     with netCDF4.Dataset(tmp_path / "vast.nc", "w") as file:
@@ -178,7 +178,7 @@ def test_a_dataset_larger_than_memory_is_not_loaded(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("verb", ["info", "plot"])
-def test_a_dataset_of_another_program(verb: str, tmp_path: Path) -> None:
+def test_a_dataset_of_another_program_is_shown_or_refused(verb: str, tmp_path: Path) -> None:
     file = tmp_path / "other.nc"
     xr.Dataset({"status": ("b", np.ones(3)), "reversals": ("c", np.ones(7)), "step_rule": ("b", [1, 2, 3])}).to_netcdf(
         file

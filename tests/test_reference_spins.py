@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import ROOT
 
+from sweep.bench.reference import SPINS
 from sweep.engine.executor import execute
-from sweep.kernels.lanes import TIME_LIMIT, Kernel
-from sweep.kernels.tableau import DOPRI5
+from sweep.kernels.measures import possible
+from sweep.kernels.methods import make_kernel
+from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
-from sweep.models.coefficients import rattle_period
 
-TABLE = np.genfromtxt(ROOT / "data" / "reference_spins.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+TABLE = np.genfromtxt(SPINS, delimiter=",", names=True, dtype=None, encoding="utf-8")
 T_END = 400.0
 
 
@@ -27,16 +27,15 @@ T_END = 400.0
         ("averaged", 0.05, {}),
     ],
 )
-def test_the_kernel_meets_the_reference(model: str, step: float, choice: dict[str, float]) -> None:
+def test_spins_agree_with_the_reference(model: str, step: float, choice: dict[str, float]) -> None:
     which = (TABLE["model"] == model) & (TABLE["t"] == T_END)
     for name, value in choice.items():
         which &= TABLE[name] == value
     rows = TABLE[which]
     columns = {name: rows[name].astype(float) for name in MODELS["slip"].parameters}
-    # The measurements of the other tests, whose compiled kernel is there already.
-    kernel = Kernel(MODELS[model], DOPRI5, MODELS[model].measures)
-    never_settles = np.full((6, len(rows)), np.nan)
-    table = kernel.images(columns, np.full(len(rows), step), T_END, never_settles, rattle_period(columns))
+    # All measurements, as in other tests: their compiled kernel serves here too.
+    kernel = make_kernel("dopri5", MODELS[model], possible(MODELS[model]))
+    table = kernel.images(columns, np.full(len(rows), step), T_END)
     execute(kernel, table, stop_when_settled=False)
     assert set(table[:, kernel.row("status")]) == {TIME_LIMIT}
     spins = MODELS[model].energy(*kernel.unpack(table))[0]

@@ -1,4 +1,4 @@
-"""Time of whole runs against how many, how long, how stiff, and on how many threads."""
+"""Time of whole runs against the number of trajectories, t_end, friction and the number of threads."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 from sweep.bench.timing import (
     COLOURS,
     MARKERS,
-    STEEPEST,
     T_END,
     Effort,
     Measurement,
@@ -21,9 +20,11 @@ from sweep.bench.timing import (
     Spread,
     Work,
     in_turn,
+    runs_at,
     spread_out,
 )
-from sweep.kernels import lanes, methods
+from sweep.kernels import methods
+from sweep.kernels.method import TOLERANCE
 from sweep.models import MODELS
 from sweep.report.cells import make_kernel, standard
 from sweep.report.rows import Section
@@ -31,7 +32,7 @@ from sweep.report.rows import Section
 MU = 60.0
 
 AXES = {"trajectories": "number of trajectories", "t_end": "t_end", "mu": "μ"}
-"""What is varied and drawn; threads are in the table alone."""
+"""What is varied and drawn, with its label; threads appear in the table only."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def cost(effort: Effort) -> Part:
         numba.set_num_threads(threads)
     spreads = [times[i].times(1e3 / len(run.work)) for i, run in enumerate(runs)]
     part = Part(Section("Cost"))
-    lines = [["varied", "value", *(f"{method}, ms a trajectory" for method in methods.METHODS), "runs of"]]
+    lines = [["varied", "value", *(f"{method}, ms per trajectory" for method in methods.METHODS), "trajectories"]]
     for setting, at in dict.fromkeys((run.setting, run.at) for run in runs):
         here = {r.method: (r, s) for r, s in zip(runs, spreads, strict=True) if (r.setting, r.at) == (setting, at)}
         shown = [f"{here[m][1]:.3g}" if m in here else "—" for m in methods.METHODS]
@@ -64,12 +65,12 @@ def cost(effort: Effort) -> Part:
         lines.append([setting, f"{at:g}", *shown, sizes])
     part.measurements = [
         Measurement(
-            "cost", "slip", run.method, f"{len(run.work)} trajectories", run.setting, run.at, "ms_a_trajectory", s
+            "cost", "slip", run.method, f"{len(run.work)} trajectories", run.setting, run.at, "ms_per_trajectory", s
         )
         for run, s in zip(runs, spreads, strict=True)
     ]
     caption = (
-        f"The slip model at the automatic step of tolerance {lanes.TOLERANCE:g}, start-up included; where not varied "
+        f"The slip model at the automatic step for tolerance {TOLERANCE:g}, start-up included. Unless varied: "
         f"{effort.trajectories} trajectories, {threads} threads, t_end = {T_END:g}, μ = {MU:g}"
     )
     part.section.tables.append((caption, lines))
@@ -86,7 +87,7 @@ def _runs(effort: Effort, threads: int) -> Iterator[Run]:
         for t_end in effort.ends:
             yield Run("t_end", t_end, method, _work(method, count=effort.trajectories, t_end=t_end), threads)
         for mu in effort.frictions:
-            if method != "dopri5" or mu <= STEEPEST:
+            if runs_at(method, mu):
                 yield Run("mu", mu, method, _work(method, count=effort.trajectories, mu=mu).affordable(effort), threads)
 
 
@@ -106,7 +107,7 @@ def _draw(runs: list[Run], spreads: list[Spread], setting: str) -> Callable[[Axe
             reach = np.transpose([s.reach for s in several])
             axes.errorbar(at, [s.median for s in several], reach, fmt=f"{MARKERS[method]}-", capsize=2,
                           color=COLOURS[method], label=method)  # fmt: skip
-        axes.set(xscale="log", yscale="log", xlabel=AXES[setting], ylabel="ms a trajectory",
+        axes.set(xscale="log", yscale="log", xlabel=AXES[setting], ylabel="ms per trajectory",
                  title=f"Cost against {AXES[setting]}")  # fmt: skip
         axes.legend(fontsize=7)
 

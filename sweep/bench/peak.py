@@ -1,9 +1,9 @@
 """Share of the machine's peak that the kernels reach: FMA peak and kernels, measured in turn.
 
-The peak is what a loop of independent fused multiply-adds on registers reaches, two flops each.
-A kernel's flops are counted by running its generated step on numbers that count: one for each
-addition, subtraction, multiplication, division and square root, whatever the hardware takes
-for it; a division or root costs it far more, and what is fused counts two, as in the peak.
+The peak is the rate of a loop of independent fused multiply-adds on registers, two flops each.  A kernel's flops are
+counted by running its generated step on numbers that count: one for each addition, subtraction, multiplication,
+division and square root.  A division or root takes the hardware far longer than that; a fused multiply-add counts as
+two, as in the peak.
 """
 
 from __future__ import annotations
@@ -21,21 +21,20 @@ from sweep.bench.timing import COLOURS, Effort, Measurement, Part, Spread, in_tu
 from sweep.grid import Array
 from sweep.jit import OPTIONS
 from sweep.kernels.adams.step import BDF, PREDICTOR_NODES
-from sweep.kernels.lanes import BLOCK, LANES, Kernel
-from sweep.kernels.methods import METHODS
-from sweep.kernels.stepper import step_source
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.layout import BLOCK, LANES
+from sweep.kernels.runge_kutta import step_source
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
-from sweep.models.coefficients import rattle_period
-from sweep.models.slip_split import newton, slow
-from sweep.report.cells import MEASURE, make_kernel, never_stable, standard
+from sweep.models.slip_split import SPLIT, newton, slow
+from sweep.report.cells import MEASURE, make_kernel, standard
 from sweep.report.rows import Section
 
 WIDTH = 128
-"""Elements of the loop that LLVM vectorises; each carries eight chains, enough to hide an FMA's latency."""
+"""Elements of the loop that LLVM vectorises.  Each carries eight chains, enough to hide the latency of an FMA."""
 
 FMAS = 8 * 8
-"""Per element and round."""
+"""FMAs per element and round."""
 
 ROUNDS, BLOCKS = 20_000, 60
 
@@ -61,7 +60,7 @@ def fma_peak(rounds: int, threads: int) -> float:
 
 
 class Counting:
-    """A number that counts what is done with it."""
+    """A number that counts the operations done with it."""
 
     flops = 0
 
@@ -90,7 +89,7 @@ class Counting:
     def __rtruediv__(self, other: Any) -> Counting:
         return self._operate(plain(other) / self.value)
 
-    def __neg__(self) -> Counting:  # folded into the operation it feeds
+    def __neg__(self) -> Counting:  # free: folded into the operation that uses it
         return Counting(-self.value)
 
     def __gt__(self, other: Any) -> bool:
@@ -110,19 +109,19 @@ def plain(x: Any) -> Any:
 
 
 def flops_of_dopri5(image: list[Counting]) -> int:
-    """Of one step of the slip model without measurements."""
+    """Flops of one step of the slip model without measurements."""
     model = MODELS["slip"]
     names: dict[str, Any] = {"rhs": model.rhs}
     exec(step_source(DOPRI5, len(model.states)), names)
     Counting.flops = 0
-    names["step"](tuple(image[:7]), tuple(image[7:18]), Counting(0.02))
+    names["step"](tuple(image[:7]), model.constants(*image[7:18]), Counting(0.02))
     measuring = 5 * 9 + 5 * 3 + 18  # dissipation and spin in the weighted stages, their sums
     return Counting.flops - measuring
 
 
 def flops_of_adams(image: list[Counting]) -> int:
-    """Of one step without measurements: two evaluations, a Newton step, and sums over the history."""
-    p, (u1, u2, M1, M2, M3, v1, v2) = image[7:21], image[:7]
+    """Flops of one step without measurements: two evaluations, a Newton step, and sums over the history."""
+    p, (u1, u2, M1, M2, M3, v1, v2) = SPLIT.constants(*image[7:21]), image[:7]
     Counting.flops = 0
     _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
     once = Counting.flops
@@ -137,14 +136,14 @@ def flops_of_adams(image: list[Counting]) -> int:
 FLOPS: dict[str, Callable[[list[Counting]], int]] = {"dopri5": flops_of_dopri5, "adams": flops_of_adams}
 
 
-HEAD = ["method", "measuring", "ns a step and trajectory", "flops a step", "GFLOP/s", "share, %", "fastest of both, %"]
+HEAD = ["method", "measuring", "ns per step and trajectory", "flops per step", "GFLOP/s", "share, %", "fastest, %"]
 
 
 def peak(effort: Effort) -> Part:
     threads = numba.get_num_threads()
     cells = LANES * threads
     measures: tuple[tuple[str, ...], ...] = ((), MEASURE)
-    cases = {(method, measure): _images(method, measure, cells) for method in METHODS for measure in measures}
+    cases = {(method, measure): _images(method, measure, cells) for method in FLOPS for measure in measures}
     times = _times(cases, effort, threads)
     speed = times["peak"].inverse(2 * FMAS * WIDTH * ROUNDS * threads / 1e9)
     part, lines, shares = Part(Section("Share of the FMA peak")), [HEAD], {}
@@ -158,12 +157,12 @@ def peak(effort: Effort) -> Part:
         shares[method, what] = share
         fastest = 100 * max(rate.values) / max(speed.values)
         lines.append([method, what, f"{each:.2f}", str(flops), f"{rate:.1f}", f"{share:.0f}", f"{fastest:.0f}"])
-        for quantity, spread in (("ns_a_step", each), ("percent_of_peak", share)):
+        for quantity, spread in (("ns_per_step", each), ("percent_of_peak", share)):
             part.measurements.append(Measurement("peak", "slip", method, what, "threads", threads, quantity, spread))
     caption = (
-        f"{threads} threads, the slip model; peak measured in the same turns: {speed:.1f} GFLOP/s. "
-        "Flops of the step alone are counted; measurements take time without counting. "
-        "Where other work disturbs the turns, the fastest turn of the kernel over that of the peak tells more."
+        f"{threads} threads, the slip model; the peak, measured in turn with the kernels, is {speed:.1f} GFLOP/s. "
+        "Only the flops of the step count; measurements take time but add none. fastest: the kernel's best turn over "
+        "the peak's, which is the better figure on a busy machine."
     )
     part.section.tables.append((caption, lines))
     part.panels.append(lambda axes: _draw(axes, shares))
@@ -171,13 +170,13 @@ def peak(effort: Effort) -> Part:
 
 
 def _times(cases: dict[tuple[str, tuple[str, ...]], tuple[Kernel, Array]], effort: Effort, threads: int) -> Any:
-    """Seconds of the peak's loop and of each kernel, by name."""
+    """Seconds of the FMA loop and of each kernel, by name."""
     works: dict[Any, Callable[[], Any]] = {"peak": lambda: fma_peak(ROUNDS, threads)}
     for case, (kernel, images) in cases.items():
         works[case] = partial(kernel.advance, images, np.arange(len(images)), BLOCKS, False)
     for work in works.values():
         work()  # compiles
-    # Short works, repeated the more: what else the machine does spoils some and spares others.
+    # These works are short, so they are repeated more often: some turns escape the machine's other work.
     return in_turn(works, replace(effort, repeats=5 * effort.repeats))
 
 
@@ -191,9 +190,9 @@ def _draw(axes: Axes, shares: dict[tuple[str, str], Spread]) -> None:
 
 
 def _images(method: str, measure: tuple[str, ...], cells: int) -> tuple[Kernel, Array]:
-    """Kernel and trajectories that run for longer than they are timed, steps alone."""
+    """A kernel and trajectories that run longer than they are timed, by steps alone."""
     kernel, columns = make_kernel(method, MODELS["slip"], measure), standard(mu=np.full(cells, 60.0))
-    images = kernel.images(columns, np.full(cells, 0.02), 1e6, never_stable(cells), rattle_period(columns))
-    if "quiet_after" in kernel.rows:
+    images = kernel.images(columns, np.full(cells, 0.02), 1e6)
+    if "quiet_after" in kernel.layout:
         images[:, kernel.row("quiet_after")] = np.inf
     return kernel, images

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from sweep.bench.reference import Spins, read_spins, spin_errors, whole_steps
-from sweep.bench.timing import MARKERS, STEEPEST, Effort, Measurement, Part, Spread, Work, in_turn, spread_out
+from sweep.bench.timing import MARKERS, Effort, Measurement, Part, Spread, Work, in_turn, runs_at, spread_out
 from sweep.grid import Array
 from sweep.kernels import methods
 from sweep.models import MODELS
@@ -19,20 +19,20 @@ from sweep.report.cells import make_kernel
 from sweep.report.rows import Section
 
 LOOSEST = 1e-3
-"""The longest step tried is the automatic one of this tolerance."""
+"""The longest step tried is the automatic step for this tolerance."""
 
 FLOOR = 1e-11
-"""An error below it is round-off; nothing is gained by a shorter step."""
+"""An error below this is round-off: a shorter step gains nothing."""
 
 BOUND = 1e-6
-"""Error at which the methods are put beside each other."""
+"""Error at which the methods are compared."""
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#bbbbbb")
 
 
 @dataclass(frozen=True)
 class Point:
-    """A step of a method: its error, and runs that tell its cost."""
+    """A step of a method: its error, and the runs that measure its cost."""
 
     model: str
     method: str
@@ -48,18 +48,18 @@ def work_precision(effort: Effort) -> Part:
     times = in_turn({i: point.work for i, point in enumerate(points)}, effort)
     cost = [times[i].times(1e3 / len(point.work)) for i, point in enumerate(points)]
     part = Part(Section("Work and precision"))
-    lines = [["model", "case", "method", "step", "largest error in spin", "ms a trajectory", "runs of"]]
+    lines = [["model", "case", "method", "step", "largest error in spin", "ms per trajectory", "trajectories"]]
     for point, milliseconds in zip(points, cost, strict=True):
         error = f"{point.error:.1e}"
         where = [point.model, point.case, point.method, f"{point.step:.4g}", error, f"{milliseconds:.3g}"]
         lines.append([*where, str(len(point.work))])
-        for quantity, spread in (("spin_error", Spread((point.error,))), ("ms_a_trajectory", milliseconds)):
+        for quantity, spread in (("spin_error", Spread((point.error,))), ("ms_per_trajectory", milliseconds)):
             measured = ("precision", point.model, point.method, point.case, "step", point.step, quantity, spread)
             part.measurements.append(Measurement(*measured))
     caption = (
-        "Whole runs to t = 400, start-up included, compilation apart, nothing measured but the spin; median "
-        f"(smallest … largest) of up to {effort.repeats} runs, in turn. Error: the largest over t = 25, 50, … 400. "
-        "Steps at which a trajectory fails are left out."
+        "Whole runs to t = 400, start-up included, compilation excluded, with no measurement but the spin; median "
+        f"(smallest … largest) of up to {effort.repeats} runs, in turn. The error is the largest over "
+        "t = 25, 50, … 400. Steps at which a trajectory fails are left out."
     )
     medians = [spread.median for spread in cost]
     part.section.tables += [(caption, lines), _at_equal_error(points, medians)]
@@ -68,7 +68,7 @@ def work_precision(effort: Effort) -> Part:
 
 
 def _groups(spins: dict[str, Spins]) -> Iterator[tuple[str, str, str, Spins]]:
-    """Model, method, name and bodies: the slip model friction by friction, the others all bodies at once."""
+    """Model, method, name and bodies: one group for each friction of the slip model, one for each other model."""
     for model, reference in spins.items():
         for method in methods.allowed(MODELS[model]):
             if model != "slip":
@@ -76,7 +76,7 @@ def _groups(spins: dict[str, Spins]) -> Iterator[tuple[str, str, str, Spins]]:
                 continue
             for body in np.flatnonzero(_standard_but_mu(reference)):
                 mu = reference.columns["mu"][body]
-                if mu >= 60 and (mu <= STEEPEST or method != "dopri5"):
+                if mu >= 60 and runs_at(method, mu):
                     yield model, method, f"μ = {mu:g}", reference.select(np.array([body]))
 
 
@@ -87,7 +87,7 @@ def _standard_but_mu(reference: Spins) -> Array:
 
 
 def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort) -> Iterator[Point]:
-    """Ever shorter steps, until the error falls no more."""
+    """Shorter and shorter steps, until the error no longer falls."""
     kernel = make_kernel(method, MODELS[model], ())
     longest, _ = methods.automatic_step(method, MODELS[model], reference.columns, LOOSEST)
     many = spread_out(reference.columns, effort.trajectories)
@@ -104,21 +104,23 @@ def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort
 
 
 def _at_equal_error(points: list[Point], cost: list[float]) -> tuple[str, list[list[str]]]:
-    """The cheapest setting of each method under `BOUND`, side by side."""
+    """The cheapest step of each method with an error up to `BOUND`, side by side."""
     best: dict[str, dict[str, float]] = {}
     for point, milliseconds in zip(points, cost, strict=True):
         if point.model == "slip" and point.error <= BOUND:
             cheapest = best.setdefault(point.case, dict.fromkeys(methods.METHODS, np.inf))
             cheapest[point.method] = min(cheapest[point.method], milliseconds)
-    lines = [["slip", *(f"{method}, ms a trajectory" for method in methods.METHODS), "times faster"]]
+    faster = [method for method in methods.METHODS if method != methods.PLAIN]
+    head = (f"{method}, ms per trajectory" for method in methods.METHODS)
+    lines = [["slip", *head, *(f"{method}: times faster" for method in faster)]]
     for case, found in best.items():
-        ratio = found["dopri5"] / found["adams"]
-        lines.append([case, *(f"{x:.3g}" if np.isfinite(x) else "—" for x in (*found.values(), ratio))])
-    return f"The slip model at equal error: the fastest step with an error up to {BOUND:g}", lines
+        ratios = (found[methods.PLAIN] / found[method] for method in faster)
+        lines.append([case, *(f"{x:.3g}" if np.isfinite(x) else "—" for x in (*found.values(), *ratios))])
+    return f"The slip model at equal error: the cheapest step with an error up to {BOUND:g}", lines
 
 
 def _panel(points: list[Point], cost: list[Spread], slip: bool) -> Callable[[Axes], None]:
-    """Draws a curve for each friction (`slip`) or each other model, and method."""
+    """Draws a curve for each method, and each friction of the slip model or each other model."""
     curves: dict[tuple[str, str], list[tuple[float, Spread]]] = {}
     for point, milliseconds in zip(points, cost, strict=True):
         if (point.model == "slip") == slip:
@@ -135,8 +137,8 @@ def _draw(axes: Axes, curves: dict[tuple[str, str], list[tuple[float, Spread]]],
         colour = PALETTE[cases.index(case) % len(PALETTE)]
         axes.errorbar(
             errors, [s.median for s in spreads], np.transpose([s.reach for s in spreads]), fmt=f"{MARKERS[method]}-",
-            color=colour, markerfacecolor=colour if method == "adams" else "white", label=f"{case}, {method}",
+            color=colour, markerfacecolor="white" if method == methods.PLAIN else colour, label=f"{case}, {method}",
             linewidth=1, elinewidth=0.6, markersize=4,
         )  # fmt: skip
-    axes.set(xscale="log", yscale="log", title=title, xlabel="largest error in spin", ylabel="ms a trajectory")
+    axes.set(xscale="log", yscale="log", title=title, xlabel="largest error in spin", ylabel="ms per trajectory")
     axes.legend(fontsize=7)

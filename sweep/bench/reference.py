@@ -1,25 +1,23 @@
-"""Reference spins and counts from `data/`, and errors against them."""
+"""Reference spins and counts, and errors against them.  The project's `data/README.md` says how they were made."""
 
 from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
-from pathlib import Path
+from importlib import resources
+from importlib.resources.abc import Traversable
 
 import numpy as np
 
 from sweep.engine.executor import execute
 from sweep.grid import Array
-from sweep.kernels.lanes import TIME_LIMIT, Kernel
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
-from sweep.models.coefficients import rattle_period
-from sweep.models.model import Columns
 from sweep.parameters import PARAMETERS
-from sweep.report.cells import never_stable
-from sweep.results.store import StoreError
 
-DATA = Path(__file__).parents[2] / "data"
-SPINS, COUNTS = DATA / "reference_spins.csv", DATA / "reference_counts_500.csv"
+_DATA = resources.files("sweep.bench") / "data"
+SPINS, COUNTS = _DATA / "reference_spins.csv", _DATA / "reference_counts_500.csv"
 
 
 @dataclass(frozen=True)
@@ -29,16 +27,16 @@ class Spins:
     columns: dict[str, Array]
     """Physical parameters, each of shape (bodies,)."""
     times: Array
-    """Multiples of the first."""
+    """All are multiples of the first."""
     spins: Array
     """Shape (bodies, times)."""
 
     def select(self, which: Array) -> Spins:
-        """The bodies that `which` (a mask or indices) picks."""
+        """The bodies chosen by `which`, a mask or indices."""
         return Spins({n: v[which] for n, v in self.columns.items()}, self.times, self.spins[which])
 
     def name(self, body: int) -> str:
-        """What sets a body apart from the standard case, in words."""
+        """The friction, and what else differs from the standard case, in words."""
         values = {name: float(column[body]) for name, column in self.columns.items()}
         shown = [
             f"{'μ' if name == 'mu' else name} = {value:g}"
@@ -55,11 +53,11 @@ class Counts:
     columns: dict[str, Array]
     reversals: Array
     firm: Array
-    """Whether no window's start and no round-off decides the count."""
+    """Whether the count depends neither on round-off nor on where the windows begin."""
 
 
 def read_spins() -> dict[str, Spins]:
-    """The reference spins by model."""
+    """The reference spins of each model."""
     found: dict[str, dict[tuple[float, ...], dict[float, float]]] = {}
     for line in _lines(SPINS):
         body = tuple(float(line[name]) for name in MODELS[line["model"]].parameters)
@@ -74,6 +72,7 @@ def read_spins() -> dict[str, Spins]:
 
 
 def read_counts() -> Counts:
+    """The reference counts."""
     lines = _lines(COUNTS)
     names = ("a", "b", "delta", "mu", "n0", "x0", "y0")
     columns = {name: np.array([float(line[name]) for line in lines]) for name in names}
@@ -82,20 +81,17 @@ def read_counts() -> Counts:
     return Counts(columns | {"c": np.ones(len(lines))}, reversals, firm)
 
 
-def _lines(path: Path) -> list[dict[str, str]]:
-    if not path.exists():
-        raise StoreError(f"{path}: no such file; bench runs from a checkout of the project (pip install -e)")
-    with path.open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(line for line in stream if not line.startswith("#")))
+def _lines(table: Traversable) -> list[dict[str, str]]:
+    return list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
 
 
 def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> tuple[Array, Array]:
-    """Largest error in spin over the reference's times, and `energy_error` at the last; shapes (bodies,).
+    """Largest error in spin over the reference's times, and `energy_error` at the last, both of shape (bodies,).
 
-    A trajectory for each time: adams' steps depend on where it is to end.  One that does not get
-    there is off by infinity.
+    Each time gets a trajectory of its own, because the steps of adams depend on where it is to end.  The error of a
+    trajectory that fails is infinite.
     """
-    table = np.concatenate([_images(kernel, reference.columns, step, t) for t in reference.times])
+    table = np.concatenate([kernel.images(reference.columns, step, t) for t in reference.times])
     execute(kernel, table, stop_when_settled=False)
     spin = kernel.model.energy(*kernel.unpack(table))[0]
     error = np.where(table[:, kernel.row("status")] == TIME_LIMIT, np.abs(spin - reference.spins.T.ravel()), np.inf)
@@ -107,9 +103,5 @@ def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> tuple[Array, A
 
 
 def whole_steps(reference: Spins, step: Array) -> Array:
-    """The longest steps up to `step` that meet all times of the reference."""
+    """The longest steps, at most `step`, of which all times of the reference are multiples."""
     return np.asarray(reference.times[0] / np.ceil(reference.times[0] / step * (1 - 1e-12)))
-
-
-def _images(kernel: Kernel, columns: Columns, step: Array, t_end: float) -> Array:
-    return kernel.images(columns, step, t_end, never_stable(len(step)), rattle_period(columns))

@@ -1,4 +1,4 @@
-"""The report: one part after the other, then table, picture, page and raw figures."""
+"""The report: all parts in order, then raw figures, picture and page."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from sweep.models import MODELS
 from sweep.report import page
 from sweep.report.cells import MEASURE, simulate, standard
 from sweep.report.rows import Row, Section
-from sweep.results.store import replacing
+from sweep.results.writing import replacing
 
 PARTS: tuple[Callable[[Effort], Part], ...] = (work_precision, tolerance, wrong_counts, peak, cost)
 
 COLUMNS = 3
-"""Panels side by side."""
+"""Number of panels side by side."""
 
 
 def bench(output: Path, note: Callable[[str], None] = lambda _: None, effort: Effort | None = None) -> list[Row]:
-    """Measure everything, write `output`/bench.csv, .png and .html, return the hard cases that do not hold."""
+    """Measure everything, write bench.csv, .png and .html to `output`, and return the hard cases that do not hold."""
     began = time.perf_counter()
     output.mkdir(parents=True, exist_ok=True)
     compile_kernels()
     ready = time.perf_counter()
-    note(f"kernels compiled or loaded in {ready - began:.1f} s, not part of any time below")
+    note(f"kernels compiled or loaded in {ready - began:.1f} s, which no time below includes")
     parts = []
     for measure in PARTS:
         parts.append(measure(effort or Effort()))
@@ -55,7 +55,7 @@ def bench(output: Path, note: Callable[[str], None] = lambda _: None, effort: Ef
 
 
 def compile_kernels() -> None:
-    """All that the parts run: what they time must not hold a compilation."""
+    """Compile all that the parts run, so that no time includes a compilation."""
     for name, model in MODELS.items():
         for method in methods.allowed(model):
             for measure in ((), MEASURE):
@@ -77,7 +77,7 @@ def draw(parts: list[Part]) -> Figure:
 
 
 def write_csv(path: Path, measurements: list[Measurement]) -> None:
-    """The raw figures, a line each."""
+    """Write the raw figures, one per line."""
     head = (
         "section",
         "model",
@@ -108,7 +108,7 @@ def _write_page(path: Path, parts: list[Part], figure: Figure, seconds: float) -
         f"({llvmlite.binding.get_host_cpu_name()}), load {os.getloadavg()[0]:.1f} at the end. Raw figures: bench.csv."
     )
     sections = [
-        Section("All at a glance", figures=[("speed, error and cost", figure)]),
+        Section("Overview", figures=[("speed, error and cost", figure)]),
         *(part.section for part in parts),
     ]
-    page.write(path, "sweep: speed against error", about, sections, ("method", "must happen", "did happen"))
+    page.write(path, "sweep: speed against error", about, sections, ("method", "expected", "found"))

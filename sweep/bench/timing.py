@@ -1,4 +1,4 @@
-"""How much to measure, and times that come with their spread."""
+"""How much to measure, and times with their spread."""
 
 from __future__ import annotations
 
@@ -13,35 +13,40 @@ from matplotlib.axes import Axes
 
 from sweep.engine.executor import execute, nominal_seconds
 from sweep.grid import Array
-from sweep.kernels.lanes import LANES, Kernel
-from sweep.models.coefficients import rattle_period
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.layout import LANES
+from sweep.kernels.methods import METHODS
 from sweep.models.model import Columns
-from sweep.report.cells import never_stable
 from sweep.report.rows import Section
 
 Key = TypeVar("Key")
 
-MARKERS = {"dopri5": "s", "adams": "o"}
-COLOURS = {"dopri5": "#4477aa", "adams": "#ee6677"}
+MARKERS = dict(zip(METHODS, "so^vD", strict=False))
+COLOURS = dict(zip(METHODS, ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#aa3377"), strict=False))
 
 T_END = 400.0
-"""Time that `tolerance` is meant for, in sqrt(c/g)."""
+"""The time for which `tolerance` bounds the error in spin, in sqrt(c/g)."""
 
 STEEPEST = 1e4
-"""Largest friction that dopri5 is tried at: it takes as long as μ is large."""
+"""Largest friction at which a method is run whose stability limits the step: its time is proportional to μ."""
+
+
+def runs_at(method: str, mu: float) -> bool:
+    """Whether a method takes a bearable time at this friction."""
+    return METHODS[method].stable_step is None or mu <= STEEPEST
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured; by default what takes about three minutes on two cores."""
+    """How much to measure; the defaults take about three minutes on two cores."""
 
     trajectories: int = 512
     repeats: int = 5
     patience: float = 3.0
-    """Seconds after which a work that has run three times is repeated no more."""
+    """Seconds after which a work that has run three times is not repeated again."""
     tolerances: tuple[float, ...] = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
     rungs: int = 8
-    """Steps to try, each shorter than the last by sqrt(2)."""
+    """Number of steps to try, each shorter than the last by sqrt(2)."""
     sizes: tuple[int, ...] = (16, 64, 256, 1024, 4096, 16384)
     ends: tuple[float, ...] = (50, 100, 200, 400, 800, 1600, 3200)
     frictions: tuple[float, ...] = (1, 10, 100, 1e3, 1e4, 1e5)
@@ -61,12 +66,12 @@ class Spread:
         return Spread(tuple(value * factor for value in self.values))
 
     def inverse(self, amount: float) -> Spread:
-        """Rates at which `amount` is done in these times."""
+        """The rates at which `amount` is done in these times."""
         return Spread(tuple(amount / value for value in self.values))
 
     @property
     def reach(self) -> tuple[float, float]:
-        """How far the smallest and the largest are from the median, as error bars want it."""
+        """Distances of the smallest and the largest from the median, for error bars."""
         return self.median - min(self.values), max(self.values) - self.median
 
     def __format__(self, form: str) -> str:
@@ -82,7 +87,7 @@ class Measurement:
     method: str
     case: str
     setting: str
-    """What was varied; `at` is its value."""
+    """What was varied, to the value `at`."""
     at: float
     quantity: str
     spread: Spread
@@ -90,7 +95,7 @@ class Measurement:
 
 @dataclass
 class Part:
-    """A section of the report, its raw figures, and what it draws."""
+    """A section of the report, its raw figures, and functions that draw its panels."""
 
     section: Section
     measurements: list[Measurement] = field(default_factory=list)
@@ -98,7 +103,7 @@ class Part:
 
 
 def in_turn(works: Mapping[Key, Callable[[], Any]], effort: Effort) -> dict[Key, Spread]:
-    """Seconds that each work takes, in turn, so that a drift of the machine's speed meets all alike."""
+    """Seconds that each work takes.  They run in turn, so that a change in the machine's speed affects all alike."""
     times: dict[Key, list[float]] = {name: [] for name in works}
     for _ in range(effort.repeats):
         for name, work in works.items():
@@ -112,7 +117,7 @@ def in_turn(works: Mapping[Key, Callable[[], Any]], effort: Effort) -> dict[Key,
 
 @dataclass(frozen=True)
 class Work:
-    """Trajectories carried from their parameters to `t_end`, start-up included."""
+    """Trajectories run from their parameters to `t_end`, start-up included."""
 
     kernel: Kernel
     columns: Columns
@@ -128,7 +133,7 @@ class Work:
         return len(self.step)
 
     def affordable(self, effort: Effort) -> Work:
-        """The first of the trajectories, so many that a run should not take longer than a third of the patience."""
+        """The first of the trajectories, as many as should run in a third of the patience."""
         count = len(self)
         seconds = nominal_seconds(self._images(), self.kernel)
         while count > 2 * LANES and seconds > effort.patience / 3:
@@ -136,12 +141,10 @@ class Work:
         return Work(self.kernel, {n: v[:count] for n, v in self.columns.items()}, self.step[:count], self.t_end)
 
     def _images(self) -> Array:
-        return self.kernel.images(
-            self.columns, self.step, self.t_end, never_stable(len(self)), rattle_period(self.columns)
-        )
+        return self.kernel.images(self.columns, self.step, self.t_end)
 
 
 def spread_out(columns: Columns, count: int) -> dict[str, Array]:
-    """`count` trajectories: the bodies `columns` again and again, their spins up to a thousandth apart."""
+    """`count` trajectories that repeat the bodies of `columns`, with spins up to a thousandth apart."""
     many = {name: np.resize(values, count) for name, values in columns.items()}
     return many | {"n0": many["n0"] * (1 + 1e-3 * np.arange(count) / count)}

@@ -1,4 +1,4 @@
-"""Whether `tolerance` is kept, and whether `energy_error` tells the error."""
+"""Whether `tolerance` is kept, and whether `energy_error` predicts the error."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 
 from sweep.bench.precision import FLOOR, PALETTE
 from sweep.bench.reference import Spins, read_spins, spin_errors, whole_steps
-from sweep.bench.timing import MARKERS, STEEPEST, Effort, Measurement, Part, Spread
+from sweep.bench.timing import MARKERS, Effort, Measurement, Part, Spread, runs_at
 from sweep.grid import Array
-from sweep.kernels import methods
+from sweep.kernels import measures, methods
 from sweep.models import MODELS
 from sweep.report.cells import MEASURE, make_kernel
 from sweep.report.rows import Section
@@ -20,7 +20,7 @@ from sweep.report.rows import Section
 
 @dataclass(frozen=True)
 class Kept:
-    """Errors at the automatic steps of one method: all of shape (bodies, tolerances)."""
+    """Errors at the automatic steps of one method, all of shape (bodies, tolerances)."""
 
     model: str
     method: str
@@ -31,8 +31,8 @@ class Kept:
 
 
 def tolerance(effort: Effort) -> Part:
-    """Whether the error at the automatic step is what was asked for, and whether the energy tells it."""
-    part = Part(Section("Is the tolerance kept, and does the energy tell the error?"))
+    """Whether the automatic step keeps the error below the tolerance, and whether the energy error predicts it."""
+    part = Part(Section("Is the tolerance kept, and does the energy error predict the error?"))
     asked = effort.tolerances
     lines = [["model", "method", "body", *(f"{t:g}" for t in asked)]]
     kept = [_errors(model, method, spins, asked) for model, method, spins in _all_bodies(read_spins())]
@@ -47,7 +47,10 @@ def tolerance(effort: Effort) -> Part:
                 if not np.isnan(v):
                     part.measurements.append(Measurement(*where, "energy_error", Spread((float(v),))))
     share = ", ".join(f"{one.model} {one.method} {(one.error <= asked).mean():.0%}" for one in kept)
-    caption = f"Largest error in spin, t <= 400, at the automatic step of each tolerance; ! is above it. Kept: {share}"
+    caption = (
+        "Largest error in spin, t <= 400, at the automatic step for each tolerance; ! marks errors above it. "
+        f"Tolerance kept: {share}"
+    )
     part.section.tables += [(caption, lines), _predictor(kept)]
     part.panels += [lambda axes: _draw_kept(axes, kept, asked), lambda axes: _draw_predictor(axes, kept)]
     return part
@@ -57,19 +60,19 @@ def _all_bodies(spins: dict[str, Spins]) -> Iterator[tuple[str, str, Spins]]:
     for model, reference in spins.items():
         for method in methods.allowed(MODELS[model]):
             bodies = reference
-            if method == "dopri5" and "mu" in reference.columns:
-                bodies = reference.select(reference.columns["mu"] <= STEEPEST)
+            if "mu" in reference.columns:
+                bodies = reference.select(np.array([runs_at(method, mu) for mu in reference.columns["mu"]]))
             yield model, method, bodies
 
 
 def _errors(model: str, method: str, reference: Spins, asked: tuple[float, ...]) -> Kept:
-    """All tolerances in one run; equal steps, where stability decides, are run once."""
+    """All tolerances in one run.  Equal steps, which occur where stability decides, are run once."""
     steps = [methods.automatic_step(method, MODELS[model], reference.columns, t)[0] for t in asked]
     bodies = np.tile(np.arange(len(reference.spins)), len(asked))
     runs, place = np.unique(
         np.stack([bodies, whole_steps(reference, np.concatenate(steps))]), axis=1, return_inverse=True
     )
-    kernel = make_kernel(method, MODELS[model], tuple(m for m in MEASURE if m in MODELS[model].measures))
+    kernel = make_kernel(method, MODELS[model], tuple(m for m in MEASURE if m in measures.possible(MODELS[model])))
     found = spin_errors(kernel, reference.select(runs[0].astype(int)), runs[1])
     error, violation = (values[place.ravel()].reshape(len(asked), -1).T for values in found)
     return Kept(model, method, reference, error, violation)
@@ -87,11 +90,11 @@ def _predictor(kept: list[Kept]) -> tuple[str, list[list[str]]]:
         likeness = np.corrcoef(np.log(error), np.log(violation))[0, 1]
         where = [one.model, one.method, str(len(error))]
         lines.append([*where, f"{middle:.2g}", f"{low:.2g} … {high:.2g}", f"{likeness:.2f}"])
-    return f"How energy_error tells the error in spin, over runs with errors above {FLOOR:g}", lines
+    return f"The error in spin beside energy_error, for runs with errors above {FLOOR:g}", lines
 
 
 def _above_floor(one: Kept) -> tuple[Array, Array]:
-    """Distinct pairs of spin error and energy error that are more than round-off."""
+    """Distinct pairs of spin error and energy error that exceed round-off."""
     pairs = np.unique(np.stack([one.error.ravel(), one.violation.ravel()]), axis=1)
     told = np.isfinite(pairs).all(axis=0) & (pairs[0] > FLOOR) & (pairs[1] > 0)
     return pairs[0, told], pairs[1, told]
@@ -103,8 +106,8 @@ def _draw_kept(axes: Axes, kept: list[Kept], asked: tuple[float, ...]) -> None:
             label = f"{one.model}, {one.method}" if not j else None
             axes.loglog(asked, errors, MARKERS[one.method], linestyle="-", linewidth=0.6, markersize=3,
                         color=PALETTE[i], label=label)  # fmt: skip
-    axes.loglog(asked, asked, "k--", label="as asked")
-    axes.set(title="Tolerance kept, a line a body", xlabel="tolerance", ylabel="largest error in spin")
+    axes.loglog(asked, asked, "k--", label="error = tolerance")
+    axes.set(title="Is the tolerance kept? One line per body", xlabel="tolerance", ylabel="largest error in spin")
     axes.legend(fontsize=7)
 
 
@@ -114,5 +117,5 @@ def _draw_predictor(axes: Axes, kept: list[Kept]) -> None:
         if len(error):
             axes.loglog(violation, error, MARKERS[one.method], linestyle="", markersize=4, color=PALETTE[i],
                         label=f"{one.model}, {one.method}")  # fmt: skip
-    axes.set(title="Does the energy tell the error?", xlabel="energy_error", ylabel="largest error in spin")
+    axes.set(title="Does the energy error predict the error?", xlabel="energy_error", ylabel="largest error in spin")
     axes.legend(fontsize=7)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,23 @@ from sweep.config import cases, document, schema
 from sweep.config.faults import ConfigError, Fault, brief
 from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import BODY, Grid, distinct, off_the_body
-from sweep.kernels import methods
+from sweep.kernels import measures, methods
+from sweep.kernels.measures import MEASURES
 from sweep.models import MODELS, TIERS
 from sweep.models.coefficients import rattle_period
 from sweep.models.model import Model, Tier
 from sweep.parameters import PARAMETERS
 
-__all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "load_config"]
+__all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "as_config", "load_config"]
+
+
+def as_config(config: Config | str | Path, overrides: Mapping[str, Any] | None = None) -> Config:
+    """`config` itself, or the one read from the file at this path, with `overrides` as `load_config` takes them."""
+    if isinstance(config, Config):
+        if overrides:
+            raise TypeError("overrides need the path of a configuration: a Config cannot be changed")
+        return config
+    return load_config(config, overrides)
 
 
 def load_config(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -42,7 +52,7 @@ def load_config(path: str | Path, overrides: Mapping[str, Any] | None = None) ->
     for key, value in (overrides or {}).items():
         plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
         source.set(_full_path(key), plain, f"--set {brief(key)}")
-    # A name that nobody gave is none to refuse.
+    # A name made from the file's must not be refused, since the user did not choose it.
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(path).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")
     try:
@@ -60,7 +70,7 @@ def _full_path(key: str) -> tuple[str, ...]:
 
 
 def _resolve(checked: Any, source: document.Document) -> Config:
-    """Fill in defaults, order the axes, and check what one value says of another."""
+    """Fill in defaults, order the axes, and check that the values fit together."""
     model = TIERS[checked.model]
     given = {
         key: getattr(getattr(checked, section), key)
@@ -97,14 +107,9 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         cases=columns,
         cases_file=checked.cases,
     )
-    if reason := _too_large(config):
-        raise ConfigError([source.fault((), reason)])
-    if reason := _too_large_to_refine(config):
-        raise ConfigError([source.fault(("refine",), reason)])
-    if beyond := off_the_body(config):
-        raise ConfigError([source.fault(("start", "x0"), beyond)])
-    if reason := _unusable_step(config):
-        raise ConfigError([source.fault(("integrator", "step"), reason)])
+    for path, check in _CHECKS:
+        if reason := check(config):
+            raise ConfigError([source.fault(path, reason)])
     return config
 
 
@@ -127,27 +132,38 @@ def _unusable_step(config: Config) -> str:
         return ""
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
-    # A window of the period-averaged spin closes at most once a step.
-    with np.errstate(all="ignore"):  # a body that is next to nothing has a period of NaN
+    # At most one window of the period-averaged spin can close in a step.
+    with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
         longest = min(float(rattle_period(columns).min()) / 2 for columns in distinct(Grid.of(config), BODY))
     return "" if step <= longest else f"{step:g}; allowed: auto, or at most {longest:.3g}, half a rattle's period"
 
 
+# What is asked of a whole configuration, each only after the checks before it: the path at fault, and what is
+# wrong ("" if nothing is).
+_CHECKS: tuple[tuple[tuple[str, ...], Callable[[Config], str]], ...] = (
+    ((), _too_large),
+    (("refine",), _too_large_to_refine),
+    (("start", "x0"), off_the_body),
+    (("integrator", "step"), _unusable_step),
+)
+
+
 def _measures(asked: list[str] | None, model: Tier) -> tuple[str, ...]:
-    if asked is not None:
-        return tuple(asked)
-    return tuple(name for name in schema.DEFAULT_MEASURES if name in model.measures)
+    return measures.default(model) if asked is None else tuple(asked)
 
 
 def _rank(name: str, names: tuple[str, ...]) -> int:
     return names.index(name) if name in names else len(names)
 
 
-def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document.Document) -> Any:
+def _misfits(
+    checked: Any, given: dict[str, Any], columns: dict[str, tuple[float, ...]] | None, source: document.Document
+) -> Iterator[Fault]:
+    """Faults of values that are valid by themselves but do not fit together."""
     model = TIERS[checked.model]
     for name in given:
         path = (PARAMETERS[name].section, name)
-        # A number that the model has no use for may stay: one file then serves every model.
+        # A number that the model does not use may stay, so that one file serves every model.
         if name not in model.parameters and given[name].is_axis:
             yield source.fault(
                 path, f"the {model.name} model has no {name}; allowed: {', '.join(model.parameters)}", at_key=True
@@ -155,34 +171,41 @@ def _misfits(checked: Any, given: dict[str, Any], columns: Any, source: document
         elif columns is not None and name in columns:
             yield source.fault(path, f"also a column of {checked.cases}; allowed: one of the two", at_key=True)
         elif columns is not None and given[name].is_axis:
-            yield source.fault(path, "an axis beside cases; allowed: a number, or a column of the table")
+            yield source.fault(path, "an axis with cases; allowed: a number, or a column of the table")
     for name in columns or {}:
         if name not in model.parameters:
             yield source.fault(("cases",), f"column {name}: the {model.name} model has no {name}")
-    if isinstance(model, Model) and checked.integrator.method not in (*methods.allowed(model), "auto"):
-        names = ", ".join((*methods.allowed(model), "auto"))
+    if isinstance(model, Model) and checked.integrator.method not in (*methods.allowed(model), methods.AUTO):
+        names = ", ".join((*methods.allowed(model), methods.AUTO))
         yield source.fault(("integrator", "method"), f"cannot run the {model.name} model; allowed: {names}")
-    if checked.integrator.method == "auto" and checked.integrator.step != "auto":
-        yield source.fault(("integrator", "step"), "a number beside method: auto; allowed: auto")
+    if checked.integrator.method == methods.AUTO and checked.integrator.step != "auto":
+        yield source.fault(("integrator", "step"), "a number with method: auto; allowed: auto")
     if checked.verify and not isinstance(model, Model):
         yield source.fault(("verify",), f"the {model.name} model takes no steps; allowed: 0")
     if checked.refine:
         yield from _unrefinable(checked, model, source)
-    for i, name in enumerate(checked.measure or ()):
-        if name not in model.measures:
+    yield from _unmeasurable(checked.measure or (), model, source)
+
+
+def _unmeasurable(specs: Sequence[str], model: Tier, source: document.Document) -> Iterator[Fault]:
+    """Faults of the measurements asked for."""
+    names, possible = [spec.partition("=")[0] for spec in specs], measures.possible(model)
+    for i, name in enumerate(names):
+        if name not in possible:
             yield source.fault(
-                ("measure", i), f"not measured on the {model.name} model; allowed: {', '.join(model.measures)}"
+                ("measure", i), f"not measured on the {model.name} model; allowed: {', '.join(possible)}"
             )
-        elif name in ("first_reversal", "noise_limited") and "reversals" not in checked.measure:
-            yield source.fault(("measure", i), "measured with the reversals; allowed: reversals beside it")
+        for needed in set(MEASURES[name].needs) - set(names):
+            yield source.fault(("measure", i), f"measured with the {needed}; allowed: {needed} beside it")
 
 
-def _unrefinable(checked: Any, model: Tier, source: document.Document) -> Any:
+def _unrefinable(checked: Any, model: Tier, source: document.Document) -> Iterator[Fault]:
+    """Faults of a refined run."""
     if not isinstance(model, Model):
         yield source.fault(("refine",), f"the {model.name} model is not simulated; allowed: 0")
     if checked.cases is not None:
-        yield source.fault(("refine",), "beside cases, which have no neighbours; allowed: 0, or axes")
+        yield source.fault(("refine",), "with cases, which have no neighbours; allowed: 0, or axes")
     if checked.verify:
-        yield source.fault(("verify",), "beside refine; allowed: 0")
+        yield source.fault(("verify",), "with refine; allowed: 0")
     if "reversals" not in _measures(checked.measure, model):
-        yield source.fault(("measure",), "no reversals, which refine goes by; allowed: reversals among them")
+        yield source.fault(("measure",), "no reversals, on which refine depends; allowed: reversals among them")

@@ -1,7 +1,7 @@
-"""Tables of cases: a CSV file with a column a parameter and a row a trajectory.
+"""Tables of cases: CSV files with a column per parameter and a row per trajectory.
 
-A configuration may name any file, so little of one that is no table is told: of a file without a
-column that is a parameter, the first cell, shortened; otherwise each cell that is wrong.
+A configuration may name any file, even a private one, so messages quote little of a file that is not
+such a table: if no column is a parameter, only the first cell, shortened; otherwise the wrong cells.
 """
 
 from __future__ import annotations
@@ -24,7 +24,13 @@ _MAX_FAULTS = 20
 
 
 def read(source: Document, name: str) -> dict[str, tuple[float, ...]]:
-    """Columns of the table `name` (relative to the configuration's folder), checked cell by cell."""
+    """Columns of the table `name`, a path relative to the configuration's folder, checked cell by cell.
+
+    Raises
+    ------
+    ConfigError
+        if the file cannot be read, or with a `Fault` for each cell that is wrong, up to some twenty.
+    """
     path = Path(source.file).parent / name
     try:
         return _columns(str(path), files.read(path, LIMIT))

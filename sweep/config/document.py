@@ -1,8 +1,8 @@
 """YAML documents as plain values, with the line and column of every part.
 
-YAML 1.2: 1e-3 is a number and `no` a word.  Only plain data passes: tags, anchors and duplicate
-keys are refused, so nothing in a file can run code, repeat itself without end or hide a line.
-A document has at most `LIMIT` bytes: reading takes some 20 s a megabyte.
+Documents are YAML 1.2, in which 1e-3 is a number and `no` a word.  Only plain data is accepted: tags,
+anchors and duplicate keys are refused, so that nothing in a file can run code, repeat itself without
+end, or override an earlier line unseen.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from sweep.config import files
 from sweep.config.faults import ConfigError, Fault, Path
 
 LIMIT = 1 * files.MIB
+"""Largest document, in bytes: reading takes some 20 s per megabyte."""
 
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _SPECIAL = {".inf": float("inf"), "-.inf": float("-inf"), ".nan": float("nan")}
@@ -30,17 +31,17 @@ _WORDS: dict[str, bool | None] = {
 
 @dataclass
 class Document:
-    """Values of a configuration and where each stands."""
+    """The values of a configuration, and where each stands: file, line and column."""
 
     file: str
     values: Any = None
     keys: dict[Path, tuple[str, int | None, int | None]] = field(default_factory=dict)
-    """Place of a mapping's key, by the path it leads to."""
+    """Where each key of a mapping stands, by the path to its value."""
     places: dict[Path, tuple[str, int | None, int | None]] = field(default_factory=dict)
-    """Place of a value."""
+    """Where each value stands, by its path."""
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
-        """A fault at `path`, or at the closest thing above it that the document has."""
+        """A fault at `path`; it is placed at the nearest section above if the document lacks that path."""
         table, known = (self.keys if at_key else self.places), path
         while known and known not in table:
             known = known[:-1]
@@ -48,7 +49,7 @@ class Document:
         return Fault(file, line, column, path, message)
 
     def set(self, path: Path, value: Any, source: str) -> None:
-        """Put `value` at `path`, making the sections above it; faults in it name `source`."""
+        """Put `value` at `path`, and add the sections above it; faults in it name `source` as their file."""
         section = self.values
         for part in path[:-1]:
             section = section.setdefault(part, {})
@@ -63,7 +64,7 @@ class Document:
 
 
 def read(path: FilePath) -> Document:
-    """Read a YAML file; `ConfigError` says what is wrong with it and where."""
+    """Read a YAML file; a `ConfigError` says what is wrong with it and where."""
     document = Document(str(path))
     try:
         text = files.read(path, LIMIT)
@@ -84,7 +85,7 @@ def read(path: FilePath) -> Document:
 
 
 def parse_value(text: str, source: str) -> Any:
-    """The value that a command line gives as text, read as YAML."""
+    """The value of a command line's text, read as YAML; a `ConfigError` names `source`."""
     node = _compose(text, source)
     scratch, faults = Document(source), list[Fault]()
     value = None if node is None else _convert(node, (), scratch, faults)
@@ -101,7 +102,7 @@ def _compose(text: str, file: str) -> Node | None:
         line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
         problem = (error.problem or error.context or "not YAML").split("\n")[0]
         raise ConfigError([Fault(file, line, column, (), f"not YAML: {problem}")]) from None
-    except Exception as error:  # ruamel lets escape what chr() and its own recursion raise, and more
+    except Exception as error:  # ruamel lets errors of chr(), of its own recursion and others escape
         problem = "nested too deeply" if isinstance(error, RecursionError) else str(error).split("\n")[0]
         raise ConfigError([Fault(file, None, None, (), f"not YAML: {problem}")]) from None
 
@@ -111,8 +112,9 @@ def _convert(node: Node, path: Path, document: Document, faults: list[Fault]) ->
         return document.file, of.start_mark.line + 1, of.start_mark.column + 1
 
     document.places[path] = place(node)
-    # An alias leads back to a node with an anchor, so none is ever followed.  A node starts with its
-    # tag; what it resolves to by itself, such as a timestamp, is read as the word it looks like.
+    # An alias leads back to a node with an anchor; as anchors are refused, no alias is ever followed.
+    # A tag stands at the start of its node.  Types that ruamel infers without one, such as timestamps,
+    # do not matter: `_scalar` reads the text itself.
     if node.anchor or node.start_mark.buffer[node.start_mark.pointer] == "!":
         faults.append(Fault(*place(node), path, "a YAML tag or anchor; allowed: plain values"))
         return None
@@ -123,7 +125,7 @@ def _convert(node: Node, path: Path, document: Document, faults: list[Fault]) ->
     result: dict[str, Any] = {}
     for key_node, value_node in node.value:
         if not isinstance(key_node, ScalarNode):
-            faults.append(Fault(*place(key_node), path, "a key is a word"))
+            faults.append(Fault(*place(key_node), path, "a key must be a word"))
             continue
         key = key_node.value
         if key in result:
@@ -150,5 +152,5 @@ def _scalar(node: ScalarNode) -> str | float | int | bool | None:
 
 
 def number(text: str) -> float | None:
-    """The number that `text` spells in plain decimal digits; None if it is none."""
+    """The number that `text` spells in decimal digits; None if it does not spell one."""
     return float(text) if _FLOAT.fullmatch(text) else None

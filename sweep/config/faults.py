@@ -1,4 +1,4 @@
-"""Faults of a configuration, each with the place where the user can mend it."""
+"""Faults of a configuration, each with the place where the user can correct it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Path = tuple[str | int, ...]
 
 
 def spell(path: Path) -> str:
-    """body.b[2] for ("body", "b", 2)."""
+    """A path as text: body.b[2] for ("body", "b", 2)."""
     text = ""
     for part in (brief(part, 60) if isinstance(part, str) else part for part in path):
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -24,20 +24,20 @@ _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 60
 
 
 def quote(value: object) -> str:
-    """A value as it was given, or its beginning and end where it is long."""
+    """A value as it was given; only its beginning and end if it is long."""
     try:
         return _REPR.repr(value)
-    except ValueError:  # Python does not spell integers of more than 4300 digits
-        return "a number of thousands of digits"
+    except ValueError:  # Python refuses to spell integers of more than 4300 digits
+        return "a number with thousands of digits"
 
 
 def brief(text: str, limit: int = 200) -> str:
-    """`text`, without its middle where it is long."""
+    """`text`; without its middle if it is long."""
     return text if len(text) <= limit else f"{text[: limit // 2]}…{text[-limit // 2 :]}"
 
 
 def printable(text: str) -> str:
-    """`text` on one line that does nothing to a terminal and that every encoding can write."""
+    """`text` on one line, with characters that cannot be printed, or could control a terminal, escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -57,7 +57,7 @@ class Fault:
 
 
 class ConfigError(Exception):
-    """A configuration that cannot be run; `faults` has one entry per thing to mend."""
+    """A configuration that cannot be run; `faults` has an entry for each thing to correct."""
 
     def __init__(self, faults: list[Fault]) -> None:
         lines = [str(fault) for fault in faults[:_MAX_LINES]]

@@ -1,4 +1,4 @@
-"""Files that a user names: only regular ones, and only as much of them as is sensible."""
+"""Reads files that a user names: only regular files, and none larger than is sensible."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ def read(path: Path, limit: int) -> str:
 
     Raises
     ------
-    OSError, UnicodeDecodeError
-        where it is none; its `strerror` says why.
+    OSError
+        if it cannot be read, is too large or is not a regular file; `strerror` says which.
+    UnicodeDecodeError
+        if it is not UTF-8.
     """
     try:
         mode = path.stat().st_mode
-    except ValueError as error:  # a NUL, or half a character, in the name
+    except ValueError as error:  # the name contains a NUL or half a character
         raise OSError(errno.EINVAL, str(error), str(path)) from None
-    # A pipe may never be written to, a device never end.
+    # Reading a pipe may wait for ever, and a device may never end.
     if not stat.S_ISREG(mode):
         what = "a folder" if stat.S_ISDIR(mode) else "a pipe or device"
         raise OSError(errno.EINVAL, f"{what}; allowed: a regular file", str(path))

@@ -1,4 +1,4 @@
-"""What a configuration may say.  Input is checked and normalised here, and trusted after."""
+"""The schema of a configuration.  Input is checked and normalised here, and trusted from then on."""
 
 from __future__ import annotations
 
@@ -15,21 +15,20 @@ from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
 from sweep.config.faults import quote
-from sweep.kernels.lanes import MEASURES, TOLERANCE
-from sweep.kernels.methods import METHODS
+from sweep.kernels.measures import MEASURES
+from sweep.kernels.method import TOLERANCE
+from sweep.kernels.methods import AUTO, METHODS, PLAIN
 from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
-DEFAULT_MEASURES = ("reversals", "energy_error", "noise_limited")
-
-# Maps are drawn with μ downwards and b across, a panel for each n0; other axes follow as written.
+# Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
 
 MAX_CELLS = 1_000_000_000
 MAX_REFINED_CELLS = 2**24
-"""Of a refined run, which holds all its arrays in memory."""
+"""Most cells of a refined run, which holds all its arrays in memory."""
 MAX_AXIS = 1_000_000
-"""Values of one axis, and rows of a table: they are held in memory as Python's numbers."""
+"""Most values of one axis and most rows of a table of cases: they are held in memory as Python numbers."""
 MAX_STEPS = 1e15
 
 
@@ -45,7 +44,7 @@ class Range(_Strict):
 
     def values(self) -> list[float]:
         if self.spacing == "linear":
-            with np.errstate(all="ignore"):  # values beyond the largest number are refused with the others
+            with np.errstate(all="ignore"):  # values that overflow are refused later, as out of bounds
                 return list(map(float, np.linspace(self.start, self.stop, self.num)))
         if np.sign(self.start) * np.sign(self.stop) <= 0:
             raise _wrong("a log range needs start and stop of one sign, both not zero", "spacing")
@@ -53,7 +52,7 @@ class Range(_Strict):
 
 
 def _wrong(reason: str, *at: str | int) -> PydanticCustomError:
-    """A fault `at` a place inside the value being checked."""
+    """A fault in the value that is being checked; `at` is the path inside that value."""
     return PydanticCustomError("value", "{reason}", {"reason": reason, "at": at})
 
 
@@ -64,7 +63,7 @@ class Values:
     numbers: tuple[float, ...]
     is_axis: bool
     spec: float | list[float] | dict[str, Any]
-    """As the configuration says it."""
+    """The value as it stands in the configuration."""
 
 
 def _parse_values(parameter: Parameter, raw: Any) -> Values:
@@ -111,25 +110,43 @@ def _step(raw: Any) -> Any:
     raise _wrong(f"{quote(raw)}; allowed: auto, or a finite number > 0 in sqrt(c/g)")
 
 
-def _distinct(names: list[Any]) -> list[Any]:
-    words = [name for name in names if isinstance(name, str)]
-    if len(set(words)) < len(words):
+def _measures(raw: Any) -> Any:
+    """Specs of the measurements: "reversals" for `reversals`, "reversal_times=12" for `{reversal_times: 12}`."""
+    if not isinstance(raw, list):
+        return raw
+    specs = [_measure(item, i) for i, item in enumerate(raw)]
+    if len({spec.partition("=")[0] for spec in specs}) < len(specs):
         raise _wrong("a name twice; allowed: each once")
-    return names
+    return specs
+
+
+def _measure(raw: Any, i: int) -> str:
+    name, setting = next(iter(raw.items())) if isinstance(raw, dict) and len(raw) == 1 else (raw, None)
+    if not isinstance(name, str) or name not in MEASURES:
+        raise _wrong(f"{quote(raw)} is not a measurement; allowed: {', '.join(MEASURES)}", i)
+    kind = MEASURES[name]
+    if not isinstance(raw, dict):
+        return kind().spec
+    if kind.bounds is None:
+        raise _wrong(f"{name} has no setting; allowed: {name}", i)
+    low, high = kind.bounds
+    if isinstance(setting, bool) or not isinstance(setting, int) or not low <= setting <= high:
+        raise _wrong(f"{quote(setting)}; allowed: a whole number from {low} to {high}", i, name)
+    return kind(setting).spec  # type: ignore[call-arg]
 
 
 class Integrator(_Strict):
-    method: Literal[(*METHODS, "auto")] = "dopri5"  # type: ignore[valid-type]
-    """`auto` is for each cell the one that reaches `t_end` to `tolerance` in the least time."""
+    method: Literal[(*METHODS, AUTO)] = PLAIN  # type: ignore[valid-type]
+    """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time."""
     step: Annotated[float | Literal["auto"], BeforeValidator(_step)] = "auto"
     tolerance: float = Field(default=TOLERANCE, ge=1e-14, lt=1)
-    """Error in spin that an automatic step keeps to, at t = 400."""
+    """Error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep."""
     t_end: float = Field(default=30_000.0, gt=0, le=1e12)
     stop_when_settled: bool = True
 
 
 def _section(name: str) -> Any:
-    """The schema of one section of physical parameters, from the table of parameters."""
+    """The schema of one section of physical parameters, made from the table of parameters."""
     fields: dict[str, Any] = {
         p.name: (
             Annotated[Any, BeforeValidator(lambda raw, p=p: _parse_values(p, raw)), Field(description=p.long_name)],
@@ -146,18 +163,12 @@ class _Top(_Strict):
     model: Literal[tuple(TIERS)] = "slip"  # type: ignore[valid-type]
     cases: str | None = None
     integrator: Integrator = Integrator()
-    measure: (
-        Annotated[
-            list[Literal[MEASURES]],  # type: ignore[valid-type]
-            BeforeValidator(lambda names: _distinct(names) if isinstance(names, list) else names),
-        ]
-        | None
-    ) = None
-    """By default `DEFAULT_MEASURES`, as far as the model has them."""
+    measure: Annotated[list[str] | None, BeforeValidator(_measures)] = None
+    """By default, those measurements marked `by_default` that the model supports."""
     verify: float = Field(default=0.0, ge=0, le=1)
-    """Share of the cells to run again with finer steps."""
+    """Share of the cells that are run again with finer steps."""
     refine: int = Field(default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1)
-    """Level of the largest blocks of cells whose inside is inferred from their sides: 2^refine cells a side."""
+    """The largest blocks of cells whose inside is inferred from their sides have 2^refine cells a side."""
     max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
 
 
@@ -167,18 +178,20 @@ Schema: Any = create_model("Configuration", __base__=_Top, **_sections)
 
 @dataclass(frozen=True)
 class Config:
-    """A checked configuration.  `parameters` are those of the model, in the order of the axes."""
+    """A checked configuration."""
 
     name: str
     model: str
     parameters: dict[str, Values]
+    """The parameters of the model, in the order of the axes."""
     integrator: Integrator
     measure: tuple[str, ...]
+    """Specs of measurements, as `sweep.kernels.measures.chosen` takes them."""
     max_failed_fraction: float
     verify: float = 0.0
     refine: int = 0
     cases: dict[str, tuple[float, ...]] | None = None
-    """Columns of the table of cases, where there is one."""
+    """Columns of the table of cases, if there is one."""
     cases_file: str | None = None
 
     @property
@@ -186,9 +199,9 @@ class Config:
         return {name: v.numbers for name, v in self.parameters.items() if v.is_axis}
 
     def document(self) -> dict[str, Any]:
-        """Everything said and defaulted, as plain data."""
+        """The whole configuration, defaults included, as plain data."""
         written = [PARAMETERS[name].section for name in self.axes if name not in FIRST_AXES]
-        # In the order of the axes: read again, they are the same.
+        # In the order of the axes, so that they keep it when the document is read again.
         sections: dict[str, dict[str, Any]] = {section: {} for section in (*written, *SECTIONS)}
         for name, value in self.parameters.items():
             sections[PARAMETERS[name].section][name] = value.spec
@@ -198,7 +211,7 @@ class Config:
             **({"cases": self.cases_file} if self.cases_file else {}),
             **{section: values for section, values in sections.items() if values},
             "integrator": self.integrator.model_dump(),
-            "measure": list(self.measure),
+            "measure": [_written(spec) for spec in self.measure],
             "verify": self.verify,
             "refine": self.refine,
             "max_failed_fraction": self.max_failed_fraction,
@@ -212,7 +225,7 @@ class Config:
         return stream.getvalue()
 
     def fingerprint(self) -> str:
-        """Hash of all that decides the numbers: neither the name nor what to do about failures."""
+        """Hash of everything that determines the numbers: not the name, nor how many failures are accepted."""
         decisive = self.document()
         for key in ("name", "max_failed_fraction", "cases"):
             decisive.pop(key, None)
@@ -220,8 +233,14 @@ class Config:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+def _written(spec: str) -> str | dict[str, int]:
+    """The spec of a measurement in the form in which a configuration gives it."""
+    name, _, setting = spec.partition("=")
+    return {name: int(setting)} if setting else name
+
+
 def describe(error: Any) -> tuple[tuple[str | int, ...], str, bool]:
-    """Path, message and whether the key itself is at fault, of one of pydantic's errors."""
+    """Of one of pydantic's errors: its path, its message, and whether the key itself is at fault."""
     path = error["loc"]
     at = error.get("ctx", {}).get("at", ())
     return (*path, *at), _message(error, _model_at(path[:-1])), error["type"] == "extra_forbidden"

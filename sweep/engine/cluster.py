@@ -1,7 +1,7 @@
-"""Runs tiles in other processes, of this machine or of a cluster, by dask.distributed.
+"""Runs tiles in other processes, of this machine or of a cluster, with dask.distributed.
 
-Workers compute and send arrays back; the process that started the run writes them.  A worker that
-dies costs the tile it was at, which another one computes again.
+Workers compute and send arrays back; only the process that started the run writes files.  If a
+worker dies, another one computes the tile it was working on.
 """
 
 from __future__ import annotations
@@ -20,11 +20,17 @@ import numba
 from sweep.config import Config
 from sweep.engine.local import Done, run_group
 from sweep.grid import Tile
+from sweep.results.identity import Identity
 from sweep.results.provenance import identify, sources
-from sweep.results.store import Identity, StoreError
+from sweep.results.store import StoreError
 
 AHEAD = 3
-"""Tiles a worker that are sent out before the first is back."""
+"""Tiles per worker that are sent out before the first comes back."""
+
+PATIENCE = "10s"
+"""How long to wait for a scheduler to answer."""
+
+_LOST = "the dask scheduler is gone; finished tiles are kept, and the same command resumes the run"
 
 
 class Cluster:
@@ -34,23 +40,23 @@ class Cluster:
         self.client = client
 
     def run(self, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Done]:
-        """Run the tiles `todo`, yielding them as they come back.
+        """Run the tiles `todo`, and yield them as they come back.
 
         Raises
         ------
         StoreError
-            where workers run other sources or die of a tile again and again, or the scheduler goes.
+            if a worker runs other source code, a tile kills several workers, or the scheduler disappears.
         """
         from distributed import CancelledError, KilledWorker, as_completed
         from distributed.comm import CommClosedError
 
-        # The result of a task, not scattered data: that would be lost with the workers that hold it.
+        # A task's result rather than scattered data, which would be lost along with the workers that hold it.
         shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
         waiting, numbers = iter(todo), dict[Any, int]()
         running = as_completed(loop=self.client.loop)
 
         def send_ahead() -> None:
-            # Workers come and go.
+            # The number of workers is asked each time, since they come and go.
             while len(numbers) < AHEAD * max(1, len(self.client.scheduler_info(n_workers=-1)["workers"])):
                 if (i := next(waiting, None)) is None:
                     return
@@ -64,24 +70,22 @@ class Cluster:
                 done: Done = future.result()
             except KilledWorker as error:
                 deaths = error.allowed_failures + 1
-                raise StoreError(f"tile {numbers[future]}: {deaths} workers died at it; out of memory?") from None
+                raise StoreError(
+                    f"tile {numbers[future]}: {deaths} workers died computing it; out of memory?"
+                ) from None
             except CancelledError:
-                raise StoreError(LOST) from None
+                raise StoreError(_LOST) from None
             del numbers[future]
             future.release()
             try:
                 send_ahead()
             except CommClosedError:
-                raise StoreError(LOST) from None
+                raise StoreError(_LOST) from None
             yield done
 
 
-LOST = "the dask scheduler is gone; finished tiles are kept, the same command goes on"
-
-PATIENCE = "10s"
-"""For the answer of a scheduler."""
-
 Shared = tuple[Config, list[Tile], Identity]
+"""What the tasks of a run have in common."""
 
 
 def _share(*given: Any) -> tuple[Any, ...]:
@@ -90,7 +94,7 @@ def _share(*given: Any) -> tuple[Any, ...]:
 
 _own_sources = cache(sources)
 
-# Kernels of several tasks at once would share threads, which not each of numba's ways allows.
+# Kernels of several tasks at once would share threads, which not all of numba's threading layers allow.
 _one_tile = threading.Lock()
 
 
@@ -110,22 +114,20 @@ def _work(shared: Shared, tile: int) -> Done:
 
 @contextmanager
 def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | None]:
-    """A local cluster of `workers` processes, the one at the address `scheduler`, or none if neither is asked for.
+    """A local cluster of `workers` processes, or the cluster at the address `scheduler`; None if neither is given.
 
     Raises
     ------
     StoreError
-        where dask.distributed is not installed, or no scheduler answers.
+        if dask.distributed is not installed, or no scheduler answers.
     """
     if workers is None and scheduler is None:
         yield None
         return
-    try:
-        import dask
-        import distributed
-    except ImportError:
-        raise StoreError("--workers and --scheduler need: pip install 'rattleback-sweep[cluster]'") from None
-    for logger in ("distributed", "distributed.client"):  # what a user has to know comes as an error
+    import dask
+    import distributed
+
+    for logger in ("distributed", "distributed.client"):  # what a user has to know is raised as an error
         logging.getLogger(logger).setLevel("CRITICAL")
     quiet = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "CRITICAL"}
     if scheduler is None:
@@ -134,7 +136,7 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
             distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
-                dashboard_address=":0",  # any port: the usual one may be taken
+                dashboard_address=":0",  # any free port: the usual one may be taken
                 scheduler_kwargs={"dashboard": False},
                 silence_logs="CRITICAL",
                 preload=__name__,
@@ -152,5 +154,8 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
 
 
 def dask_setup(worker: Any) -> None:  # noqa: ARG001
-    """Leave Ctrl-C, which a terminal sends to all processes, to the one that started the run."""
+    """Make a worker ignore Ctrl-C, which a terminal sends to all processes: it is for the one that started the run.
+
+    Dask calls this in each worker, by the name of this module given as `preload`.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Runs a table of trajectories to their ends, a chunk at a time."""
+"""Advances a table of trajectories to their ends, in chunks of work."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ import numba
 import numpy as np
 
 from sweep.grid import Array
-from sweep.kernels.lanes import BLOCK, LANES, RUNNING, Kernel
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.layout import BLOCK, LANES
+from sweep.kernels.status import RUNNING
 
 CHUNK_SECONDS = 0.7
-"""Progress, checkpoints and Ctrl-C wait for a chunk at the most."""
+"""Length of a chunk.  Progress, checkpoints and Ctrl-C wait for the end of one."""
 
 _MOST_BLOCKS = 2**40
 
@@ -29,15 +31,17 @@ def execute(
 
     Parameters
     ----------
-    after_chunk : called after each chunk, when `images` is consistent: to report, save or stop
-        (by raising)
-    chunk_blocks : blocks of steps a chunk; by default what takes about `CHUNK_SECONDS`
+    images : shape (cells, rows), a row of the table per trajectory
+    stop_when_settled : end a trajectory as soon as its spin can no longer reverse
+    after_chunk : called after each chunk, when `images` is consistent: to report, save, or stop
+        by raising an exception
+    chunk_blocks : blocks of steps per chunk; by default as many as take about `CHUNK_SECONDS`
 
     Notes
     -----
-    Trajectories that have begun go first, the others in a scrambled order, so that what is done
-    is at any moment a fair sample of the whole and the time left can be told from it.  Neither
-    the order nor the size of the chunks touches a result.
+    Trajectories that have begun go first and the others follow in random order, so that those done
+    are always a fair sample, from which the time left can be estimated.  Neither the order nor the
+    size of the chunks changes a result.
     """
     status = images[:, kernel.row("status")]
     steps = images[:, kernel.row("done")]
@@ -55,14 +59,14 @@ def execute(
 
 
 def _rescale(blocks: int, seconds: float) -> int:
-    # Where the last trajectories pause often, every call is short, and blocks would grow without end.
+    # While the last trajectories pause often, every call is short, and `blocks` would grow without end.
     return min(max(1, int(blocks * np.clip(CHUNK_SECONDS / seconds, 0.25, 8))), _MOST_BLOCKS)
 
 
 def nominal_seconds(images: Array, kernel: Kernel) -> float:
-    """Rough upper estimate of the time for `images`: every one stepped to its time limit.
+    """Rough upper bound on the time for `images`, as if each were stepped to its time limit.
 
-    25 ns a step and lane on one thread, measured on the slip model with dopri5 (`sweep bench`).
+    Assumes 25 ns per step and lane on one thread, measured on the slip model with dopri5 (`sweep bench`).
     """
     goal = images[:, kernel.row("goal")] - images[:, kernel.row("done")]
     threads = numba.get_num_threads()

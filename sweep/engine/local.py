@@ -1,4 +1,4 @@
-"""Runs tiles: in this process on all its threads, or as the work of one process of many."""
+"""Runs tiles in this process, on all its threads; a worker of a cluster runs its tiles this way too."""
 
 from __future__ import annotations
 
@@ -12,19 +12,15 @@ from sweep.config import Config
 from sweep.engine import executor, verification
 from sweep.engine.plan import Plan, plan, pool
 from sweep.grid import Array, Grid, Tile
-from sweep.kernels.lanes import SETTLED
+from sweep.kernels.status import SETTLED
 from sweep.models import MODELS, TIERS
 from sweep.prediction import predict
 from sweep.results import dataset
 from sweep.results.provenance import this_cpu
-from sweep.results.store import Checkpoint, Memory
+from sweep.results.store import Running, Store
 
 GROUP = 32_768
-"""Cells in memory together (50 MB of images); lanes idle at the end of a group alone."""
-
-
-Running = tuple[list[int], dict[str, Array], float]
-"""What `Checkpoint.load_running` finds."""
+"""Cells simulated together (50 MB of images).  Lanes idle only at the end of such a group of tiles."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +29,31 @@ class Done:
 
     tile: int
     arrays: dict[str, Array]
+    """Results by name, each of shape (cells,)."""
     seconds: float
     cpu: str
+
+
+def run(
+    config: Config,
+    tiles: Sequence[Tile],
+    todo: Sequence[int],
+    store: Store,
+    *,
+    compiling: Callable[[], None],
+    after_chunk: Callable[[Array], None],
+) -> Iterator[Done]:
+    """Run the tiles `todo`, group by group, and yield them as they are finished.
+
+    Parameters
+    ----------
+    store : keeps the images between chunks; those it has of an earlier run are continued first
+    compiling : called before a kernel is compiled
+    after_chunk : called with the statuses of the cells at work
+    """
+    grid = Grid.of(config)
+    for group, left in _groups(grid, tiles, todo, store):
+        yield from run_group(config, tiles, group, store=store, left=left, compiling=compiling, after_chunk=after_chunk)
 
 
 def run_group(
@@ -42,17 +61,18 @@ def run_group(
     tiles: Sequence[Tile],
     group: Sequence[int],
     *,
-    checkpoint: Checkpoint | Memory | None = None,
+    store: Store | None = None,
     left: Running | None = None,
     compiling: Callable[[], None] = lambda: None,
     after_chunk: Callable[[Array], None] = lambda status: None,  # noqa: ARG005
 ) -> Iterator[Done]:
-    """Run the tiles of numbers `group` together.
+    """Run the tiles `group` together.
 
     Parameters
     ----------
-    checkpoint : keeps the images after each chunk
-    left : what it holds of this group, to go on from
+    store : keeps the images after each chunk
+    left : the images of this group that an earlier run left, to be continued
+    compiling : called before a kernel is compiled
     after_chunk : called with the statuses of the group's cells
     """
     grid, cpu = Grid.of(config), this_cpu()
@@ -64,15 +84,15 @@ def run_group(
     for kernel, _ in tables.values():
         kernel.compile()
     images, began = {method: table for method, (_, table) in tables.items()}, time.perf_counter()
-    if left and {m: t.shape for m, t in left[1].items()} == {m: t.shape for m, t in images.items()}:
-        for method, table in left[1].items():
+    if left and {m: t.shape for m, t in left.tables.items()} == {m: t.shape for m, t in images.items()}:
+        for method, table in left.tables.items():
             images[method][:] = table
-        began -= left[2]
+        began -= left.seconds
 
     def chunk() -> None:
-        # Saved here alone, between two chunks: elsewhere an interrupt finds images half moved on.
-        if checkpoint:
-            checkpoint.save_running(list(group), images, time.perf_counter() - began)
+        # Images are saved only here, between two chunks: anywhere else an interrupt may find half of them advanced.
+        if store:
+            store.save_running(Running(list(group), images, time.perf_counter() - began))
         after_chunk(np.concatenate([table[:, kernel.row("status")] for kernel, table in tables.values()]))
 
     for kernel, table in tables.values():
@@ -83,15 +103,15 @@ def run_group(
         yield Done(i, _results(job, grid, tiles[i]), seconds, cpu)
 
 
-def groups(
-    grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], checkpoint: Checkpoint | Memory
+def _groups(
+    grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], store: Store
 ) -> Iterator[tuple[list[int], Running | None]]:
-    """Numbers of tiles to run together: first those that the checkpoint has images of, with these."""
+    """The tiles to run together: first those whose images the store has, along with these."""
     waiting = list(todo)
-    left = checkpoint.load_running()
-    if left and set(left[0]) <= set(waiting):
-        yield left[0], left
-        waiting = [i for i in waiting if i not in left[0]]
+    left = store.load_running()
+    if left and set(left.tiles) <= set(waiting):
+        yield left.tiles, left
+        waiting = [i for i in waiting if i not in left.tiles]
     group: list[int] = []
     cells = 0
     for i in waiting:
@@ -106,7 +126,7 @@ def groups(
 
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
-    """Results of a tier that is a formula."""
+    """The results of a model that is a formula."""
     arrays = dataset.predicted(predict(TIERS[config.model], grid))
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:

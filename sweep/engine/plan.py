@@ -1,4 +1,4 @@
-"""From the cells of a grid to images: what each is run with, before the first step is taken."""
+"""Turns the cells of a grid into images: the method, step, limits and start of each, before any step is taken."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from sweep.config import Config
 from sweep.grid import Array, Grid
 from sweep.kernels import methods
 from sweep.kernels.build import build
-from sweep.kernels.lanes import Kernel
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.method import FIXED
+from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import MODELS
-from sweep.models.coefficients import rattle_period
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
 
-# One of each in a process: its machine code takes a second to load.
+# Each kernel is made once in a process, because its machine code takes a second to load.
 _kernel = cache(methods.make_kernel)
 
 
@@ -28,10 +29,12 @@ class Part:
 
     method: str
     cells: Array
-    """Their indices in the grid."""
+    """Indices of the cells in the grid, shape (cells,)."""
     kernel: Kernel
     step_rule: Array
+    """What determined the step of each cell (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
     images: Array
+    """Shape (cells, rows)."""
 
     @property
     def status(self) -> Array:
@@ -46,25 +49,25 @@ class Plan:
     grid: Grid
     prediction: Prediction
     parts: tuple[Part, ...]
-    """One unless the configuration leaves the choice of the method to each cell."""
+    """One part, unless the configuration has the method chosen for each cell (`method: auto`)."""
 
     def results(self) -> dict[str, Array]:
-        """What the dataset says of the cells and of their bodies, once the images are at their ends."""
+        """The variables of the dataset, over the cells and over their bodies, once all trajectories have ended."""
         arrays: dict[str, Array] = {}
         for part in self.parts:
             found = dataset.measured(part.kernel, part.images, self.config.integrator.t_end)
             found["step_rule"] = part.step_rule
-            if self.config.integrator.method == "auto":
-                found["method"] = np.full(len(part.cells), methods.METHODS.index(part.method))
+            if self.config.integrator.method == AUTO:
+                found["method"] = np.full(len(part.cells), list(METHODS).index(part.method))
             for name, values in found.items():
-                arrays.setdefault(name, np.empty(self.grid.size))[part.cells] = values
+                arrays.setdefault(name, np.empty((self.grid.size, *values.shape[1:])))[part.cells] = values
         return arrays | dataset.predicted(self.prediction)
 
 
 def plan(config: Config, grid: Grid | None = None, compiling: Callable[[], None] = lambda: None) -> Plan:
-    """Lay out the cells of `grid`, by default all of `config`, with their methods, steps, limits and starts.
+    """Give each cell of `grid`, by default all cells of `config`, its method, step, limits and start.
 
-    `compiling` is called for each kernel that no cache holds.
+    `compiling` is called before each kernel that has to be compiled because no cache holds it.
     """
     grid = grid or Grid.of(config)
     model, integrator = MODELS[config.model], config.integrator
@@ -72,13 +75,13 @@ def plan(config: Config, grid: Grid | None = None, compiling: Callable[[], None]
     prediction = predict(model, grid)
     assert prediction.stability is not None  # it is a model
     stable = prediction.stability.ranges[:, grid.bodies()[1]]
-    if integrator.method == "auto":
+    if integrator.method == AUTO:
         chosen = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:
-        chosen = np.full(grid.size, methods.METHODS.index(integrator.method))
+        chosen = np.full(grid.size, list(METHODS).index(integrator.method))
     parts = []
     for i in np.unique(chosen):
-        method, cells = methods.METHODS[i], np.flatnonzero(chosen == i)
+        method, cells = list(METHODS)[i], np.flatnonzero(chosen == i)
         kernel = _kernel(method, model, config.measure, integrator.tolerance)
         if not kernel.is_compiled():
             compiling()
@@ -87,17 +90,17 @@ def plan(config: Config, grid: Grid | None = None, compiling: Callable[[], None]
         if integrator.step == "auto":
             step, rule = methods.automatic_step(method, model, theirs, integrator.tolerance)
         else:
-            step, rule = np.full(len(cells), integrator.step), np.full(len(cells), methods.FIXED)
-        images = kernel.images(theirs, step, integrator.t_end, stable[:, cells], rattle_period(theirs))
+            step, rule = np.full(len(cells), integrator.step), np.full(len(cells), FIXED)
+        images = kernel.images(theirs, step, integrator.t_end, stable[:, cells])
         parts.append(Part(method, cells, kernel, rule, images))
     return Plan(config, grid, prediction, tuple(parts))
 
 
 def pool(plans: Iterable[Plan]) -> tuple[list[Plan], dict[str, tuple[Kernel, Array]]]:
-    """The same plans with their images as views into one table a method, and these tables."""
+    """The same plans, with their images as views into one table per method; and the tables, with their kernels."""
     plans = list(plans)
     tables: dict[str, tuple[Kernel, Array]] = {}
-    for method in methods.METHODS:
+    for method in METHODS:
         found = [part for each in plans for part in each.parts if part.method == method]
         if found:
             tables[method] = found[0].kernel, np.concatenate([part.images for part in found])

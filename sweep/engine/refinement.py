@@ -1,14 +1,20 @@
-"""Which nodes of a map to simulate where its outcome is constant but for lines: those near the lines.
+"""Which nodes of a map to simulate if its outcome changes only across lines: the nodes near these lines.
 
-The nodes of the refined axes are cut into blocks of 2^depth intervals a side; a block shares the nodes
-of its sides with its neighbours, and the last of an axis may be shorter.  Of a block the corners are
-simulated.  It is halved where the outcomes known in it or on its sides differ.  Inside a block of two
-intervals a side that differs, a node is inferred where two opposite neighbours agree, and no other two
-on another outcome; so of a line every second node is simulated, and where it turns.  Lines one cell
-wide get lost by that: a node simulated whose neighbours for the most part differ has these simulated
-too.  Along the other axes there are as many maps.
+The map is cut into blocks with 2^depth intervals along each refined axis.  Neighbouring blocks share the
+nodes of their common side, and the last block of an axis may be shorter.
 
-All follows from the outcomes known so far: a search can go on from these alone.
+1. The corners of every block are simulated.
+2. A block in which, or on whose sides, known outcomes differ is halved along each axis, and so on down
+   to blocks of two intervals.  The inside of every other block has the outcome of its corners.
+3. Inside a block of two intervals whose outcomes differ, a node is inferred if two opposite neighbours
+   agree, and no two others agree on another outcome.  So along a line every second node is simulated,
+   and each node where the line turns.
+4. Lines one node wide would be lost by that.  Therefore, if most neighbours of a simulated node have
+   another outcome, these neighbours are simulated too.
+
+The axes that are not refined count maps, each of which is searched by itself.
+
+Everything follows from the outcomes known so far, so a search can be resumed from these alone.
 """
 
 from __future__ import annotations
@@ -25,16 +31,16 @@ Flags = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
 
 UNKNOWN = -1
-"""Outcome of a node that is not simulated; those of the others are not negative."""
+"""Outcome of a node that is not simulated; no other outcome is negative."""
 
 
 def missing(outcome: Outcomes, refined: Sequence[int], depth: int) -> Nodes:
-    """Nodes to simulate next, as ascending indices in the C order of `outcome`; none when all is known.
+    """Nodes to simulate next, as ascending indices in the C order of `outcome`; none when the search is complete.
 
     Parameters
     ----------
-    outcome : of any shape, `UNKNOWN` where not simulated yet
-    refined : its refined axes
+    outcome : outcomes of the nodes, of any shape; `UNKNOWN` where not simulated yet
+    refined : indices of the refined axes
     depth : level of the largest blocks, at least 1
     """
     wanted, _ = _search(outcome, refined, depth)
@@ -42,22 +48,22 @@ def missing(outcome: Outcomes, refined: Sequence[int], depth: int) -> Nodes:
 
 
 def sources(outcome: Outcomes, refined: Sequence[int], depth: int) -> Nodes:
-    """For each node the simulated one whose outcome it has; shape of `outcome`.
+    """For each node the simulated one whose outcome it has, as indices; shape of `outcome`.
 
-    Takes the outcomes as `missing` leaves them when it finds nothing more.
+    Takes the outcomes of a complete search, for which `missing` finds no more nodes.
     """
     return _search(outcome, refined, depth)[1]
 
 
 def _search(outcome: Outcomes, refined: Sequence[int], depth: int) -> tuple[Flags, Nodes]:
-    """Which nodes are to be simulated, and for each the one whose outcome it has; itself where that is open."""
+    """Which nodes to simulate, and for each node the one whose outcome it has (itself if that is not known yet)."""
     wanted = np.zeros(outcome.shape, bool)
     source = np.arange(outcome.size).reshape(outcome.shape)
     for level, blocks, halved in _levels(outcome, refined, depth):
         size = 2**level
         at = [_corner_places(n, size) for n in outcome.shape]
         wanted[_mesh(outcome, refined, at)] |= _corners(blocks, refined)
-        # A node on the sides of several blocks has one outcome with each: any will do.
+        # A node on the sides of several blocks has the same outcome in each: any of them will do.
         block = [np.minimum(np.arange(n), n - 2) // size for n in outcome.shape]
         inferred = (blocks & ~halved)[_mesh(outcome, refined, block)] & (outcome == UNKNOWN)
         first = _mesh(outcome, refined, [size * i for i in block])
@@ -68,9 +74,10 @@ def _search(outcome: Outcomes, refined: Sequence[int], depth: int) -> tuple[Flag
 
 
 def _infer_between(outcome: Outcomes, refined: Sequence[int], wanted: Flags, source: Nodes) -> None:
-    """Infer what is between the corners of the smallest blocks, or want it; in place.
+    """Infer the nodes between the corners of the smallest blocks, or mark them as wanted; in place.
 
-    Middles of edges come before those of faces, these before those of bodies: each has its neighbours before it.
+    Midpoints of edges come first, then those of faces, then those of bodies, so that the neighbours
+    of a node are decided before it.
     """
     outcomes = outcome.ravel()
     for axes in (axes for count in range(len(refined)) for axes in combinations(refined, count + 1)):
@@ -93,9 +100,10 @@ def _infer_between(outcome: Outcomes, refined: Sequence[int], wanted: Flags, sou
 
 
 def _beside_tips(outcome: Outcomes, refined: Sequence[int], value: Outcomes) -> Flags:
-    """Neighbours of the nodes simulated that share the outcome of fewer than half an inner node's: ends of thin lines.
+    """The neighbours of tips: of simulated nodes like those at the end of a thin line.
 
-    `value` has the outcomes that are inferred too.
+    A tip shares its outcome with fewer neighbours than half of those that an inner node has.
+    `value` has the outcomes of simulated and inferred nodes.
     """
     alike, judged = np.zeros(outcome.shape, np.int8), outcome != UNKNOWN
     for axis in refined:
@@ -115,7 +123,7 @@ def _beside_tips(outcome: Outcomes, refined: Sequence[int], value: Outcomes) -> 
 
 
 def _corner_places(nodes: int, size: int) -> Nodes:
-    """Where the corners of blocks of `size` intervals are along an axis."""
+    """The corners of blocks of `size` intervals, as indices along an axis."""
     return np.append(np.arange(0, nodes - 1, size), nodes - 1)
 
 
@@ -125,7 +133,7 @@ def _mesh(outcome: Outcomes, refined: Sequence[int], places: Sequence[Any]) -> t
 
 
 def _levels(outcome: Outcomes, refined: Sequence[int], depth: int) -> Iterator[tuple[int, Flags, Flags]]:
-    """From the largest blocks to those of two intervals a side: level, which there are, which of these are halved."""
+    """Level, which blocks there are, and which of these are halved; from the largest down to those of two intervals."""
     changed = _changed(outcome, refined, depth)
     blocks = np.ones_like(changed[depth])
     for level in range(depth, 0, -1):
@@ -137,7 +145,7 @@ def _levels(outcome: Outcomes, refined: Sequence[int], depth: int) -> Iterator[t
 
 
 def _changed(outcome: Outcomes, refined: Sequence[int], depth: int) -> list[Flags]:
-    """By level: in which blocks, their sides included, known outcomes differ."""
+    """By level: the blocks in which, or on whose sides, known outcomes differ."""
     lowest, highest = np.where(outcome == UNKNOWN, np.iinfo(outcome.dtype).max, outcome), outcome
     for axis in refined:
         lowest, highest = _pairs(np.minimum, lowest, axis), _pairs(np.maximum, highest, axis)
@@ -152,13 +160,13 @@ def _changed(outcome: Outcomes, refined: Sequence[int], depth: int) -> list[Flag
 
 
 def _pairs(function: np.ufunc, values: Any, axis: int) -> Any:
-    """`function` of each two neighbours along an axis."""
+    """`function` of each pair of neighbours along an axis."""
     values = np.moveaxis(values, axis, 0)
     return np.moveaxis(function(values[:-1], values[1:]), 0, axis)
 
 
 def _corners(blocks: Flags, refined: Sequence[int]) -> Flags:
-    """Nodes of the level that are corners of `blocks`."""
+    """The nodes of a level that are corners of `blocks`."""
     for axis in refined:
         framed = np.pad(blocks, [(int(i == axis),) * 2 for i in range(blocks.ndim)])
         blocks = _pairs(np.logical_or, framed, axis)

@@ -1,4 +1,4 @@
-"""A share of the cells, drawn at random, run again with finer steps: a run's own measure of its error."""
+"""Runs a random sample of the cells again with finer steps, so that a run measures its own error."""
 
 from __future__ import annotations
 
@@ -11,27 +11,26 @@ from sweep.engine import executor
 from sweep.engine.plan import Part, Plan
 from sweep.grid import Array
 from sweep.kernels import methods
-from sweep.kernels.lanes import SETTLED, TIME_LIMIT
-from sweep.models.coefficients import rattle_period
+from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.results import dataset
 
 FINER = 100.0
-"""By what the tolerance is divided; the step is halved at least."""
+"""Factor by which the second run divides the tolerance; its step is at most half that of the first run."""
 
 
 @cache
 def draw(cells: int, share: float) -> Array:
-    """Indices of the cells to run again, ascending.  Every tile asks for its part of the one draw."""
+    """Indices of the cells to run again, ascending.  It is drawn once, and every tile takes its cells from it."""
     return np.sort(np.random.default_rng(0).choice(cells, math.ceil(share * cells), replace=False, shuffle=False))
 
 
 def verify(job: Plan, drawn: Array) -> dict[str, Array]:
-    """Run those of the cells `drawn` that did not fail again, to where they ended.
+    """Run the cells `drawn`, except those that failed, a second time, up to the times at which they ended.
 
     Returns
     -------
-    By name: `verified_cell`, indices in the grid of `job`, ascending; what the second run found for
-    them, and how it differs from the first.
+    Arrays by name: `verified_cell`, indices in the grid of `job`, ascending; the results of the second
+    run for these cells; and how they differ from those of the first.
     """
     status = np.empty(job.grid.size)
     for part in job.parts:
@@ -56,8 +55,7 @@ def _again(job: Plan, part: Part, where: Array) -> dict[str, Array]:
     if integrator.step == "auto":
         finer, _ = methods.automatic_step(part.method, model, columns, integrator.tolerance / FINER)
         step = np.minimum(step, finer)
-    never = np.full((6, len(where)), np.nan)
-    images = kernel.images(columns, step, t_stop, never, rattle_period(columns))
+    images = kernel.images(columns, step, t_stop)
     executor.execute(kernel, images, stop_when_settled=False)
     before, after = (dataset.measured(part.kernel, first, t_stop), dataset.measured(kernel, images, t_stop))
     after["spin_difference"] = np.abs(after["spin_final"] - before["spin_final"])

@@ -1,4 +1,4 @@
-"""The integration methods by name: what a model can be run with, and how long a step may be."""
+"""The integration methods by name, the choice of the cheapest, and the automatic step of each."""
 
 from __future__ import annotations
 
@@ -6,55 +6,51 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sweep.kernels.adams import kernel as adams
-from sweep.kernels.adams.kernel import AdamsKernel
-from sweep.kernels.lanes import TOLERANCE, Kernel
-from sweep.kernels.tableau import DOPRI5
-from sweep.models import linear
+from sweep.kernels import measures, runge_kutta
+from sweep.kernels.adams import method as adams
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method
 from sweep.models.coefficients import rattle_period
 from sweep.models.model import Array, Columns, Model
-from sweep.models.slip_split import SPLIT
 
-METHODS = ("dopri5", "adams")
+METHODS: dict[str, Method] = {method.name: method for method in (runge_kutta.DOPRI5_METHOD, adams.METHOD)}
+"""The first is the plain one, which runs every model."""
 
-STABILITY_SHARE = 0.9
-"""Share of the stability interval of dopri5 used along the fastest decay."""
+PLAIN = next(iter(METHODS))
 
-FIXED, ACCURACY, STABILITY = range(3)
-
-# Time of a step and lane, and of start-up in steps, relative to dopri5's step (`sweep bench`, and 4.6 to 6.4 µs of
-# start-up beside 22 ns a step, on one thread).
-_COST = {"dopri5": (1.0, 0.0), "adams": (0.64, 390.0)}
+AUTO = "auto"
+"""Stands in place of the name of a method: the cheapest is taken for each cell."""
 
 
 def allowed(model: Model) -> tuple[str, ...]:
-    """Methods that can run a model: adams has the slip model's equations built in."""
-    return METHODS if model.name == SPLIT.name else ("dopri5",)
+    """Names of the methods that can integrate a model."""
+    return tuple(name for name, method in METHODS.items() if method.runs(model))
 
 
 def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> Array:
-    """Index in `METHODS` of the method that reaches `t_end` to `tolerance` in the least time, shape (cells,)."""
+    """Index in `METHODS` of the method that reaches `t_end` within `tolerance` in the least time, shape (cells,)."""
     costs = []
-    for method in allowed(model):
-        per_step, start_up = _COST[method]
-        step, _ = automatic_step(method, model, columns, tolerance)
-        costs.append(per_step * (t_end / step + start_up))
+    for method in METHODS.values():
+        if method.runs(model):
+            step, _ = automatic_step(method.name, model, columns, tolerance)
+            costs.append(method.step_cost * (t_end / step + method.start_up_cost))
+        else:
+            costs.append(np.full_like(columns["a"], np.inf))
     return np.asarray(np.argmin(costs, axis=0))
 
 
 def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:
-    return AdamsKernel(measure, tolerance) if method == "adams" else Kernel(model, DOPRI5, measure)
+    """The kernel of a method, not compiled yet, for a model and for measurements given by their specs."""
+    return METHODS[method].kernel(model, measures.chosen(measure), tolerance)
 
 
 def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:
-    """Step of each trajectory in sqrt(c/g), and which of the two limits set it; shapes (cells,)."""
-    # Half a period at the most, where even the fastest motion is slow: the windows need two steps.
-    longest = rattle_period(columns) / 2
+    """Step of each trajectory, in sqrt(c/g), and the rule that determined it; both of shape (cells,)."""
+    # At most half a rattle period, however slow the fastest motion: an averaging window needs two steps.
+    record, longest = METHODS[method], rattle_period(columns) / 2
     with np.errstate(divide="ignore"):
-        if method == "adams":
-            step = np.minimum(adams.accurate_step(columns, tolerance), longest)
+        step = np.minimum(record.accurate_step(model, columns, tolerance), longest)
+        if record.stable_step is None:
             return step, np.full(len(step), ACCURACY)
-        radians = model.radians_a_step * (tolerance / TOLERANCE) ** (1 / DOPRI5.order)
-        accuracy = np.minimum(radians / linear.fastest_motion(model, columns), longest)
-        stability = STABILITY_SHARE * DOPRI5.real_stability / model.fastest_decay(columns)
-    return np.minimum(accuracy, stability), np.where(stability < accuracy, STABILITY, ACCURACY)
+        stable = record.stable_step(model, columns)
+    return np.minimum(step, stable), np.where(stable < step, STABILITY, ACCURACY)

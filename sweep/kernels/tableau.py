@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta methods as data that check themselves."""
+"""Explicit Runge-Kutta methods as data: Butcher tableaus, which check themselves when they are made."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from fractions import Fraction as F
 
 @dataclass(frozen=True)
 class Tableau:
-    """A Butcher tableau of an explicit Runge-Kutta method for autonomous systems.
+    """The Butcher tableau of an explicit Runge-Kutta method for autonomous systems.
 
-    `a[i]` holds the weights of the slopes 0 … i for the argument of slope i + 1, `b` those of the
-    result, `c` the abscissae.  Exact fractions, so that construction can refuse a mistyped entry:
+    `a[i]` holds the weights of the slopes 0 … i in the argument of slope i + 1, `b` those in the
+    result, and `c` the abscissae.  They are exact fractions, so that a mistyped entry is found at once.
 
     Raises
     ------
     ValueError
-        where a row sum differs from its abscissa or an order condition up to `order` (at most 5,
-        Butcher 2016, table 301(I)) is not met exactly.
+        if the lengths do not match, a row sum differs from its abscissa, an order condition up to `order`
+        (at most 5; Butcher 2016, table 301(I)) is not met exactly, or `real_stability` is not the end of
+        the real stability interval.
     """
 
     name: str
@@ -26,7 +27,7 @@ class Tableau:
     b: tuple[F, ...]
     c: tuple[F, ...]
     real_stability: float
-    """Largest z with |R(-z)| <= 1: how far the step may reach along the negative real axis."""
+    """Largest z with |R(-z)| <= 1: the limit of h |λ| for real negative λ."""
 
     def __post_init__(self) -> None:
         if not len(self.a) + 1 == len(self.b) == len(self.c):
@@ -53,7 +54,7 @@ class Tableau:
         return 1 + z * sum(float(w) * k for w, k in zip(self.b, slopes, strict=True))
 
     def _conditions(self) -> list[tuple[str, list[F], int]]:
-        """The rooted trees up to `order`: name, elementary weights, density."""
+        """The order conditions, one for each rooted tree up to `order`: name, elementary weights, density."""
         c = list(self.c)
         one = [F(1)] * len(c)
 
@@ -82,7 +83,7 @@ class Tableau:
 
 
 # Dormand & Prince (1980), J. Comput. Appl. Math. 6, 19, table 2: RK5(4)7M.  Its seventh stage
-# serves the embedded error estimate alone and has no part in a fixed step.
+# is left out: it serves only the embedded error estimate, which a fixed step does not use.
 DOPRI5 = Tableau(
     name="dopri5",
     order=5,

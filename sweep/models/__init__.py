@@ -1,4 +1,4 @@
-"""The ladder of models, one file each, each an approximation of the one before."""
+"""The ladder of models, one file each; every model approximates the one before it."""
 
 from sweep.models import analytic, averaged, effective, noslip, slip
 from sweep.models.model import Model, Tier

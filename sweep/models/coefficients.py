@@ -1,7 +1,7 @@
-"""Shape, frequency and friction coefficients of the effective equations (Takano 2011, p … f).
+"""Coefficients of the effective equations for shape, frequencies and friction (Takano 2011, p … f).
 
-The paper sets c = 1.  Here lengths are divided by c and rates multiplied by sqrt(c) first (g = 1),
-so every coefficient is the paper's own for the body of the same shape.
+The paper sets c = 1.  Here lengths are first divided by c and rates multiplied by sqrt(c), with g = 1,
+so that every coefficient is the paper's for a body of the same shape.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from sweep.models.model import Array, Columns
 class Coefficients:
     """The paper's symbols, each an array of shape (cells,), for bodies scaled to c = 1.
 
-    p, q, s (p, q, s); J1, J2 (j1j2); I3; theta (tanth, exact); nu1, nu2: frequencies of the X and Y
-    modes (nu1, nu2 without the paper's expansion in δ); f (f); k1 … k4 (k1 … k4, exact);
-    m1 … m4 (m12, m34).
+    The labels of the paper's equations are in parentheses: p, q, s (p, q, s); J1, J2 (j1j2); I3;
+    theta (tanth, exact); nu1 and nu2, the frequencies of the X and Y modes (nu1, nu2, but without the
+    paper's expansion in δ); f (f); k1 … k4 (k1 … k4, exact); m1 … m4 (m12, m34).
     """
 
     p: Array
@@ -43,7 +43,7 @@ class Coefficients:
 
 
 def coefficients(columns: Columns) -> Coefficients:
-    """Coefficients of the bodies and frictions in `columns` (a, b, c, delta, mu)."""
+    """Coefficients for the bodies in `columns`, which need a, b, c, delta and mu."""
     c = columns["c"]
     a2, b2 = (columns["a"] / c) ** 2, (columns["b"] / c) ** 2
     mu = columns["mu"] * np.sqrt(c)
@@ -54,7 +54,7 @@ def coefficients(columns: Columns) -> Coefficients:
     s = sin_d**2 / a2 + cos_d**2 / b2
     J1, J2 = (b2 + 6) / 5, (a2 + 6) / 5
 
-    # Q = J⁻¹ P⁻¹ J⁻¹, turned by θ into diag(ν1², ν2²); a round body (0/0) needs no turning.
+    # The rotation by θ turns Q = J⁻¹ P⁻¹ J⁻¹ into diag(ν1², ν2²).  A round body (0/0) needs no rotation.
     bottom = J1 * s - J2 * p
     theta = 0.5 * np.arctan(-2 * q * np.sqrt(J1 * J2) / np.where(bottom == 0, np.inf, bottom))
     cos, sin = np.cos(theta), np.sin(theta)
@@ -80,13 +80,13 @@ def coefficients(columns: Columns) -> Coefficients:
 
 
 def rattle_period(columns: Columns) -> Array:
-    """τ = 2π / min(ν1, ν2) in sqrt(c/g): the window over which a spin is averaged."""
+    """τ = 2π / min(ν1, ν2), in sqrt(c/g), shape (cells,): the window over which the spin is averaged."""
     k = coefficients({**columns, "mu": np.ones_like(columns["c"])})
     return 2 * np.pi / np.minimum(k.nu1, k.nu2) * np.sqrt(columns["c"])
 
 
 def normal_coordinates(columns: Columns) -> tuple[Array, Array]:
-    """X and Y of the start (x0, y0), by (X, Y) = T J P (x, y) (xX)."""
+    """X and Y at the start (x0, y0), by (X, Y) = T J P (x, y) (xX); each of shape (cells,)."""
     k = coefficients({**columns, "mu": np.ones_like(columns["c"])})
     x, y = columns["x0"] / columns["c"], columns["y0"] / columns["c"]
     first, second = np.sqrt(k.J2) * (k.p * x + k.q * y), np.sqrt(k.J1) * (k.q * x + k.s * y)

@@ -1,9 +1,9 @@
-"""The body: an ellipsoid on a plane, its axes of inertia turned by δ against its own.
+"""The body: an ellipsoid on a plane, with principal axes of inertia rotated by δ against those of the ellipsoid.
 
-Body axes are the principal axes of inertia, z downward; u is the upward normal of the plane in
-these axes.  With A the matrix of the squared semi-axes, turned by δ into the axes of inertia, the
-contact point is x_p = -A u / r, and r = sqrt(uᵀ A u) is the height of the centre of mass: exact for the
-ellipsoid, where Takano (2011) expands (xp, u).
+The body axes are the principal axes of inertia, z downward; u is the upward normal of the plane in these axes.
+Let A be the matrix of the squared semi-axes, rotated by δ into the axes of inertia.  Then r = sqrt(uᵀ A u) is the
+height of the centre of mass, and x_p = -A u / r is the contact point.  Both are exact for the ellipsoid, where
+Takano (2011) uses an expansion (xp, u).
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from sweep.models.model import Array, Columns
 
 
 def shape(columns: Columns) -> tuple[Array, Array, Array, Array]:
-    """A11, A12, A22, A33: squared semi-axes in the axes of inertia."""
+    """A11, A12, A22, A33: the squared semi-axes as a matrix in the axes of inertia, each of shape (cells,)."""
     a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
     cos, sin = np.cos(columns["delta"]), np.sin(columns["delta"])
     return a2 * cos**2 + b2 * sin**2, (b2 - a2) * sin * cos, a2 * sin**2 + b2 * cos**2, c2
 
 
 def inertia(columns: Columns) -> tuple[Array, Array, Array]:
-    """I1, I2, I3 of the homogeneous ellipsoid, by the paper's definition (for small δ)."""
+    """I1, I2, I3 of the homogeneous ellipsoid by the paper's definition (for small δ), each of shape (cells,)."""
     a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
     return (b2 + c2) / 5, (a2 + c2) / 5, (a2 + b2) / 5
 
 
 def start(columns: Columns) -> tuple[Array, Array, Array]:
-    """u with the contact point at (x0, y0), which must lie inside the body seen from above."""
+    """u for the contact point (x0, y0), which has to lie within the outline of the body seen from above."""
     A11, A12, A22, A33 = shape(columns)
     x, y = columns["x0"], columns["y0"]
     det = A11 * A22 - A12**2
@@ -42,15 +42,16 @@ def start(columns: Columns) -> tuple[Array, Array, Array]:
 
 
 @inline
-def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, A11: Any, A12: Any, A22: Any, A33: Any) -> Any:
-    """(u3, 1/u3), the contact point, u' and the contact point's velocity in the body.
+def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+    """(u3, 1/u3), the contact point x_p, u', and the velocity x_p' of the contact point in the body.
 
-    u' = u × ω (omega) and x_p' = -(A u' + x_p (u' · A u) / r) / r.
+    u' = u × ω (omega) and x_p' = -(A u' + x_p (u' · A u) / r) / r.  `p` holds A11 … A33.
     """
+    A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
     u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
     au1, au2, au3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
     r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
-    # One division serves 1/r and 1/u3.
+    # One division is enough for both 1/r and 1/u3.
     shared = 1.0 / (r * u3)
     inv_r, inv_u3 = shared * u3, shared * r
     x, y, z = -au1 * inv_r, -au2 * inv_r, -au3 * inv_r
@@ -65,13 +66,14 @@ def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, A11: Any, A12: Any, A22
 
 @inline
 def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any) -> Any:
-    """(spin, energy of the rattle, I3): E = ωᵀIω/2 + |v_g|²/2 + (r - c), split with ω = n u + w, w ⊥ u.
+    """(spin n, energy of the rattle, I3), where the energy above rest is the energy of the rattle + I3 n²/2.
 
-    Each term but I3 n²/2 is quadratic in small quantities and formed as such: no difference of
-    O(1) numbers is taken.  `p` begins with A11, A12, A22, A33, 1/I1, 1/I2, 1/I3.
+    E = ωᵀIω/2 + |v_g|²/2 + (r - c) is split by means of ω = n u + w, w ⊥ u.  Every term except I3 n²/2 is quadratic
+    in small quantities and is computed as such: no difference of numbers of order one is taken.  `p` holds A11 … A33
+    and the inverse moments of inertia, inv_I1 … inv_I3.
     """
-    A11, A12, A22, A33, i1, i2, i3 = p[0], p[1], p[2], p[3], p[4], p[5], p[6]
-    I1, I2, I3 = 1.0 / i1, 1.0 / i2, 1.0 / i3
+    A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
+    I1, I2, I3 = 1.0 / p.inv_I1, 1.0 / p.inv_I2, 1.0 / p.inv_I3
 
     u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
     n = u1 * w1 + u2 * w2 + u3 * w3

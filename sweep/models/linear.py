@@ -1,25 +1,29 @@
-"""Small rattle about steady upright spin, from a model's own right-hand side.
+"""Linear stability of steady upright spin, from the right-hand side of a model itself.
 
-With n constant the rattle obeys a linear system; its eigenvalues say at which spins it grows.
+At constant n a small rattle obeys a linear system, whose eigenvalues say at which spins it grows.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from sweep.models.model import Array, Columns, Model, stack
+from sweep.models.model import Array, Columns, Model, stack, take
 
-# Beyond this spin, in sqrt(g/c), upright spin is taken as stable for good: fifty times a hand's.
+# The search for critical spins ends at this spin, in sqrt(g/c), fifty times what a hand gives: upright spin that
+# is stable up to here is taken to be stable at any spin.
 _SPIN_LIMIT = 10.0
 
-# Spins looked at, beyond n_c1, for another stable range.
+# Number of spins beyond n_c1 at which another stable range is searched for.
 _OUTER_SAMPLES = 24
 
 
-def jacobian(model: Model, constants: Array, spin: Array) -> Array:
-    """Jacobian of the rattle at upright spin, shape (cells, m, m), m = number of states less spin.
+def jacobian(model: Model, constants: Any, spin: Array) -> Array:
+    """Jacobian of the rattle at upright spin, shape (cells, m, m), where m is the number of states without the spin.
 
-    By complex steps of 1e-30: to the last digit, without a difference or a second derivation.
+    Computed by complex steps of 1e-30: accurate to the last digit, because no difference is taken, and without
+    deriving the equations a second time.
     """
     states = stack(model.upright(spin)).astype(complex)
     rattle = [i for i in range(len(model.states)) if i != model.spin_state]
@@ -32,71 +36,71 @@ def jacobian(model: Model, constants: Array, spin: Array) -> Array:
     return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
 
 
-def growth_rate(model: Model, constants: Array, spin: Array) -> Array:
-    """Largest real part of the rattle's eigenvalues: above zero, it grows.  Shape (cells,)."""
+def growth_rate(model: Model, constants: Any, spin: Array) -> Array:
+    """Largest real part of the rattle's eigenvalues, in sqrt(g/c), shape (cells,): positive where the rattle grows."""
     return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)).real.max(axis=-1))
 
 
 def fastest_motion(model: Model, columns: Columns) -> Array:
-    """Largest |λ| of the rattle at the fastest spins within reach, friction's quick decay left out.
+    """Largest |λ| of the rattle at the fastest spins within reach, leaving out the fast decay due to friction.
 
-    What an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.
+    This is the motion that an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.
     """
-    constants, reach = stack(model.constants(columns)), fastest_spin(model, columns)
+    constants, reach = model.constants.of(columns), fastest_spin(model, columns)
     values = np.concatenate([np.linalg.eigvals(jacobian(model, constants, spin)) for spin in (reach, -reach)], axis=-1)
     moving = -values.real <= np.abs(values.imag)
     return np.asarray(np.where(moving, np.abs(values), 0.0).max(axis=-1))
 
 
 def fastest_spin(model: Model, columns: Columns) -> Array:
-    """The |spin| that a start could reach if all its energy went into it, shape (cells,)."""
-    start = stack(model.start(columns)), stack(model.constants(columns))
-    spin, rattle, inertia = model.energy(*start)
+    """The |spin| that a trajectory would reach if all its energy went into it, in sqrt(g/c), shape (cells,)."""
+    spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
     return np.asarray(np.sqrt(spin**2 + 2 * rattle / inertia))
 
 
 def critical_spins(model: Model, columns: Columns, guess: tuple[Array, Array]) -> tuple[Array, Array]:
-    """n_c1+ and n_c1- of the model itself: the ends of the spins about zero at which rattle decays.
+    """n_c1+ and n_c1- of the model itself: the ends of the range of spins about zero in which the rattle decays.
 
     Parameters
     ----------
     columns : physical parameters, each of shape (cells,)
-    guess : where to look first, positive and negative, such as the paper's n_c1±; NaN is no guess
+    guess : where to search first, on the positive and on the negative side, such as the paper's n_c1±;
+        NaN where there is no critical spin to search for
 
     Returns
     -------
-    Two arrays of shape (cells,): ±inf where the rattle decays at all spins up to the limit of the
-    search, NaN where it does not decay at rest (no friction, or no dissipation in the model).
+    Two arrays of shape (cells,), in sqrt(g/c): ±inf where the guess is NaN or the rattle decays at all spins
+    up to the limit of the search; NaN where it does not decay at rest (no friction, or no dissipation in the model).
     """
-    constants = stack(model.constants(columns))
-    # Without friction the real parts are zero but for rounding.
-    at_rest = growth_rate(model, constants, np.zeros(constants.shape[1])) < -1e-13
+    constants = model.constants.of(columns)
+    # Without friction the real parts are zero except for rounding.
+    at_rest = growth_rate(model, constants, np.zeros_like(constants[0])) < -1e-13
     upper, lower = (_boundary(model, constants, at_rest, side) for side in guess)
     return upper, np.where(np.isinf(lower), -np.inf, lower)
 
 
 def outer_range(model: Model, columns: Columns, n_c1: Array, reach: Array) -> tuple[Array, Array]:
-    """The next range of spins beyond `n_c1` at which the rattle decays: its near and far end.
+    """The near and the far end of the next range of spins beyond `n_c1` in which the rattle decays.
 
-    Nearly round bodies have one: a fast spin detunes the two modes whose coupling feeds the rattle.
+    Nearly round bodies have such a range: a fast spin detunes the two modes whose coupling feeds the rattle.
 
     Parameters
     ----------
-    n_c1 : critical spin of either sign, shape (cells,), where the first range ends
+    n_c1 : critical spin, of either sign, at which the first range ends, shape (cells,)
     reach : largest |spin| of interest, shape (cells,)
 
     Returns
     -------
-    Two arrays of shape (cells,): NaN where there is no such range within reach; the far end is
-    infinite where it lies beyond reach.
+    Two arrays of shape (cells,), in sqrt(g/c): NaN where there is no such range within reach; the far end is
+    infinite if it lies beyond reach.
     """
-    constants, sign = stack(model.constants(columns)), np.sign(n_c1)
+    constants, sign = model.constants.of(columns), np.sign(n_c1)
     near, far = np.full_like(n_c1, np.nan), np.full_like(n_c1, np.nan)
     cells = np.flatnonzero(np.isfinite(n_c1) & (np.abs(n_c1) < reach))
     if not len(cells):
         return near, far
     spins = sign[cells] * np.geomspace(1.001 * np.abs(n_c1[cells]), 1.001 * reach[cells], _OUTER_SAMPLES)
-    growth = np.array([growth_rate(model, constants[:, cells], spin) for spin in spins])
+    growth = np.array([growth_rate(model, take(constants, cells), spin) for spin in spins])
     enters = (growth[:-1] >= 0) & (growth[1:] < 0)
     first = np.where(enters.any(axis=0), enters.argmax(axis=0), _OUTER_SAMPLES)
     later = np.arange(_OUTER_SAMPLES - 1)[:, None] > first
@@ -107,20 +111,21 @@ def outer_range(model: Model, columns: Columns, n_c1: Array, reach: Array) -> tu
         at = np.flatnonzero(sample < _OUTER_SAMPLES)
         i = sample[at]
         end[cells[at]] = _root(
-            lambda spin, which, at=at: growth_rate(model, constants[:, cells[at[which]]], spin),
+            lambda spin, which, at=at: growth_rate(model, take(constants, cells[at[which]]), spin),
             spins[i, at], spins[i + 1, at], growth[i, at], growth[i + 1, at],
         )  # fmt: skip
     return near, np.where(np.isinf(far), sign * np.inf, far)
 
 
-def _boundary(model: Model, constants: Array, at_rest: Array, guess: Array) -> Array:
+def _boundary(model: Model, constants: Any, at_rest: Array, guess: Array) -> Array:
+    """The critical spin on the side of `guess`, shape (cells,); `at_rest` says where the rattle decays at rest."""
     result = np.where(at_rest, np.inf, np.nan)
     cells = np.flatnonzero(at_rest & np.isfinite(guess))
     if not len(cells):
         return result
 
     def growth(spin: Array, which: Array) -> Array:
-        return growth_rate(model, constants[:, which], spin)
+        return growth_rate(model, take(constants, which), spin)
 
     # Walk outwards from half the guess until the rattle grows.
     low, high = np.zeros(len(cells)), 0.5 * guess[cells]
@@ -136,7 +141,7 @@ def _boundary(model: Model, constants: Array, at_rest: Array, guess: Array) -> A
 
 
 def _root(f, low: Array, high: Array, f_low: Array, f_high: Array) -> Array:  # type: ignore[no-untyped-def]
-    """Roots of many functions at once by the Anderson-Björck regula falsi, to the last digits."""
+    """Roots of many functions at once, to the last digits, by the regula falsi of Anderson and Björck."""
     for _ in range(60):
         active = np.flatnonzero(np.abs(high - low) > 4e-15 * np.abs(high))
         active = active[f_high[active] != 0]
@@ -147,7 +152,8 @@ def _root(f, low: Array, high: Array, f_low: Array, f_high: Array) -> Array:  # 
         fx = f(x, active)
         same = np.sign(fx) == np.sign(f2)
         shrink = 1 - fx / f2
-        # The newest point becomes `high`; the far end keeps its value, scaled down if it stays again.
+        # The newest point becomes `high`.  If the other end stays where it is, its function value is scaled down,
+        # as it might otherwise stay for ever.
         low[active] = np.where(same, x1, x2)
         f_low[active] = np.where(same, f1 * np.where(shrink > 0, shrink, 0.5), f2)
         high[active], f_high[active] = x, fx

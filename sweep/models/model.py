@@ -1,11 +1,26 @@
-"""What a model is: implement this and kernel, executor, store and plots work.
+"""What a model is, and how to add one.
 
-A model is a system of ordinary differential equations y' = f(y) with constant coefficients for
-the motion of a rattleback near upright spin.  It lives in one file, which defines one `MODEL`.
+A model is a system of autonomous ordinary differential equations y' = f(y) for the motion of a rattleback near upright
+spin.  It lives in one file, which defines one `Model` by the name `MODEL`; enter it in `sweep.models.__init__`.
+Kernels, executor, store and plots then work with it.  `noslip` is a short example.
+
+1. Choose the states, in such a way that all but one vanish in upright spin; the remaining one carries the spin
+   (`states`, `spin_state`).  A rattle then keeps its relative precision however small it becomes.
+2. Compute the coefficients and the starts of many cells at once, from arrays of parameters (`constants`, `start`).
+3. Write `rhs`, `energy` and `upright` for one trajectory, on scalars.
+4. Say what the model depends on and what can be asked of it (`parameters`, `offers`).
+5. If friction or anything else makes the model stiff, bound its fastest decay (`fastest_decay`).
+
+`constants.of`, `start` and `energy` are called when a run is prepared, `rhs` in every stage of a step, and `energy`
+again at every look.  The linear theory of `sweep.models.linear` calls `upright` and `rhs`, the latter with complex
+states.
+
+Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.
 """
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,63 +30,85 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 Columns = Mapping[str, Array]
-"""Physical parameters by name: arrays of one common shape (cells,)."""
+"""Physical parameters by name: arrays of a common shape (cells,)."""
+
+
+COUNT, SPIN, ENERGY, MODES, FORMULAS = "count", "spin", "energy", "modes", "formulas"
+"""What a model may offer: a number of reversals; the spin as a function of time; an energy that only friction changes;
+two rocking modes that the linear theory of the slip model describes; Takano's formulas for the critical spins and the
+number of reversals."""
 
 
 def nothing_decays(columns: Columns) -> Array:
-    """No mode is stiff."""
+    """The default `fastest_decay`: no mode is stiff."""
     return np.zeros_like(columns["a"])
 
 
 @dataclass(frozen=True)
 class Tier:
-    """One rung of the ladder of models, be it equations of motion or a formula."""
+    """One rung of the ladder of models: equations of motion, or a formula."""
 
     name: str
+    """As in the configuration."""
     summary: str
+    """One line for the documentation."""
     parameters: tuple[str, ...]
-    """Names of the physical parameters it depends on, `sweep.parameters` has their meaning."""
-    measures: tuple[str, ...]
-    """What can be measured on it, of `sweep.kernels.lanes.MEASURES`."""
+    """Names of the physical parameters that it depends on; `sweep.parameters` has their meanings."""
+    offers: frozenset[str]
+    """What can be asked of it, out of `COUNT`, `SPIN`, `ENERGY`, `MODES` and `FORMULAS`.  If a model lacks `FORMULAS`,
+    no stable ranges of spin are searched for, and its trajectories never settle."""
 
 
 @dataclass(frozen=True)
 class Model(Tier):
     """A rung that is simulated.
 
-    The functions marked `sweep.jit.inline` dissolve into the kernel, where they work on the scalars
-    of one trajectory.  Called from Python they take arrays too, real or complex: starts, energies
-    and Jacobians are computed with the very same code.
+    The functions called "inline" are marked `sweep.jit.inline`.  They become part of the kernel, where they work on
+    the scalars of one trajectory.  Called from Python they also take arrays, real or complex, so that energies and
+    Jacobians are computed with the very same code.  They consist of plain arithmetic, without branches or loops, so
+    that the loop over lanes can be vectorised.
     """
 
     states: tuple[str, ...]
+    """Names of the states, in the order in which all functions take and return them."""
     spin_state: int
     """Index of the state that carries the spin; all others vanish in upright spin."""
-    constants: Callable[[Columns], tuple[Array, ...]]
-    """Coefficients of the right-hand side, each of shape (cells,)."""
+    constants: type[Any]
+    """The coefficients of the right-hand side by name: a `NamedTuple` class whose classmethod `of` computes them
+    from columns of parameters, each coefficient of shape (cells,)."""
     start: Callable[[Columns], tuple[Array, ...]]
-    """States at t = 0, each of shape (cells,)."""
+    """(columns) -> the states at t = 0, each of shape (cells,)."""
     upright: Callable[..., tuple[Any, ...]]
-    """Inline, spin -> states: steady upright spin without rattle."""
+    """Inline, (spin) -> the states of steady upright spin without rattle."""
     rhs: Callable[..., tuple[Any, ...]]
-    """Inline, (states, constants) -> (derivatives, (spin, dissipated power, normal force,
-    Painlevé denominator)); what a model lacks of the last three is a literal 0.0, 1.0, 1.0."""
+    """Inline, (states, constants) -> (derivatives, (spin, dissipated power, normal force, Painlevé denominator)).
+    Of the last three, a model that lacks them returns the literals 0.0, 1.0 and 1.0."""
     energy: Callable[..., tuple[Any, ...]]
-    """Inline, (states, constants) -> (spin, energy of the rattle, inertia J of the spin):
-    rattle + J n²/2 is the energy above rest, which friction alone changes.  Each term must keep
-    its relative precision however small the rattle is."""
+    """Inline, (states, constants) -> (spin n, energy of the rattle, moment of inertia J of the spin).  Rattle + J n²/2
+    is the energy above rest, which only friction changes.  Every term must keep its relative precision however
+    small the rattle is: no difference of numbers of order one may be taken."""
     fastest_decay: Callable[[Columns], Array] = nothing_decays
-    """Bound on |λ| of the fastest damped mode anywhere on the trajectory, shape (cells,); it
-    limits the step of an explicit method.  By default nothing is stiff."""
+    """(columns) -> bound on |λ| of the fastest damped mode anywhere on the trajectory, in sqrt(g/c), shape (cells,).
+    It limits the step of an explicit method.  By default nothing is stiff."""
     radians_a_step: float = 0.07
-    """Phase of the fastest motion in one step of a fifth-order method.  On the slip model 0.07 gives
-    spin errors at t = 400 (a = 10, b = 3, n0 = 0.05 and 0.1, μ = 20, where accuracy decides) of 3e-9
-    and 1e-8; they fall as its fifth power."""
-    observe: Callable[[Array, Array], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
-    """States (n, samples) and constants (k, 1) -> what a trajectory shows beside spin and energy,
-    by names that `sweep.results.dataset` explains."""
+    """Phase through which the fastest motion advances in one step of a fifth-order method at the default
+    tolerance.  On the slip model 0.07 gives errors in spin at t = 400 of 3e-9 and 1e-8 (a = 10, b = 3, n0 = 0.05 and
+    0.1, μ = 20, where accuracy determines the step); they fall as its fifth power."""
+    observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
+    """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
+    shows beside spin and energy, by names that `sweep.studies.trajectory` explains."""
+
+
+def named(*fields: str) -> Any:
+    """A base for the constants of a model whose fields are put together from several lists, a `NamedTuple` class."""
+    return namedtuple("Constants", fields)
+
+
+def take(constants: Any, cells: Any) -> Any:
+    """The constants of the cells with the indices `cells`, in a record of the same type."""
+    return type(constants)(*(values[cells] for values in constants))
 
 
 def stack(columns: tuple[Array, ...]) -> Array:
-    """Arrays (or numbers) as the rows of one array, broadcast against each other."""
+    """Arrays or numbers as the rows of one array, broadcast against each other."""
     return np.stack(np.broadcast_arrays(*columns))

@@ -1,15 +1,15 @@
 """The full model: a rattleback that slips with viscous friction (Takano 2011, Ldot … visf).
 
-Lengths in c, times in sqrt(c/g).  The unknowns (u1, u2, ω1, ω2, ω3, v1, v2) are components in the
-body of the upward normal u, the angular velocity ω and the slip velocity v_p of the contact point.
-All but ω3 vanish in upright spin, so however small a rattle is, it keeps its relative precision.
+Lengths are in c, times in sqrt(c/g).  The unknowns (u1, u2, ω1, ω2, ω3, v1, v2) are components along the body
+axes of the upward normal u, the angular velocity ω and the slip velocity v_p of the contact point.
+All of them except ω3 vanish in upright spin, so a rattle keeps its relative precision however small it is.
 
     u' = u × ω                                                        (omega)
     I ω' = x_p × F - ω × I ω,   F = R (u + f),   f = -μ v_p           (Ldot, visf)
     v_p' = F - u - x_p × ω' - ω × (v_p + v_0 - x_p'),   v_0 = x_p × ω   (vgdot, vgvp)
 
-and the normal force R follows from v_p · u = 0 (R).  Scalar triple products are turned so that
-q = u × x_p is formed once: (x_p × α) · u = q · α.
+The normal force R follows from v_p · u = 0 (R).  Scalar triple products are rearranged so that
+q = u × x_p is computed only once: (x_p × α) · u = q · α.
 """
 
 from __future__ import annotations
@@ -19,20 +19,30 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models import ellipsoid
+from sweep.models import ellipsoid, friction
 from sweep.models.ellipsoid import contact
-from sweep.models.model import Array, Columns, Model
+from sweep.models.model import COUNT, ENERGY, FORMULAS, MODES, SPIN, Array, Columns, Model, named
+
+SHAPE = ("A11", "A12", "A22", "A33")
+INVERSE_INERTIA = ("inv_I1", "inv_I2", "inv_I3")
+RATIOS = ("ratio1", "ratio2", "ratio3")
 
 
-def constants(columns: Columns) -> tuple[Array, ...]:
-    """Shape, inverse moments of inertia, Euler's inertia ratios, friction: eleven arrays."""
-    I1, I2, I3 = ellipsoid.inertia(columns)
-    ratios = (I2 - I3) / I1, (I3 - I1) / I2, (I1 - I2) / I3
-    return (*ellipsoid.shape(columns), 1 / I1, 1 / I2, 1 / I3, *ratios, columns["mu"])
+class Constants(named(*SHAPE, *INVERSE_INERTIA, *RATIOS, *friction.CONSTANTS)):  # type: ignore[misc]
+    """Shape, inverse moments of inertia, the ratios in Euler's equations, friction.
+
+    `ratio1` is (I2 - I3) / I1; the others follow by cyclic permutation.
+    """
+
+    @classmethod
+    def of(cls, columns: Columns) -> Constants:
+        I1, I2, I3 = ellipsoid.inertia(columns)
+        ratios = (I2 - I3) / I1, (I3 - I1) / I2, (I1 - I2) / I3
+        return cls(*ellipsoid.shape(columns), 1 / I1, 1 / I2, 1 / I3, *ratios, *friction.constants(columns))
 
 
 def start(columns: Columns) -> tuple[Array, ...]:
-    """At rest but for the spin n0, with contact point (x0, y0): ω = n0 u, v_p = 0."""
+    """At rest except for the spin n0, with the contact point at (x0, y0): ω = n0 u, v_p = 0."""
     u1, u2, u3 = ellipsoid.start(columns)
     n0, rest = columns["n0"], np.zeros_like(u1)
     return u1, u2, n0 * u1, n0 * u2, n0 * u3, rest, rest
@@ -46,18 +56,18 @@ def upright(n: Any) -> Any:
 @inline
 def rhs(y: Any, p: Any) -> Any:
     u1, u2, w1, w2, w3, v1, v2 = y
-    A11, A12, A22, A33, i1, i2, i3, d1, d2, d3, mu = p
-    (u3, inv_u3), (x, y_, z), (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, A11, A12, A22, A33)
+    (u3, inv_u3), (x, y_, z), (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
 
     v3 = -(v1 * u1 + v2 * u2) * inv_u3
-    # u + f, the contact force per unit of R
-    g1, g2, g3 = u1 - mu * v1, u2 - mu * v2, u3 - mu * v3
-    # v_0 - x_p'
+    # g = u + f, the contact force per unit of R
+    g1, g2, g3 = friction.contact_force(u1, u2, u3, v1, v2, v3, p)
+    # s = v_0 - x_p'
     s1, s2, s3 = y_ * w3 - z * w2 - dx, z * w1 - x * w3 - dy, x * w2 - y_ * w1 - dz
     q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
-    # ω' = α + R β: Euler's gyroscopic part and the torque of the contact force
-    al1, al2, al3 = d1 * w2 * w3, d2 * w3 * w1, d3 * w1 * w2
-    be1, be2, be3 = i1 * (y_ * g3 - z * g2), i2 * (z * g1 - x * g3), i3 * (x * g2 - y_ * g1)
+    # ω' = α + R β: Euler's gyroscopic terms, and the torque of the contact force
+    al1, al2, al3 = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
+    be1, be2 = p.inv_I1 * (y_ * g3 - z * g2), p.inv_I2 * (z * g1 - x * g3)
+    be3 = p.inv_I3 * (x * g2 - y_ * g1)
 
     denominator = 1.0 - (q1 * be1 + q2 * be2 + q3 * be3)
     R = (1.0 + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)) / denominator
@@ -68,8 +78,8 @@ def rhs(y: Any, p: Any) -> Any:
     dv2 = R * g2 - u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
 
     spin = u1 * w1 + u2 * w2 + u3 * w3
-    dissipation = mu * R * (v1 * v1 + v2 * v2 + v3 * v3)
-    return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, dissipation, R, denominator)
+    power = friction.dissipation(R, v1, v2, v3, p)
+    return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, power, R, denominator)
 
 
 @inline
@@ -78,13 +88,13 @@ def energy(y: Any, p: Any) -> Any:
     return ellipsoid.energy(u1, u2, w1, w2, w3, v1, v2, p)
 
 
-def observe(y: Array, p: Array) -> dict[str, Array]:
-    """What a trajectory shows beside spin and energy: contact point, slip, its derivatives, force.
+def observe(y: Array, p: Constants) -> dict[str, Array]:
+    """What a trajectory shows beside spin and energy: contact point, slip v_p, v̇_p, v̇_0 and normal force.
 
-    v̇_p is the derivative in the body's axes; v̇_0 that in space, (d/dt) v_0 of the paper.
+    v̇_p is the derivative in the body axes; v̇_0 is the derivative in space, (d/dt) v_0 in the paper.
     """
     u1, u2, w1, w2, w3, v1, v2 = y
-    _, point, _, moving = contact(u1, u2, w1, w2, w3, *p[:4])
+    _, point, _, moving = contact(u1, u2, w1, w2, w3, p)
     slopes, (_, _, R, _) = rhs(y, p)
     omega, slope = y[2:5], np.stack(slopes[2:5])
     x_p, dx_p = np.stack(point), np.stack(moving)
@@ -107,26 +117,27 @@ def observe(y: Array, p: Array) -> dict[str, Array]:
 
 
 def fastest_decay(columns: Columns) -> Array:
-    """Bound on the rate at which friction stops the slip, over the whole trajectory."""
-    return np.asarray(columns["mu"] * strongest_grip(columns))
+    """Bound on the rate at which friction stops the slip, over the whole trajectory, in sqrt(g/c), shape (cells,)."""
+    return np.asarray(friction.strongest_resistance(columns) * strongest_grip(columns))
 
 
 def strongest_grip(columns: Columns) -> Array:
-    """Bound on the slip's decay rate per μ: 1 + c²/I1 at rest, growing with the rattle.
+    """Bound on the decay rate of the slip per unit of friction's resistance, shape (cells,).
 
-    The slip velocity relaxes at μ R (1 + z²/I + ρ²/I3), with ρ the contact point's distance from the axis
-    and I the moment about the horizontal axis in question.  Both R and the bracket grow with the
-    rattle, which can take up the whole energy above rest E0.  Rocking about one axis at height r,
+    It is 1 + c²/I1 at rest and grows with the rattle.  The slip velocity relaxes at the rate
+    μ R (1 + z²/I + ρ²/I3), where ρ is the distance of the contact point from the z axis and I the moment
+    of inertia about the horizontal axis in question.  Both R and the bracket grow with the rattle, which can
+    take up the whole energy above rest, E0.  For rocking about one axis, with the centre of mass at height r,
 
         R - 1 <= r'' φ'^2,   φ'^2 = 2 (E0 - (r - c)) / (I + |x_p|²),
 
-    so the largest product over the heights c … c + E0 bounds the rate.  Checked on starts with
-    E0 from 0.003 to 1: DP5 stays stable at 0.9 of the step that this allows in every one, and
-    diverges at 1.1 to 1.3 of it in most.
+    so the largest product over the heights c … c + E0 bounds the rate.  Checked on starts with E0 from
+    0.003 to 1: at 0.9 of the step that this allows, DP5 stays stable in every case; at 1.1 to 1.3 of it,
+    DP5 diverges in most.
     """
     a, b, c = columns["a"], columns["b"], columns["c"]
     I1, I2, I3 = ellipsoid.inertia(columns)
-    spin, rattle, inertia = energy(start(columns), constants(columns))
+    spin, rattle, inertia = energy(start(columns), Constants.of(columns))
     energy_start = rattle + 0.5 * inertia * spin**2
     worst = np.zeros_like(energy_start)
     for share in np.linspace(0, 1, 9):
@@ -149,9 +160,9 @@ MODEL = Model(
     summary="full equations with viscous slip friction (Takano 2011, Ldot … visf)",
     states=("u1", "u2", "omega1", "omega2", "omega3", "v1", "v2"),
     spin_state=4,
-    parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
-    measures=("reversals", "energy_error", "first_reversal", "noise_limited"),
-    constants=constants,
+    parameters=("a", "b", "c", "delta", *friction.PARAMETERS, "n0", "x0", "y0"),
+    offers=frozenset({COUNT, SPIN, ENERGY, MODES, FORMULAS}),
+    constants=Constants,
     start=start,
     fastest_decay=fastest_decay,
     upright=upright,

@@ -1,63 +1,96 @@
-"""The slip model in variables that keep its stiffness in the slip alone.
+"""The slip model in variables in which only the slip is stiff.
 
-The angular momentum about the contact point, M = I ω - x_p × v_g, takes the place of ω.  No friction
-and no normal force appear in
+The angular momentum about the contact point, M = I ω - x_p × v_g, takes the place of ω.  Neither friction
+nor the normal force appears in
 
     u' = u × ω,   M' = s × v_g - ω × M - u × x_p,   s = v_0 - x_p',   v_g = v_p + v_0,
 
-for forces at the contact point have no moment about it; ω = I_P⁻¹ (M + x_p × v_p) with
-I_P = I + |x_p|² - x_p x_pᵀ.  Friction is in the slip alone,
+because forces at the contact point have no torque about it.  Here ω = I_P⁻¹ (M + x_p × v_p) with
+I_P = I + |x_p|² - x_p x_pᵀ.  Friction appears only in the equation for the slip,
 
     v_p' = R G - rest,   G = T (u - μ v_p),   T = 1 - [x_p] I⁻¹ [x_p],   R = num / den,   den = u · G,
 
-a 2 × 2 block that an implicit formula solves by one Newton step.  The motion is that of `slip`.
+where [x_p] is the matrix of the cross product.  This is a 2 × 2 system, which an implicit formula solves by one
+Newton step.  The motion is the same as in `slip`.
 
-With a = A u, r² = u · a, D_i = I_i r² + |a|²: r² I_P = D - a aᵀ, which Sherman and Morrison's formula
-inverts without a root or quotient, so that one division yields 1/r, 1/u3 and I_P⁻¹.
+With a = A u, r² = u · a and D_i = I_i r² + |a|², one has r² I_P = D - a aᵀ.  The Sherman-Morrison formula inverts this
+without a root or a quotient, so that a single division yields 1/r, 1/u3 and I_P⁻¹.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.models import ellipsoid, slip
-from sweep.models.model import Array, Columns
+from sweep.models.model import Array, Columns, named
 
 
-def constants(columns: Columns) -> tuple[Array, ...]:
-    """Shape, moments of inertia and their inverses, Euler's inertia ratios, friction: fourteen arrays."""
-    p = slip.constants(columns)
-    return (*p[:4], *ellipsoid.inertia(columns), *p[4:])
+class Constants(named("I1", "I2", "I3", *slip.Constants._fields)):  # type: ignore[misc]
+    """The moments of inertia and the constants of the slip model."""
+
+    @classmethod
+    def of(cls, columns: Columns) -> Constants:
+        return cls(*ellipsoid.inertia(columns), *slip.Constants.of(columns))
+
+
+class Geometry(NamedTuple):
+    """What `slow` computes on its way and `newton` needs as well; components along the body axes."""
+
+    u3: Any
+    x: Any
+    """Contact point x_p."""
+    y: Any
+    z: Any
+    t1: Any
+    """u1/u3; t2 is u2/u3, so that v3 = -(t1 v1 + t2 v2)."""
+    t2: Any
+    v3: Any
+    w1: Any
+    """ω."""
+    w2: Any
+    w3: Any
+    du1: Any
+    """u'."""
+    du2: Any
+    du3: Any
+    s1: Any
+    """s = v_0 - x_p'."""
+    s2: Any
+    s3: Any
+    q1: Any
+    """u × x_p."""
+    q2: Any
+    q3: Any
 
 
 @inline
 def momentum(y: Any, p: Any) -> Any:
-    """States (u1, u2, M1, M2, M3, v1, v2) of the slip model's states; `p` as of `constants`."""
+    """The states (u1, u2, M1, M2, M3, v1, v2) from those of the slip model; `p` are `Constants`."""
     u1, u2, w1, w2, w3, v1, v2 = y
     u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    a1, a2, a3 = p[0] * u1 + p[1] * u2, p[1] * u1 + p[2] * u2, p[3] * u3
+    a1, a2, a3 = p.A11 * u1 + p.A12 * u2, p.A12 * u1 + p.A22 * u2, p.A33 * u3
     r = np.sqrt(u1 * a1 + u2 * a2 + u3 * a3)
     x, y_, z = -a1 / r, -a2 / r, -a3 / r
     v3 = -(v1 * u1 + v2 * u2) / u3
     g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
-    M1, M2, M3 = p[4] * w1 - (y_ * g3 - z * g2), p[5] * w2 - (z * g1 - x * g3), p[6] * w3 - (x * g2 - y_ * g1)
+    M1, M2, M3 = p.I1 * w1 - (y_ * g3 - z * g2), p.I2 * w2 - (z * g1 - x * g3), p.I3 * w3 - (x * g2 - y_ * g1)
     return u1, u2, M1, M2, M3, v1, v2
 
 
 def start(columns: Columns) -> tuple[Array, ...]:
-    """The slip model's start: ω = n0 u, v_p = 0, contact point (x0, y0)."""
-    states: tuple[Array, ...] = momentum(slip.start(columns), constants(columns))
+    """The start of the slip model: ω = n0 u, v_p = 0, contact point at (x0, y0)."""
+    states: tuple[Array, ...] = momentum(slip.start(columns), Constants.of(columns))
     return states
 
 
 @inline
 def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) -> Any:
-    """(u1', u2', M1', M2', M3') and what `newton` needs beside them."""
-    A11, A12, A22, A33, I1, I2, I3 = p[0], p[1], p[2], p[3], p[4], p[5], p[6]
+    """The slow derivatives (u1', u2', M1', M2', M3'), and the `Geometry` that `newton` needs."""
+    A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
     c3 = 1.0 - (u1 * u1 + u2 * u2)
     u3 = -np.sqrt(c3)
     a1, a2, a3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
@@ -65,7 +98,7 @@ def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) 
     r = np.sqrt(r2)
     b1, b2, b3 = a1 * a1, a2 * a2, a3 * a3
     square = b1 + b2 + b3
-    D1, D2, D3 = I1 * r2 + square, I2 * r2 + square, I3 * r2 + square
+    D1, D2, D3 = p.I1 * r2 + square, p.I2 * r2 + square, p.I3 * r2 + square
     E1, E2, E3 = D2 * D3, D1 * D3, D1 * D2
     DD = D1 * E1
     det = DD - (b1 * E1 + b2 * E2 + b3 * E3)
@@ -93,21 +126,23 @@ def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) 
     dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - q1
     dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - q2
     dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - q3
-    geometry = (u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
+    geometry = Geometry(u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
     return (du1, du2, dM1, dM2, dM3), geometry
 
 
 @inline
 def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
-    """One Newton step from v for v = b + γ v_p'(v), with the Jacobian of R G, dR/dv included.
+    """One Newton step, starting from v, for the equation v = b + γ v_p'(v).
 
-    The gyroscopic terms of v_p' are left out of the Jacobian: they are not stiff.
-
-    Multiplied by den², so R is never formed.  Returns the new v, and num and den of R at the old.
+    The Jacobian is that of R G, with dR/dv included.  The gyroscopic terms of v_p' are left out of it, because they
+    are not stiff.  Everything is multiplied by den², so that R itself is never computed.  Returns the new v1 and v2,
+    and num and den of R at the old v.
     """
-    i1, i2, i3, d1, d2, d3, mu = p[7], p[8], p[9], p[10], p[11], p[12], p[13]
     u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3 = geometry
-    al1, al2, al3 = d1 * w2 * w3, d2 * w3 * w1, d3 * w1 * w2
+    i1, i2, i3 = p.inv_I1, p.inv_I2, p.inv_I3
+    al1, al2, al3 = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
+    # `friction.contact_force` and its derivative, written out: called as functions they change the last bits.
+    mu = p.mu
     g1, g2, g3 = u1 - mu * v1, u2 - mu * v2, u3 - mu * v3
     xx, yy, zz = x * x, y * y, z * z
     T11, T22, T33 = 1.0 + zz * i2 + yy * i3, 1.0 + zz * i1 + xx * i3, 1.0 + yy * i1 + xx * i2
@@ -119,15 +154,15 @@ def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any
     rest1 = u1 + (y * al3 - z * al2) + (w2 * e3 - w3 * e2)
     rest2 = u2 + (z * al1 - x * al3) + (w3 * e1 - w1 * e3)
 
-    # dG_i/dv_j = -μ S_ij with v3 = -(u1 v1 + u2 v2)/u3;  d den/dv_j = -μ f_j
+    # With v3 = -(u1 v1 + u2 v2)/u3: dG_i/dv_j = -μ S_ij and d den/dv_j = -μ e_j.
     S11, S12 = T11 - T13 * t1, T12 - T13 * t2
     S21, S22 = T12 - T23 * t1, T22 - T23 * t2
     S31, S32 = T13 - T33 * t1, T23 - T33 * t2
-    f1, f2 = u1 * S11 + u2 * S21 + u3 * S31, u1 * S12 + u2 * S22 + u3 * S32
+    e1, e2 = u1 * S11 + u2 * S21 + u3 * S31, u1 * S12 + u2 * S22 + u3 * S32
     gn = gamma * num
     k, dd = gn * mu, den * den
-    m11, m12 = dd + k * (den * S11 - G1 * f1), k * (den * S12 - G1 * f2)
-    m21, m22 = k * (den * S21 - G2 * f1), dd + k * (den * S22 - G2 * f2)
+    m11, m12 = dd + k * (den * S11 - G1 * e1), k * (den * S12 - G1 * e2)
+    m21, m22 = k * (den * S21 - G2 * e1), dd + k * (den * S22 - G2 * e2)
     r1 = den * (den * ((b1 - v1) - gamma * rest1) + gn * G1)
     r2 = den * (den * ((b2 - v2) - gamma * rest2) + gn * G2)
     d = 1.0 / (m11 * m22 - m12 * m21)
@@ -136,26 +171,28 @@ def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any
 
 @inline
 def energy(y: Any, p: Any) -> Any:
-    """(spin, energy of the rattle, I3), as the slip model's."""
+    """(spin, energy of the rattle, I3), as in the slip model."""
     u1, u2, M1, M2, M3, v1, v2 = y
     _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
-    inverse = (p[0], p[1], p[2], p[3], p[7], p[8], p[9])
-    return ellipsoid.energy(u1, u2, geometry[7], geometry[8], geometry[9], v1, v2, inverse)
+    return ellipsoid.energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
 
 
 @inline
 def rocking(p: Any) -> Any:
-    """(B12, B21, C11, C12, C21, C22) of u' = B M, M' = C u, the rocking about upright rest without slip.
+    """(B12, B21, C11, C12, C21, C22) in u' = B M, M' = C u: the rocking about upright rest without slip.
 
-    B's diagonal vanishes.
+    The diagonal of B vanishes.
     """
-    A11, A12, A22, A33, I1, I2 = p[0], p[1], p[2], p[3], p[4], p[5]
+    A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
     inv_c = 1.0 / np.sqrt(A33)
-    return 1.0 / (I2 + A33), -1.0 / (I1 + A33), A12 * inv_c, (A22 - A33) * inv_c, (A33 - A11) * inv_c, -A12 * inv_c
+    return 1.0 / (p.I2 + A33), -1.0 / (p.I1 + A33), A12 * inv_c, (A22 - A33) * inv_c, (A33 - A11) * inv_c, -A12 * inv_c
 
 
 def fastest_rocking(p: Any) -> Array:
-    """The higher frequency ν of the rocking about upright rest without slip, -ν² an eigenvalue of B C; (cells,)."""
+    """The higher frequency ν of the rocking about upright rest without slip, shape (cells,).
+
+    -ν² is an eigenvalue of B C (see `rocking`).
+    """
     B12, B21, C11, C12, C21, C22 = rocking(p)
     first, second = -B12 * C21, -B21 * C12
     half_split = np.sqrt((0.5 * (first - second)) ** 2 + B12 * C22 * B21 * C11)
@@ -164,7 +201,7 @@ def fastest_rocking(p: Any) -> Array:
 
 @inline
 def implicit(weight: Any, p: Any) -> Any:
-    """(1 - weight J)⁻¹ row by row, sixteen numbers; J the matrix of the rocking in (u1, u2, M1, M2)."""
+    """(1 - weight J)⁻¹ row by row, sixteen numbers, where J is the matrix of `rocking` in (u1, u2, M1, M2)."""
     B12, B21, C11, C12, C21, C22 = rocking(p)
     square = weight * weight
     # E = (1 - w² B C)⁻¹; the other blocks are w E B, w C E and 1 + w² C E B.
@@ -183,26 +220,26 @@ def implicit(weight: Any, p: Any) -> Any:
     )  # fmt: skip
 
 
-def velocities(y: Array, p: Array) -> Array:
-    """The slip model's states of these, shape (7, cells): undoes `momentum`."""
+def velocities(y: Array, p: Constants) -> Array:
+    """The states of the slip model from these, shape (7, cells): the inverse of `momentum`."""
     _, geometry = slow(*y, p)
-    return np.stack(np.broadcast_arrays(y[0], y[1], *geometry[7:10], y[5], y[6]))
+    return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))
 
 
-def slip_constants(p: Array) -> Array:
-    """The slip model's constants, of these."""
-    return np.concatenate([p[:4], p[7:]])
+def slip_constants(p: Constants) -> slip.Constants:
+    """The constants of the slip model from these."""
+    return slip.Constants(*(getattr(p, name) for name in slip.Constants._fields))
 
 
-def observe(y: Array, p: Array) -> dict[str, Array]:
-    """What the slip model shows."""
+def observe(y: Array, p: Constants) -> dict[str, Array]:
+    """What a trajectory shows, as in the slip model."""
     return slip.observe(velocities(y, p), slip_constants(p))
 
 
 SPLIT = replace(
     slip.MODEL,
     states=("u1", "u2", "M1", "M2", "M3", "v1", "v2"),
-    constants=constants,
+    constants=Constants,
     start=start,
     energy=energy,
     observe=observe,

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from sweep.grid import Array
 from sweep.models.coefficients import rattle_period
-from sweep.plots.maps import SYMBOLS
+from sweep.plots.panels import symbol
 
-# title, unit, series drawn together
+# Title, unit, and the variables drawn together.
 _PANELS = (
     ("contact point", "c", ("contact_x", "contact_y")),
     ("normal coordinates", "1", ("mode_1", "mode_2")),
@@ -24,7 +24,7 @@ _PANELS = (
 
 
 def draw(dataset: xr.Dataset) -> Figure:
-    """Spin with its reversals and critical values, and whatever else the model shows, over time."""
+    """The spin with its reversals and critical values over time, and below it whatever else the dataset has."""
     panels = [panel for panel in _PANELS if panel[2][0] in dataset]
     figure = Figure(figsize=(9, 3.2 + 1.9 * len(panels)), dpi=110, layout="constrained")
     rows = figure.subplots(1 + len(panels), 1, sharex=True, squeeze=False, height_ratios=[2] + [1] * len(panels))[:, 0]
@@ -44,7 +44,7 @@ def draw(dataset: xr.Dataset) -> Figure:
 
 
 def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
-    """n(t) of each trajectory, its reversals as dots, the critical spins of the first as lines."""
+    """n(t) of each trajectory with its reversals as dots, and the critical spins of the first trajectory as lines."""
     for i in range(dataset.sizes["trajectory"]):
         one = dataset.isel(trajectory=i)
         count = f": {int(one['reversals'])} reversals" if "reversals" in one else ""
@@ -63,7 +63,7 @@ def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
 
 
 def reversal_times(one: xr.Dataset) -> Array:
-    """Times at which the spin averaged over a rattle's period changes sign, of one trajectory."""
+    """Times at which the spin of one trajectory, averaged over a period of the rattle, changes sign."""
     good = np.isfinite(one["time"].values)
     time, spin = one["time"].values[good], one["spin"].values[good]
     columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "delta")}
@@ -76,9 +76,9 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 
 def _label(dataset: xr.Dataset, i: int) -> str:
-    """What tells this trajectory from the others."""
+    """The parameters that set this trajectory apart from the others."""
     varying = [n for n in ("mu", "b", "n0", "a", "c", "delta", "x0", "y0") if n in dataset and _varies(dataset, n)]
-    return ", ".join(f"{SYMBOLS.get(n, n)} = {float(dataset[n][i]):g}" for n in varying or ["n0"])
+    return ", ".join(f"{symbol(n)} = {float(dataset[n][i]):g}" for n in varying or ["n0"])
 
 
 def _varies(dataset: xr.Dataset, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""Trajectories straight from columns of parameters: a report needs no configuration, labels or files."""
+"""Trajectories straight from columns of parameters, without configuration, labels or files."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 
 from sweep.engine.executor import execute
 from sweep.grid import Array, Grid
-from sweep.kernels import lanes, methods
-from sweep.kernels.lanes import Kernel
-from sweep.models import MODELS
-from sweep.models.coefficients import rattle_period
+from sweep.kernels import measures, methods
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.method import TOLERANCE
+from sweep.models import MODELS, slip_split
 from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
 from sweep.prediction import predict
@@ -25,20 +25,26 @@ MEASURE = ("reversals", "energy_error")
 
 @dataclass(frozen=True)
 class Ends:
-    """Trajectories that have been carried to their ends."""
+    """Trajectories that have run to their ends."""
 
     kernel: Kernel
     images: Array
     t_end: float
 
     def __getitem__(self, name: str) -> Array:
-        """A simulated variable of the dataset by its name, shape (cells,)."""
+        """A simulated variable of the dataset, by its name there, of shape (cells,)."""
         return measured(self.kernel, self.images, self.t_end)[name]
 
     @property
     def states(self) -> Array:
-        """The model's, of shape (states, cells)."""
-        return self.kernel.unpack(self.images)[0]
+        """The model's states, of shape (states, cells)."""
+        return self.kernel.states(self.images)
+
+
+def slip_states(kernel: Kernel, images: Array) -> Array:
+    """States (u1, u2, ω1, ω2, ω3, v1, v2) of the slip model, whichever variables the method uses, shape (7, cells)."""
+    states, constants = kernel.unpack(images)
+    return slip_split.velocities(states, constants) if kernel.model is slip_split.SPLIT else states
 
 
 def standard(**parameters: Any) -> dict[str, Array]:
@@ -48,14 +54,9 @@ def standard(**parameters: Any) -> dict[str, Array]:
     return {name: array.copy() for name, array in zip(values, arrays, strict=True)}
 
 
-def never_stable(cells: int) -> Array:
-    """Ranges of spin for `Kernel.images` in which nothing settles."""
-    return np.full((6, cells), np.nan)
-
-
 @cache
 def make_kernel(method: str, model: Model, measure: tuple[str, ...]) -> Kernel:
-    """The kernel, compiled."""
+    """The compiled kernel."""
     kernel = methods.make_kernel(method, model, measure)
     kernel.compile()
     return kernel
@@ -66,31 +67,31 @@ def simulate(
     t_end: float,
     *,
     model: str = "slip",
-    method: str = "dopri5",
+    method: str = methods.PLAIN,
     step: float | Array | None = None,
-    tolerance: float = lanes.TOLERANCE,
+    tolerance: float = TOLERANCE,
     measure: Iterable[str] = MEASURE,
     ranges: bool = True,
     settle: bool = False,
 ) -> Ends:
-    """Carry trajectories to their ends.
+    """Run trajectories to their ends.
 
     Parameters
     ----------
     columns : physical parameters by name, each of shape (cells,)
     t_end : time limit in sqrt(c/g)
     step : in sqrt(c/g), for all or of shape (cells,); by default the automatic one of `tolerance`
-    measure : what of this the model can measure
-    ranges : whether to tell the kernel at which spins the rattle decays: without, nothing settles
-    settle : whether a trajectory ends where it has settled
+    measure : measurements, of which those that the model knows are taken
+    ranges : whether the kernel gets the spins at which the rattle decays; without them nothing settles
+    settle : whether a trajectory ends as soon as it has settled
     """
     chosen = MODELS[model]
-    kernel = make_kernel(method, chosen, tuple(name for name in measure if name in chosen.measures))
+    kernel = make_kernel(method, chosen, tuple(name for name in measure if name in measures.possible(chosen)))
     cells = len(columns["a"])
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
     stability = predict(chosen, Grid({}, {}, dict(columns))).stability if ranges else None
-    stable = stability.ranges if stability else never_stable(cells)
+    stable = stability.ranges if stability else None
     steps = np.broadcast_to(steps, cells).astype(float)
-    images = kernel.images(columns, steps, t_end, stable, rattle_period(columns))
+    images = kernel.images(columns, steps, t_end, stable)
     execute(kernel, images, stop_when_settled=settle)
     return Ends(kernel, images, t_end)

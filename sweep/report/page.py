@@ -1,4 +1,4 @@
-"""Sections as text for the terminal and as one HTML page that needs no network."""
+"""Sections of a report as text for the terminal, and as one HTML page that needs no network."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from sweep.report.rows import Row, Section
-from sweep.results.store import replacing
+from sweep.results.writing import replacing
 
 _HEAD = """<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>
 <style>body{{font:15px/1.5 system-ui,sans-serif;max-width:75em;margin:2em auto;padding:0 1em}}
@@ -22,7 +22,7 @@ figure{{margin:1.5em 0}}img{{max-width:100%}}figcaption{{color:#555}}</style>"""
 
 
 def text(section: Section) -> str:
-    """A section for the terminal."""
+    """A section as text for the terminal."""
     lines = [f"\n{section.title}"]
     for row in section.rows:
         verdict, expected = "ok  " if row.holds else "FAIL", f"(expected: {row.expected})"
@@ -35,12 +35,12 @@ def text(section: Section) -> str:
 
 
 def write(path: Path, title: str, about: str, sections: Iterable[Section], heads: tuple[str, str, str]) -> None:
-    """Write the page.
+    """Write the sections as one HTML page.
 
     Parameters
     ----------
-    about : one line under the title, after how many rows hold
-    heads : what the rows' source, expected and found stand for here
+    about : a line for the top of the page, after the number of rows that hold
+    heads : column heads for the rows' source, expected and found
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     sections = list(sections)
@@ -61,7 +61,7 @@ def write(path: Path, title: str, about: str, sections: Iterable[Section], heads
 
 
 def _rows(rows: list[Row], heads: tuple[str, str, str]) -> str:
-    head = ("what", *heads, "difference", "tolerance", "why", "what was found", "verdict")
+    head = ("quantity", *heads, "difference", "tolerance", "reason for the tolerance", "remark", "verdict")
     lines = ["<table><tr>" + "".join(f"<th>{name}</th>" for name in head) + "</tr>"]
     for row in rows:
         cells = (row.what, row.source, row.expected, row.found, row.difference, row.tolerance, row.why, row.remark)

@@ -1,4 +1,4 @@
-"""A statement, what we find, and whether the two agree."""
+"""Statements beside what we find, and whether the two agree."""
 
 from __future__ import annotations
 
@@ -11,31 +11,32 @@ from matplotlib.figure import Figure
 class Row:
     what: str
     source: str
-    """Label of an equation or figure, a section, or the method that is tried."""
+    """The label of an equation or figure, a section, or the method that is tested."""
     expected: str
     found: str
     difference: str
     tolerance: str
     why: str
-    """Where the tolerance comes from."""
+    """The reason for the tolerance."""
     holds: bool
     remark: str = ""
-    """What was found where the source is wrong or silent."""
+    """What we found where the source is wrong or says nothing."""
 
 
 @dataclass
 class Section:
-    """Rows, figures and tables under one heading of the report."""
+    """Rows, figures and tables under one heading."""
 
     title: str
     rows: list[Row] = field(default_factory=list)
     figures: list[tuple[str, Figure]] = field(default_factory=list)
     """Caption and figure."""
     tables: list[tuple[str, list[list[str]]]] = field(default_factory=list)
-    """Caption and lines, the first of them the head."""
+    """Caption and lines; the first line is the head."""
 
 
 def against(what: str, source: str, expected: float, found: float, tolerance: float, why: str, remark: str = "") -> Row:
+    """A number that must agree with the expected one to an absolute tolerance."""
     difference = found - expected
     holds = abs(difference) <= tolerance
     return Row(
@@ -44,12 +45,12 @@ def against(what: str, source: str, expected: float, found: float, tolerance: fl
 
 
 def below(what: str, source: str, found: float, bound: float, why: str, remark: str = "") -> Row:
-    """Something that must not exceed a bound."""
+    """A number that must stay below a bound."""
     return Row(what, source, f"< {bound:g}", f"{found:.3g}", "", f"{bound:g}", why, found < bound, remark)
 
 
 def states(
     what: str, source: str, expected: str, found: str, holds: bool, remark: str = "", why: str = "a statement"
 ) -> Row:
-    """A statement in words that a computation confirms or not."""
+    """A statement in words, which a computation confirms or not."""
     return Row(what, source, expected, found, "", "", why, holds, remark)

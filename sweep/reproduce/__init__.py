@@ -1,4 +1,4 @@
-"""Every number and figure of Takano (2011) beside ours, as rows with a verdict and redrawn figures."""
+"""Every number and figure of Takano (2011) beside ours: rows with a verdict, and figures drawn again."""
 
 from sweep.reproduce.report import reproduce
 

@@ -1,4 +1,4 @@
-"""The report: sections run one after the other, one page."""
+"""The report: all sections in order, on one page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SECTIONS: tuple[Callable[[], Section], ...] = (
 
 
 def reproduce(output: Path, note: Callable[[str], None] = lambda _: None) -> list[Row]:
-    """Run all sections, write `output`/reproduce.html, return the rows that do not hold."""
+    """Run all sections, write reproduce.html to `output`, and return the rows that do not hold."""
     sections = []
     for make in SECTIONS:
         sections.append(make())
@@ -30,7 +30,7 @@ def reproduce(output: Path, note: Callable[[str], None] = lambda _: None) -> lis
     page.write(
         output / "reproduce.html",
         "Takano (2011), “Spin reversal of a rattleback with viscous friction”, reproduced",
-        "All figures are computed in this run.",
+        "All numbers and figures were computed in this run.",
         sections,
         ("source", "paper", "ours"),
     )

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from sweep.config import Config, Integrator, Values
 from sweep.engine.run import run
 from sweep.grid import Array
+from sweep.kernels.measures import possible
 from sweep.models import MODELS, TIERS, analytic
 from sweep.parameters import PARAMETERS
 from sweep.plots.trajectories import draw_spin
@@ -36,19 +37,19 @@ def configure(model: str = "slip", t_end: float = 30_000.0, measure: Any = ("rev
         model=model,
         parameters={n: chosen[n] for n in order},
         integrator=Integrator(t_end=t_end),
-        measure=tuple(m for m in measure if m in TIERS[model].measures),
+        measure=tuple(m for m in measure if m in possible(TIERS[model])),
         max_failed_fraction=1.0,
     )
 
 
 def slip_ratio() -> Section:
-    """Figs. v01vp1m100 … v02vp2m200: the slip's acceleration is small beside that of v_0."""
+    """Figs. v01vp1m100 … v02vp2m200: the acceleration of the slip is small compared with that of v_0."""
     both = trajectory(configure(t_end=400.0), mu=[100, 200])
-    section = Section("Is dv_p/dt small beside dv_0/dt?")
+    section = Section("Is dv_p/dt small compared with dv_0/dt?")
     for i, mu in enumerate((100, 200)):
         figure = Figure(figsize=(8, 3), dpi=100, layout="constrained")
         for axes, component in zip(figure.subplots(1, 2), (1, 2), strict=True):
-            # The start at rest makes the slip jump once; the figures' amplitudes are those after.
+            # Starting without slip makes it jump once; the figures show the amplitudes after that.
             late = both.isel(trajectory=i, sample=both["time"][i].values > 1.0)
             v0, vp = late[f"v0_rate_{component}"], late[f"slip_rate_{component}"]
             ratio = float(np.sqrt((vp**2).mean() / (v0**2).mean()))
@@ -66,7 +67,7 @@ def slip_ratio() -> Section:
 
 
 def critical_spins() -> Section:
-    """Fig. nc21pm: below n_c1 the rattle decays, from n_c2 on the spin reverses."""
+    """Fig. nc21pm: below n_c1 the rattle decays, above n_c2 the spin reverses."""
     section = Section("Spins below, between and above the critical ones, μ = 75")
     figure = Figure(figsize=(8, 6.5), dpi=100, layout="constrained")
     for axes, starts in zip(figure.subplots(2, 1), ((0.0015, 0.003, 0.005), (-0.006, -0.015, -0.025)), strict=True):
@@ -95,7 +96,7 @@ def _behaviour(grows: bool, reverses: bool) -> str:
 
 
 def friction() -> Section:
-    """Fig. mu601000: counts at three frictions, and the way to rolling."""
+    """Fig. mu601000: counts at three frictions, and the approach to rolling."""
     section = Section("From three reversals to rolling")
     figure = Figure(figsize=(8, 6.5), dpi=100, layout="constrained")
     top, bottom = figure.subplots(2, 1)
@@ -113,13 +114,17 @@ def friction() -> Section:
     found = ", ".join(f"{d:.2g}" for d in distance)
     section.rows.append(
         states(
-            "largest distance from no-slip, t < 400, μ = 500, 1000, 1500", "mu601000 (b)", "falls with μ", found, closer
+            "largest difference from no-slip, t < 400, μ = 500, 1000, 1500",
+            "mu601000 (b)",
+            "falls with μ",
+            found,
+            closer,
         )
     )
     after = configure(t_end=6000.0)
     endless = replace(after, integrator=Integrator(t_end=6000.0, stop_when_settled=False))
     tail = trajectory(endless, mu=60, every=3.0)["spin"][0].values[-100:]
-    found = f"varies by {np.ptp(tail) / abs(tail[-1]):.1g} of itself over 5700 < t < 6000"
+    found = f"relative variation of {np.ptp(tail) / abs(tail[-1]):.1g} over 5700 < t < 6000"
     constant = bool(np.ptp(tail) < 1e-3 * abs(tail[-1]))
     section.rows.append(states("spin after the last reversal, μ = 60", "sec. sim C", "stays constant", found, constant))
     section.figures.append(("mu601000: (a) μ = 60, 130, 200, (b) μ = 500, 1000, 1500 and no slip", figure))
@@ -133,7 +138,7 @@ def _distance(one: xr.Dataset, other: xr.Dataset, until: float) -> float:
 
 
 def count_against_friction() -> Section:
-    """Fig. nrvsmu: predicted and simulated reversals over μ."""
+    """Fig. nrvsmu: predicted and simulated reversals against μ."""
     maps = run(configure(mu=np.arange(20, 201, 2.0)))
     ours, theirs, mu = (
         maps["reversals"].values.astype(int),
@@ -157,7 +162,7 @@ def count_against_friction() -> Section:
             "agree_up_to",
             "counts agree within one up to μ =",
             limit,
-            f"equal in {low:.0%} of the cells up to 70, in {high:.0%} beyond",
+            f"equal in {low:.0%} of the cells up to μ = 70, in {high:.0%} beyond",
         ),
         states(
             "beyond μ = 70, n_ap >= n_ex", "nrvsmu", "n_ap is larger", f"in {larger:.0%} of the cells", larger > 0.95
@@ -167,12 +172,12 @@ def count_against_friction() -> Section:
 
 
 def count_against_shape() -> Section:
-    """Figs. vsb and lf: reversals over b beside the form factor."""
+    """Figs. vsb and lf: reversals against b, beside the form factor."""
     b = np.linspace(1.2, 9.8, 87)
     maps = run(configure(mu=np.array([100.0, 200.0]), b=b))
     figure = Figure(figsize=(7, 6), dpi=100, layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
-    section = Section("Reversals against shape", figures=[("vsb and lf: counts and form factor over b", figure)])
+    section = Section("Reversals against shape", figures=[("vsb and lf: counts and form factor against b", figure)])
     factor = analytic.form_factor(standard(b=b))
     best = analytic.best_b(10.0)
     for i, mu in enumerate((100, 200)):
@@ -190,14 +195,18 @@ def count_against_shape() -> Section:
                 found,
                 1.8,
                 "«similar to the form factor»",
-                f"the paper's own n_r is largest at b = {peak:.1f}: beside L(f) it has |sin θ cos θ|, "
+                f"the paper's own n_r is largest at b = {peak:.1f}: besides L(f) it contains |sin θ cos θ|, "
                 "and θ depends on b too",
             )
         )
         likeness = float(np.corrcoef(smooth, factor)[0, 1])
         section.rows.append(
             states(
-                f"n_r over b is like L(f), μ = {mu}", "vsb", "similar", f"correlation {likeness:.2f}", likeness > 0.7
+                f"n_r against b resembles L(f), μ = {mu}",
+                "vsb",
+                "similar",
+                f"correlation {likeness:.2f}",
+                likeness > 0.7,
             )
         )
     top.set_ylabel("n_r:ex")
@@ -214,7 +223,7 @@ def _running_median(values: Array, width: int) -> Array:
 
 
 def ladder() -> Section:
-    """How good each rung is: count, reversal times and cost of each model beside the full one."""
+    """How good each reduced model is: its counts, reversal times and cost beside the full model's."""
     mu, b = np.linspace(20, 200, 19), np.linspace(1.5, 9.0, 16)
     measure = ("reversals", "first_reversal")
     maps = {}
@@ -229,8 +238,8 @@ def ladder() -> Section:
             "model",
             "equal counts",
             "within one",
-            "first reversal off by (median)",
-            "last reversal off by (median)",
+            "error of the first reversal (median)",
+            "error of the last reversal (median)",
             "trajectories/s",
         ]
     ]
@@ -241,15 +250,15 @@ def ladder() -> Section:
         mesh = axes.pcolormesh(b, mu, off.transpose("mu", "b"), cmap="RdBu_r", vmin=-6, vmax=6, shading="nearest")
         axes.set(title=name, xlabel="b")
     panels[0].set_ylabel("μ")
-    figure.colorbar(mesh, ax=list(panels), label="count minus the full model's")
+    figure.colorbar(mesh, ax=list(panels), label="count minus that of the full model")
     for name, one in maps.items():
         lines.append(
             [name, *_agreement(one, full), f"{one.attrs['trajectories_per_second']:.3g}" if name in MODELS else "—"]
         )
     caption = (
-        "19 × 16 cells, μ = 20 … 200, b = 1.5 … 9, n0 = 0.05, t < 15 000; no-slip: 16 cells, it never stops reversing"
+        "19 × 16 cells, μ = 20 … 200, b = 1.5 … 9, n0 = 0.05, t < 15 000; no-slip: 16 cells, which never stop reversing"
     )
-    return Section("How good is each rung", figures=[(caption, figure)], tables=[(caption, lines)])
+    return Section("How good is each model?", figures=[(caption, figure)], tables=[(caption, lines)])
 
 
 def _agreement(one: xr.Dataset, full: xr.Dataset) -> list[str]:

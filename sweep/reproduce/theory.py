@@ -1,8 +1,6 @@
-"""Numbers that formulas give, and what the models must agree on among themselves."""
+"""Numbers from the paper's formulas, and what the models must agree on among themselves."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -12,12 +10,12 @@ from sweep.models.coefficients import coefficients, rattle_period
 from sweep.models.model import Columns, stack
 from sweep.report import cells
 from sweep.report.cells import standard
-from sweep.report.rows import Section, against, below
+from sweep.report.rows import Row, Section, against, below
 from sweep.reproduce.rows import against_paper
 
 
 def simulate(name: str, columns: Columns, t_end: float, step: float | None = None) -> tuple[Array, Array, Array]:
-    """Final states (n, cells), spins and largest violations of the energy balance, relative."""
+    """Final states of shape (states, cells), spins, and largest relative violations of the energy balance."""
     ends = cells.simulate(columns, t_end, model=name, step=step, measure=("energy_error",), ranges=False)
     violation = ends["energy_error"] if ends.kernel.measure else np.zeros(len(ends.images))
     return ends.states, ends["spin_final"], violation
@@ -44,7 +42,7 @@ def formulas() -> Section:
             ),
             against_paper("nu2_squared", "ν2² at a = 10, b = 3", float(k.nu2[0] ** 2)),
             against_paper("tan_2_theta", "|tan 2θ| is O(1/10)", abs(float(np.tan(2 * k.theta[0])))),
-            against_paper("k1", "k1 ~ a² δ", float(k.k1[0]), "exact; the leading term is half too large at b = 3"),
+            against_paper("k1", "k1 ~ a² δ", float(k.k1[0]), "exact; at b = 3 the leading term is 50 % too large"),
             against_paper("k4", "k4 ~ a² δ / 2", float(k.k4[0])),
             against_paper("best_f", "f of the largest form factor", best_f),
             against_paper("best_b", "b of the largest form factor at a = 10", best_b),
@@ -57,17 +55,17 @@ def formulas() -> Section:
 
 
 def consistency() -> Section:
-    """What ties the models to each other and to conserved quantities: a wrong coefficient shows here."""
-    section = Section("The models among themselves")
+    """How the models agree with each other and conserve what they must: a wrong coefficient shows here."""
+    section = Section("Agreement between the models")
     section.rows += [*_slip_rows(), *_rolling_rows(), *_reduced_rows()]
     return section
 
 
-def _slip_rows() -> list[Any]:
+def _slip_rows() -> list[Row]:
     body = standard()
     plus, minus = linear.critical_spins(MODELS["slip"], body, analytic.critical_spins(body))
     _, spin, violation = simulate("slip", standard(mu=[60.0, 200.0]), 400.0, 0.005)
-    other = "digits of an independent implementation"
+    other = "the digits of an independent implementation"
     return [
         below("slip: energy balance over t = 400", "visf", float(violation.max()), 1e-8, "the method's error"),
         against("slip: n(400) at μ = 60", "Ldot … visf", -0.04527003408, float(spin[0]), 1e-9, other),
@@ -78,7 +76,7 @@ def _slip_rows() -> list[Any]:
     ]  # fmt: skip
 
 
-def _rolling_rows() -> list[Any]:
+def _rolling_rows() -> list[Row]:
     _, rolling, drift = simulate("noslip", standard(), 1000.0)
     _, rolling, _ = simulate("noslip", standard(), 100.0)
     mu = np.array([1e3, 1e4, 1e5])
@@ -86,13 +84,11 @@ def _rolling_rows() -> list[Any]:
     exponent = np.polyfit(np.log(mu), np.log(difference), 1)[0]
     return [
         below("no-slip: energy drift over t = 1000", "sec. basiceq", float(drift[0]), 1e-9, "energy is conserved"),
-        against(
-            "slip tends to no-slip as μ to the power", "sec. basiceq", -1, float(exponent), 0.02, "first order in 1/μ"
-        ),
+        against("exponent of μ in slip minus no-slip", "sec. basiceq", -1, float(exponent), 0.02, "first order in 1/μ"),
     ]
 
 
-def _reduced_rows() -> list[Any]:
+def _reduced_rows() -> list[Row]:
     free = standard(mu=np.inf)
     k = coefficients(free)
 
@@ -117,11 +113,14 @@ def _reduced_rows() -> list[Any]:
         for name in ("effective", "averaged")
     }
     return [
-        below("averaged, no slip: N² + A² + B² and A^γ B over t = 1000", "sec. svm", float(change), 1e-9, "conserved"),
+        below("averaged, no slip: change of N² + A² + B² and A^γ B over t = 1000", "sec. svm",
+              float(change), 1e-9, "conserved"),
         against("spin lost, effective over averaged, small rattle", "ndotab, abdef", 1, float(lost[0] / lost[1]), 0.05,
                 "second order in the amplitude and in a_i",
                 "with A = sqrt(ν1² + 1) X0; the ν1² - 1 printed in (abdef) is a misprint: it gives "
                 f"{lost[0] / lost[1] * (k.nu1[0] ** 2 + 1) / (k.nu1[0] ** 2 - 1):.2f}"),
-        below("averaged: n_c1± of its eigenvalues, off the formula", "sec. nc1", offset["averaged"], 1e-9, "exact"),
-        below("effective: n_c1± of its eigenvalues, off the formula", "sec. nc1", offset["effective"], 0.03, "O(a_i²)"),
+        below("averaged: n_c1± from eigenvalues, relative difference from the formula", "sec. nc1",
+              offset["averaged"], 1e-9, "exact"),
+        below("effective: n_c1± from eigenvalues, relative difference from the formula", "sec. nc1",
+              offset["effective"], 0.03, "O(a_i²)"),
     ]  # fmt: skip

@@ -1,9 +1,9 @@
-"""Labelled results: from images and predictions to an xarray dataset with CF-1.11 attributes."""
+"""Turns images and predictions into a labelled xarray dataset with CF-1.11 attributes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,36 +11,25 @@ import xarray as xr
 
 from sweep.config import Config
 from sweep.grid import Array, Grid
-from sweep.kernels import lanes, methods
-from sweep.kernels.lanes import Kernel
+from sweep.kernels import measures, status
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.method import STEP_RULES
+from sweep.kernels.methods import METHODS
 from sweep.parameters import PARAMETERS
 from sweep.prediction import Prediction
+from sweep.variables import Variable
 
 STATUSES = {
     0: "not_run",
-    lanes.SETTLED: "settled",
-    lanes.TIME_LIMIT: "time_limit",
-    lanes.LIFT_OFF: "lift_off",
-    lanes.DIVERGED: "diverged",
-    lanes.PARADOX: "paradox",
+    status.SETTLED: "settled",
+    status.TIME_LIMIT: "time_limit",
+    status.LIFT_OFF: "lift_off",
+    status.DIVERGED: "diverged",
+    status.PARADOX: "paradox",
 }
 
 EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND = range(4)
 REASONS = {EXISTS: "exists", NO_FRICTION: "no_friction", NO_COUPLING: "no_coupling", NOT_FOUND: "not_found"}
-
-NOISE = {0: "firm", 1: "noise_limited"}
-
-STEP_RULES = {methods.FIXED: "fixed", methods.ACCURACY: "accuracy", methods.STABILITY: "stability"}
-
-
-@dataclass(frozen=True)
-class Variable:
-    dtype: str
-    units: str
-    long_name: str
-    flags: Mapping[int, str] | None = None
-    per_body: bool = False
-    """Without the parameters of the start."""
 
 
 def _critical(sign: str, event: str, source: str) -> Variable:
@@ -51,24 +40,12 @@ def _critical(sign: str, event: str, source: str) -> Variable:
 _FORMULA, _EIGENVALUES = "the formula of Takano (2011)", "the eigenvalues of the model"
 
 VARIABLES: dict[str, Variable] = {
-    "reversals": Variable("int16", "1", "spin reversals of the simulated trajectory"),
-    "t_first_reversal": Variable("float64", "1", "time of the first spin reversal, in sqrt(c/g)"),
-    "t_last_reversal": Variable("float64", "1", "time of the last spin reversal, in sqrt(c/g)"),
-    "noise_limited": Variable(
-        "int8", "1", "whether a mode of the rattle fell under the round-off of the other before it grew", NOISE
-    ),
-    "spin_mean": Variable("float64", "1", "spin averaged over the last full window before t_stop, in sqrt(g/c)"),
+    **{name: spec for kind in measures.MEASURES.values() for name, spec in kind.variables.items()},
     "status": Variable("int8", "1", "how the simulation of the trajectory ended", STATUSES),
     "inferred": Variable("int8", "1", "how reversals and status were found", {0: "simulated", 1: "inferred"}),
-    "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)"),
+    "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
     "t_stop": Variable("float64", "1", "time at which the simulation ended, in sqrt(c/g)"),
-    "energy_error": Variable(
-        "float64",
-        "1",
-        f"largest violation of the energy balance, looked at every {lanes.BLOCK} steps, "
-        "relative to the start energy above rest",
-    ),
-    "method": Variable("int8", "1", "integration method of the trajectory", dict(enumerate(methods.METHODS))),
+    "method": Variable("int8", "1", "integration method of the trajectory", dict(enumerate(METHODS))),
     "step": Variable("float64", "1", "integration step, in sqrt(c/g)"),
     "step_rule": Variable("int8", "1", "what set the integration step", STEP_RULES),
     "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),
@@ -104,35 +81,18 @@ VERIFIED: dict[str, Variable] = {
 
 
 def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
-    """The simulated variables, each of shape (cells,), from images at their ends."""
-
-    def row(name: str) -> Array:
-        return np.asarray(images[:, kernel.row(name)])
-
+    """The simulated variables, each of shape (cells,) or (cells, length), from images whose trajectories have ended."""
+    table = kernel.table(images)
     spin, _, _ = kernel.model.energy(*kernel.unpack(images))
-    result = {
-        "status": row("status"),
-        "spin_final": spin,
-        "t_stop": kernel.times(images, t_end),
-        "step": row("step"),
-    }
-    if "reversals" in kernel.measure:
-        closed = kernel.times(images, t_end) >= row("period")
-        result["reversals"] = row("reversals")
-        result["t_last_reversal"] = row("last_reversal")
-        if "first_reversal" in kernel.measure:
-            result["t_first_reversal"] = row("first_reversal")
-        if "noise_limited" in kernel.measure:
-            result["noise_limited"] = row("noise_limited")
-        result["spin_mean"] = np.where(closed, row("closed_window") / row("period"), np.nan)
-    if "energy_error" in kernel.measure:
-        start, violation = row("energy_start"), row("violation")
-        result["energy_error"] = np.divide(violation, start, out=violation.copy(), where=start > 0)
+    times = kernel.times(images, t_end)
+    result = {"status": table["status"], "spin_final": spin, "t_stop": times, "step": table["step"]}
+    for each in kernel.measurements:
+        result |= each.read(table, times)
     return result
 
 
 def predicted(prediction: Prediction) -> dict[str, Array]:
-    """The predicted variables, over cells or bodies."""
+    """The predicted variables, each over the cells or over the bodies."""
     result = {"form_factor": prediction.form_factor}
     if formulas := prediction.formulas:
         plus, minus = formulas.n_c1
@@ -145,16 +105,18 @@ def predicted(prediction: Prediction) -> dict[str, Array]:
 
 
 def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: Mapping[str, Any]) -> xr.Dataset:
-    """A dataset of arrays over the cells of `grid` (or over its bodies, where they are per body), flat or shaped."""
+    """A dataset of `arrays` over the cells of `grid`, or over its bodies where a variable is per body.
+
+    The cells may lie along one dimension, in C order, or along those of the grid.
+    """
     variables = {
-        name: xr.Variable(
-            over.dims, np.asarray(arrays[name]).astype(spec.dtype, copy=False).reshape(over.shape), described(spec)
-        )
+        name: xr.Variable(dims(over, spec), shaped(over, spec, arrays[name]), described(spec))
         for name, (over, spec) in layout(grid, arrays).items()
     }
     coordinates = {
         name: xr.Variable((name,), values, _parameter_attributes(name)) for name, values in grid.axes.items()
     }
+    coordinates |= numbers_along({name: np.shape(values) for name, values in arrays.items()})
     for name, column in (grid.cases or {}).items():
         coordinates[name] = xr.Variable(("case",), column, _parameter_attributes(name))
     if grid.cases is not None:
@@ -167,32 +129,52 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
 
 
 def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]:
-    """Of the variables `names` those over cells or bodies, each with the grid that it is an array over."""
+    """Those of the variables `names` that extend over cells or bodies, each with the grid that it extends over."""
     bodies, _ = grid.bodies()
     return {name: (bodies if spec.per_body else grid, spec) for name, spec in VARIABLES.items() if name in names}
 
 
+def numbers_along(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, xr.Variable]:
+    """Coordinates 1, 2, … of the dimensions that variables of these `shapes` have in addition to those of the cells."""
+    found = {}
+    for name, shape in shapes.items():
+        if (spec := VARIABLES.get(name)) and spec.along:
+            words = {"long_name": f"number of the {spec.along}", "units": "1"}
+            found[spec.along] = xr.Variable((spec.along,), np.arange(1, shape[-1] + 1), words)
+    return found
+
+
+def dims(over: Grid, spec: Variable) -> tuple[str, ...]:
+    """Names of the dimensions of a variable over the cells of `over`."""
+    return (*over.dims, spec.along) if spec.along else over.dims
+
+
+def shaped(over: Grid, spec: Variable, values: Array) -> Array:
+    """`values` over the cells of `over`, converted to the dimensions and the type of the variable."""
+    values = np.asarray(values).astype(spec.dtype, copy=False)
+    return values.reshape(over.shape + (values.shape[-1:] if spec.along else ()))
+
+
 def blocks(grid: Grid, tile: tuple[slice, ...], arrays: Mapping[str, Array]) -> Iterator[tuple[str, Any, Array]]:
-    """Name, place in the whole array, and values of each variable of a tile's flat `arrays`."""
+    """For each variable in a tile's flat `arrays`: its name, its place in the whole array, and its values."""
     at = dict(zip(grid.dims, tile, strict=True))
     for name, (over, spec) in layout(grid.part(tile), arrays).items():
-        values = np.asarray(arrays[name]).astype(spec.dtype).reshape(over.shape)
-        yield name, tuple(at[dim] for dim in over.dims), values
+        yield name, tuple(at[dim] for dim in over.dims), shaped(over, spec, arrays[name])
 
 
 def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, Array]]]) -> dict[str, Array]:
-    """Arrays over all cells or bodies from those of the tiles."""
+    """Arrays over all cells or bodies, put together from those of the tiles."""
     whole: dict[str, Array] = {}
     for tile, arrays in tiles:
         for name, (over, spec) in layout(grid, set(arrays) - set(whole)).items():
-            whole[name] = np.empty(over.shape, spec.dtype)
+            whole[name] = np.empty(over.shape + np.shape(arrays[name])[1:], spec.dtype)
         for name, place, values in blocks(grid, tile, arrays):
             whole[name][place] = values
     return whole
 
 
 def beside(result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
-    """`result` with what a second run of some cells found, along the dimension `verified`."""
+    """`result`, with the results of a second run of some cells (`again`) along the dimension `verified`."""
     variables = {
         f"verified_{name}": xr.Variable(
             "verified", np.asarray(again[f"verified_{name}"]).astype(spec.dtype), described(spec)
@@ -209,7 +191,7 @@ def beside(result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
 
 
 def described(spec: Variable) -> dict[str, Any]:
-    """The attributes of a variable."""
+    """The CF attributes of a variable."""
     words: dict[str, Any] = {"long_name": spec.long_name, "units": spec.units}
     if spec.flags:
         words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)

@@ -1,4 +1,4 @@
-"""Where the numbers of a dataset come from: what they depend on, and what made them."""
+"""Where the numbers of a dataset come from: what they depend on, and what produced them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ import numba
 
 from sweep.config import Config
 from sweep.jit import fingerprint
-from sweep.kernels import methods
+from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import MODELS
-from sweep.results.store import Identity
+from sweep.results.identity import Identity
 
 _PACKAGE = Path(__file__).parent.parent
 
-# All that lies above the engine shows numbers, or asks for them, but decides none.  Whatever is not named here is
-# taken to decide them: a new file that is forgotten makes a run start anew, not go on from other numbers.
+# What lies above the engine asks for numbers or shows them, but decides none.  Every file that is not named here
+# counts as decisive: if a new one is forgotten, runs start again for nothing, but never resume from other numbers.
 _ABOVE_THE_ENGINE = {
     "__init__.py", "__main__.py", "api.py", "cli.py", "progress.py",
     "plots", "studies", "report", "reproduce", "bench",
@@ -30,17 +30,18 @@ _ABOVE_THE_ENGINE = {
 
 
 def decisive_sources() -> list[Path]:
-    """The files of the package that the numbers of a dataset depend on."""
+    """The files of the package on which the numbers of a dataset depend."""
     files = sorted(_PACKAGE.rglob("*.py"))
     return [path for path in files if path.relative_to(_PACKAGE).parts[0] not in _ABOVE_THE_ENGINE]
 
 
 def identify(config: Config) -> Identity:
+    """The identity of a run of `config` by this program."""
     return Identity(config.to_yaml(), config.fingerprint(), *sources())
 
 
 def sources() -> tuple[str, str]:
-    """Hash of the decisive sources, and versions of what runs them."""
+    """Hash of the decisive source files, and the versions of what compiles and runs them."""
     own, libraries = metadata.version("rattleback-sweep"), ("numba", "llvmlite", "numpy")
     found = [f"{name} {metadata.version(name)}" for name in libraries]
     versions = ", ".join([f"sweep {own}", f"Python {platform.python_version()}", *found])
@@ -48,12 +49,12 @@ def sources() -> tuple[str, str]:
 
 
 def this_cpu() -> str:
-    """The type of CPU that kernels are compiled for here."""
+    """The type of CPU for which kernels are compiled here."""
     return str(llvmlite.binding.get_host_cpu_name())
 
 
 def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] = ()) -> dict[str, Any]:
-    """Attributes of a dataset: configuration, versions, machines (`cpus`, by default this one's), cost."""
+    """Attributes of a dataset: configuration, versions, types of CPU (by default this one's) and cost."""
     identity = identify(config)
     return {
         "config": identity.config,
@@ -79,14 +80,14 @@ def _integrator_words(config: Config) -> str:
     if config.integrator.step != "auto":
         return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"
     rule, method = f"a spin error of {config.integrator.tolerance:g} at t = 400", config.integrator.method
-    if method == "dopri5":
-        rule = f"the shorter of {methods.STABILITY_SHARE:g} of the stability limit and {rule}"
-    name = "the cheapest method" if method == "auto" else method
+    if method != AUTO and METHODS[method].step_words:
+        rule = f"the shorter of {METHODS[method].step_words} and {rule}"
+    name = "the cheapest method" if method == AUTO else method
     return f"{name}, fixed step, per trajectory by {rule}"
 
 
 def _git_commit() -> str:
-    """The commit of the checkout that the package runs from; "unknown" for an installed one."""
+    """The commit of the checkout from which the package runs; "unknown" for an installed package."""
     root = _PACKAGE.parent
     if not (root / ".git").exists():
         return "unknown"

@@ -1,4 +1,4 @@
-"""Critical spins three ways: the paper's formulas, the model's eigenvalues, simulation."""
+"""Critical spins in three ways: the paper's formulas, the model's eigenvalues, and simulation."""
 
 from __future__ import annotations
 
@@ -11,38 +11,39 @@ import xarray as xr
 from sweep.config import Config, ConfigError, Fault, Values
 from sweep.engine import executor
 from sweep.engine.plan import plan
-from sweep.engine.run import simulated, with_dopri5
 from sweep.grid import Array, Grid
-from sweep.kernels.lanes import FAILURES, RUNNING, Kernel
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.status import FAILURES, RUNNING
 from sweep.models import MODELS
 from sweep.models.coefficients import rattle_period
 from sweep.models.linear import growth_rate
-from sweep.models.model import stack
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
 from sweep.results.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
 from sweep.results.provenance import provenance
+from sweep.studies.stepwise import stepwise
 
 WIDTH = 1e-3
-"""Relative width to which simulation brackets a critical spin."""
+"""Relative width down to which simulation brackets a critical spin."""
 
 TINY = 1e-8
-"""Contact point of the rattle whose growth is looked at, in c: linear to sixteen digits."""
+"""Start contact point of the rattle whose growth is measured, in c: so small that it is linear to sixteen digits."""
 
-# Growth is read between two series of looks: when the other mode is gone, and later; in times that
-# the slower rattle takes to decay by e at rest.
-_FIRST_LOOK, _SECOND_LOOK = 5.0, 13.0
-_LOOKS = 24
+# Growth is measured between two series of samples: one that begins when the other mode has decayed, and a
+# later one.  Both beginnings are in units of the time in which the slower mode decays by a factor e at rest.
+_FIRST_SERIES, _SECOND_SERIES = 5.0, 13.0
+_SAMPLES = 24
 
 
 @dataclass(frozen=True)
 class Bracket:
-    """Where a critical spin lies; arrays over the bodies, NaN where it was not found."""
+    """Two spins between which a critical spin lies; arrays over the bodies, NaN where it was not found."""
 
     inner: Array
-    """Closer to zero, where what it is critical for does not happen yet."""
+    """The end nearer zero, where the critical event does not happen yet."""
     outer: Array
+    """The far end, where it happens."""
 
     @property
     def middle(self) -> Array:
@@ -50,24 +51,33 @@ class Bracket:
 
 
 def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] = lambda _: None) -> xr.Dataset:
-    """Critical spins over all axes of `config` but n0.
+    """Critical spins over all axes of `config` except n0.
 
-    n_c1: where a tiny rattle begins to grow; simulated, by the growth of the energy of one of
-    size `TINY` once the other mode has decayed.  n_c2: where the trajectory from the
-    configuration's start point begins to reverse; simulated, by the count.  Bisection on n0, over
-    all bodies at once, down to `width` relative to the spin.
+    n_c1 is the spin beyond which a tiny rattle grows.  Its simulation follows a rattle of size `TINY`
+    and measures the growth of its energy once the other mode has decayed.  n_c2 is the spin beyond
+    which the trajectory from the configuration's start point reverses.  Its simulation counts
+    reversals.  Both are found by bisection on n0, for all bodies at once.
+
+    Parameters
+    ----------
+    width : of the brackets, relative to the spin
+    note : called with a line before each bisection
 
     Returns
     -------
-    Dataset over the axes without n0; `*_simulated` with its bracket `*_inner`, `*_outer`, and
+    Dataset over the axes without n0: each `*_simulated` with its bracket `*_inner`, `*_outer`, and
     `critical_reason`, which says why a spin is NaN.
+
+    Raises
+    ------
+    ConfigError
+        if the model is a formula, or the start point is an axis.
     """
-    model = simulated(config)
+    config = stepwise(config)
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
         raise ConfigError([Fault("critical", None, None, ("start", beyond[0]), "an axis; allowed: a number")])
-    config = with_dopri5(config)
     grid = Grid.of(_without_n0(config))
-    prediction = predict(model, grid)
+    prediction = predict(MODELS[config.model], grid)
     arrays: dict[str, Array] = dict(dataset.predicted(prediction))
     arrays.pop("reversals_predicted", None)
     columns = grid.columns()
@@ -75,9 +85,9 @@ def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] =
     arrays["critical_reason"] = reason
     search = np.flatnonzero(reason == EXISTS)
     for sign, side in ((1, "plus"), (-1, "minus")):
-        for name, grows in (("n_c1", _rattle_grows), ("n_c2", _reverses)):
+        for name, happens in (("n_c1", _rattle_grows), ("n_c2", _reverses)):
             note(f"{name} {side}: bisection over {len(search)} bodies")
-            bracket = _bisect(config, grows, columns, search, sign, width)
+            bracket = _bisect(config, happens, columns, search, sign, width)
             for suffix, values in (("", bracket.middle), ("_inner", bracket.inner), ("_outer", bracket.outer)):
                 arrays[f"{name}_{side}_simulated{suffix}"] = values
             reason[search[np.isnan(bracket.middle[search])]] = NOT_FOUND
@@ -86,7 +96,7 @@ def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] =
 
 
 def _without_n0(config: Config) -> Config:
-    """`config` at one start spin, which no critical spin depends on."""
+    """`config` with a single start spin, since no critical spin depends on it."""
     parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
     return replace(config, parameters=parameters, cases=cases or None)
@@ -104,14 +114,14 @@ def _reasons(prediction: Prediction, columns: dict[str, Array], grid: Grid) -> A
 def _bisect(
     config: Config, happens: Callable[..., Array], columns: dict[str, Array], search: Array, sign: int, width: float
 ) -> Bracket:
-    """Bracket the |n0| from which on `happens`, for the cells `search`, all at once."""
+    """Bracket the |n0| beyond which something `happens`, for the cells `search`, all at once; `sign` is that of n0."""
     cells = len(columns["a"])
     inner, outer = np.zeros(cells), np.full(cells, 1e-3)
 
     def ask(which: Array, size: Array) -> Array:
         return happens(config, {n: v[which] for n, v in columns.items()} | {"n0": sign * size})
 
-    # Walk outwards until it happens.
+    # Double the spin until the event happens.
     walking = search
     while len(walking):
         yes = ask(walking, outer[walking])
@@ -135,38 +145,40 @@ def _reverses(config: Config, columns: dict[str, Array]) -> Array:
     kernel, images = _images(config, columns, ("reversals",), config.integrator.t_end)
     executor.execute(kernel, images, stop_when_settled=True)
     reverses = images[:, kernel.row("reversals")] > 0
-    # A body that leaves the plane is not one that stays below its critical spin.
+    # A body that leaves the plane, or whose trajectory fails otherwise, is not below its critical spin.
     return np.asarray(reverses | np.isin(images[:, kernel.row("status")], FAILURES))
 
 
 def _rattle_grows(config: Config, columns: dict[str, Array]) -> Array:
-    """Whether a tiny rattle grows, by the mean logarithm of its energy in two series of looks.
+    """Whether a tiny rattle grows, by the mean logarithm of its energy in two series of samples.
 
-    Each series averages over the energy's ripple at uneven intervals; what is left of it blurs the
-    critical spin by less than 1e-4.
+    The energy ripples within a period.  The samples of a series are spaced so that the ripple averages
+    out; what is left of it blurs the critical spin by less than 1e-4.
     """
     tiny = columns | {"x0": np.full_like(columns["n0"], TINY), "y0": np.full_like(columns["n0"], TINY)}
     model = MODELS[config.model]
-    decay = -growth_rate(model, stack(model.constants(tiny)), np.zeros_like(columns["n0"]))
-    kernel, images = _images(config, tiny, (), float(2 * _SECOND_LOOK / decay.min()))
+    decay = -growth_rate(model, model.constants.of(tiny), np.zeros_like(columns["n0"]))
+    kernel, images = _images(config, tiny, (), float(2 * _SECOND_SERIES / decay.min()))
     step, interval = images[:, kernel.row("step")], rattle_period(tiny) / (2 * np.pi)
     means = []
-    for begin in (_FIRST_LOOK / decay, _SECOND_LOOK / decay):
+    for begin in (_FIRST_SERIES / decay, _SECOND_SERIES / decay):
         logs = []
-        for look in range(_LOOKS):
-            _carry_on(kernel, images, np.round((begin + look * 1.618 * interval) / step))
+        for sample in range(_SAMPLES):
+            _continue_to(kernel, images, np.round((begin + sample * 1.618 * interval) / step))
             logs.append(np.log(_rattle(kernel, images)))
         means.append(np.mean(logs, axis=0))
     return np.asarray(means[1] > means[0])
 
 
-def _carry_on(kernel: Kernel, images: Array, steps: Array) -> None:
+def _continue_to(kernel: Kernel, images: Array, steps: Array) -> None:
+    """Advance the trajectories until they have made this number of steps."""
     images[:, kernel.row("goal")] = steps
     images[:, kernel.row("status")] = RUNNING
     executor.execute(kernel, images, stop_when_settled=False)
 
 
 def _rattle(kernel: Kernel, images: Array) -> Array:
+    """Energy of the rattle, shape (cells,)."""
     _, rattle, _ = kernel.model.energy(*kernel.unpack(images))
     return np.asarray(np.broadcast_to(rattle, len(images)))
 

@@ -1,4 +1,4 @@
-"""Single trajectories, dense in time."""
+"""Single trajectories, sampled densely in time."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError, Fault
+from sweep.config import Config, ConfigError, Fault, as_config
 from sweep.engine import executor
 from sweep.engine.plan import plan
-from sweep.engine.run import as_config, simulated, with_dopri5
 from sweep.grid import Array, off_the_body
-from sweep.kernels.lanes import RUNNING, Kernel
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.runge_kutta import RungeKuttaKernel
+from sweep.kernels.status import RUNNING
 from sweep.models import TIERS
 from sweep.models.linear import fastest_motion
 from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
 from sweep.results import dataset
 from sweep.results.provenance import provenance
+from sweep.studies.stepwise import stepwise
 
 SAMPLES_A_RADIAN = 3
-"""Samples in a radian of the fastest motion: nearly twenty a period."""
+"""Samples per radian of the fastest motion: nearly twenty per period."""
 
 MAX_TRAJECTORIES = 1000
-"""All combinations of what is asked for are followed, and each is held in memory as a whole."""
+"""Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
 
 # name: units, long_name
 SERIES: dict[str, tuple[str, str]] = {
@@ -53,32 +55,37 @@ SERIES: dict[str, tuple[str, str]] = {
 
 
 def trajectory(config: Config | str | Path, *, every: float | None = None, **at: float | Sequence[float]) -> xr.Dataset:
-    """Dense series of the cells of `config` picked by parameters, such as ``mu=60, n0=[0.02, 0.05]``.
+    """Follow the cells of `config` picked by their parameters, such as ``mu=60, n0=[0.02, 0.05]``.
 
     Parameters
     ----------
     config : a configuration or the path of one
-    every : time between samples, in sqrt(c/g), rounded to whole steps; by default nearly twenty in
-        a period of the fastest motion
-    at : values by parameter; each combination is one trajectory.  Parameters that are axes of
-        `config` and not named take their first value.
+    every : time between samples, in sqrt(c/g), rounded to whole steps; by default nearly twenty
+        per period of the fastest motion
+    at : values by parameter; each combination is one trajectory.  An axis of `config` that is not
+        named takes its first value
 
     Returns
     -------
-    Dataset over (trajectory, sample): `time` and the series that the model shows, NaN behind the
-    end of a trajectory; over (trajectory): all that a sweep gives for the cell, from the same run,
-    whose steps the sampling does not touch.
+    Dataset over (trajectory, sample): `time` and the series that the model can show, NaN after the
+    end of a trajectory.  Over (trajectory): all that a sweep gives for the cell, from the very same
+    steps, which the sampling does not change.
+
+    Raises
+    ------
+    ConfigError
+        if the model is a formula, or `at` picks cells that cannot be run.
     """
-    config = as_config(config, {})
-    simulated(config)
+    config = stepwise(as_config(config))
     job = plan(_choose(config, {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}))
     (part,) = job.parts
     start = part.images.copy()
     executor.execute(part.kernel, part.images, stop_when_settled=job.config.integrator.stop_when_settled)
     labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
     summary = labelled.reset_coords(drop=False)
-    # Blocks of one step: a look costs what it shows, not a hundred steps of idle lanes.
-    kernel = Kernel(part.kernel.model, part.kernel.tableau, part.kernel.measure, block=1)
+    # With blocks of one step, advancing to the next sample takes no more steps than lie between the two.
+    assert isinstance(part.kernel, RungeKuttaKernel)  # which is plain enough to stop after each step
+    kernel = part.kernel.stepwise()
     columns = job.grid.columns()
     series = []
     for i in range(len(start)):
@@ -98,7 +105,7 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
 
 
 def _choose(config: Config, at: dict[str, list[float]]) -> Config:
-    """`config` with the cells picked by `at` as its cases; `ConfigError` if they cannot be."""
+    """`config` with the cells picked by `at` as its cases; `ConfigError` if they cannot be run."""
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
         constants |= {name: column[0] for name, column in config.cases.items()}
@@ -116,14 +123,14 @@ def _choose(config: Config, at: dict[str, list[float]]) -> Config:
         name: tuple(dict(zip(at, values, strict=True)).get(name, constant) for values in combinations)
         for name, constant in constants.items()
     }
-    chosen = replace(with_dopri5(config), parameters={}, cases=cases)
+    chosen = replace(config, parameters={}, cases=cases)
     if beyond := off_the_body(chosen):
         raise ConfigError([Fault("--at", None, None, (), beyond)])
     return chosen
 
 
 def _wrong(config: Config, name: str, values: list[float]) -> str:
-    """What is wrong with values asked for a parameter; "" if nothing is."""
+    """What is wrong with the values asked for a parameter; "" if nothing is."""
     model = TIERS[config.model]
     if name not in model.parameters:
         return f"no parameter of the {model.name} model; allowed: {', '.join(model.parameters)}"
@@ -132,9 +139,9 @@ def _wrong(config: Config, name: str, values: list[float]) -> str:
 
 
 def _sample(kernel: Kernel, start: Array, end: Array, every: float) -> dict[str, Array]:
-    """Step the trajectory again to its end, moving its goal from sample to sample.
+    """Step a trajectory again from `start` to its `end`, stopping at each sample.
 
-    The steps are the sweep's own code, so they are the same to the last bit.
+    The steps are the sweep's own, and so equal to the last bit.
     """
     model = kernel.model
     step, steps = float(end[kernel.row("step")]), int(end[kernel.row("done")])
@@ -157,4 +164,5 @@ def _sample(kernel: Kernel, start: Array, end: Array, every: float) -> dict[str,
 
 
 def _interval(model: Model, columns: Columns) -> float:
+    """Time between samples for the body `columns`."""
     return float(1 / (SAMPLES_A_RADIAN * max(fastest_motion(model, columns)[0], 0.1)))

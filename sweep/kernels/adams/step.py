@@ -1,84 +1,147 @@
-"""One step of the method of `adams` as source, for its loop and for its start-up."""
+"""One step of the stiff method, used both in its main loop and in its start-up.
+
+The arithmetic is in `solve`, an ordinary inline function.  Only the sums over the history are generated as text,
+because the slots of the ring have to be known when the code is compiled.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from sweep.kernels.lanes import DIVERGED, LIFT_OFF, PARADOX, count_constants
-from sweep.models.slip_split import SPLIT
+from sweep.jit import inline
+from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
+from sweep.models import friction
+from sweep.models.slip_split import SPLIT, newton, slow
 
 HISTORY = 8
 PREDICTOR_NODES = tuple(-j for j in range(8))
 CORRECTOR_NODES = tuple(1 - j for j in range(9))
 
-# BDF5 and its predictor, the extrapolation of five points; both exact for polynomials of degree 4.
+# BDF5, and its predictor, which extrapolates from five points; both are exact for polynomials of degree 4.
 BDF = (300 / 137, -300 / 137, 200 / 137, -75 / 137, 12 / 137)
 BDF_GAMMA = 60 / 137
 EXTRAPOLATE = (5.0, -10.0, 10.0, -5.0, 1.0)
 
 assert max(len(PREDICTOR_NODES), len(CORRECTOR_NODES) - 1, len(BDF)) == HISTORY
 
+SLOPES = tuple(f"f{{}}_{i}" for i in range(5))
+SLIPS = tuple(f"v{{}}_{i}" for i in range(2))
+POINT = (*SLOPES, *SLIPS)
+"""Quantities of a point of the history, to be formatted with its slot: the slopes of (u, M), and the slip."""
+
+MATRIX = tuple(f"P{i}{j}" for i in range(4) for j in range(4))
+"""Elements of P, the implicit part of the corrector (see `slip_split.implicit`)."""
+
+CONSTANTS = tuple(f"constant.{name}" for name in SPLIT.constants._fields)
+
 At = Callable[[str], str]
-"""Where a quantity of one lane is kept: its name -> an expression that can be read and written."""
+"""Tells where a quantity of one lane is kept: (name) -> an expression that can be read and assigned to."""
+
+
+@inline
+def correct(q: Any, g: Any, f: Any, weight: Any, P: Any) -> Any:
+    """(r, d): the residual r by which the corrector exceeds the rocking states q, and d = P r; four numbers each."""
+    r0, r1 = g[0] + weight * f[0] - q[0], g[1] + weight * f[1] - q[1]
+    r2, r3 = g[2] + weight * f[2] - q[2], g[3] + weight * f[3] - q[3]
+    d0 = P[0] * r0 + P[1] * r1 + P[2] * r2 + P[3] * r3
+    d1 = P[4] * r0 + P[5] * r1 + P[6] * r2 + P[7] * r3
+    d2 = P[8] * r0 + P[9] * r1 + P[10] * r2 + P[11] * r3
+    d3 = P[12] * r0 + P[13] * r1 + P[14] * r2 + P[15] * r3
+    return (r0, r1, r2, r3), (d0, d1, d2, d3)
+
+
+@inline
+def solve(q: Any, g: Any, e: Any, b: Any, p: Any, weight: Any, per_weight: Any, gamma: Any, P: Any) -> Any:
+    """The new point, from the sums over the history.
+
+    Parameters
+    ----------
+    q : predicted (u, M), five numbers
+    g : the corrector for (u, M) without the term of the new slope, five numbers
+    e, b : extrapolated slip, and the BDF formula without the term of the new slope, two numbers each
+    p : constants of `slip_split`
+    weight, per_weight : weight of the new slope in the corrector, and 1/weight
+    gamma : weight of the new slope in the BDF formula
+    P : the implicit part of the corrector, row by row, sixteen numbers
+
+    Returns
+    -------
+    (states, slopes, spin, (num, den) of R, power of friction); the slopes are those that the corrected states imply.
+    """
+    f, geometry = slow(q[0], q[1], q[2], q[3], q[4], e[0], e[1], p)
+    v0, v1, num, den = newton(q[0], q[1], e[0], e[1], geometry, p, gamma, b[0], b[1])
+    _, d = correct(q, g, f, weight, P)
+    q = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4])
+    f, geometry = slow(q[0], q[1], q[2], q[3], q[4], v0, v1, p)
+    r, d = correct(q, g, f, weight, P)
+    states = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4], v0, v1)
+    slopes = (
+        f[0] + (d[0] - r[0]) * per_weight,
+        f[1] + (d[1] - r[1]) * per_weight,
+        f[2] + (d[2] - r[2]) * per_weight,
+        f[3] + (d[3] - r[3]) * per_weight,
+        f[4],
+    )
+    spin = q[0] * geometry.w1 + q[1] * geometry.w2 + geometry.u3 * geometry.w3
+    return states, slopes, spin, (num, den), power(num, den, v0, v1, geometry, p)
+
+
+@inline
+def power(num: Any, den: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
+    """Power of friction at a point with slip (v1, v2) and normal force num/den."""
+    v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
+    return friction.dissipation(num / den, v1, v2, v3, p)
+
+
+NAMES = {"solve": solve, "Constants": SPLIT.constants}
+"""The names to which the generated lines refer."""
 
 
 def load_lines(at: At) -> list[str]:
-    """Constants p and states y0 … y6."""
-    constants = " ".join(at(f"constant{i}") + "," for i in range(count_constants(SPLIT)))
-    return [f"p = ({constants})", *(f"y{i} = {at(name)}" for i, name in enumerate(SPLIT.states))]
+    """Lines that load the constants p and the states y."""
+    constants, states = (" ".join(f"{at(name)}," for name in names) for names in (CONSTANTS, SPLIT.states))
+    return [f"p = Constants({constants})", f"y = ({states})"]
 
 
 def step_lines(at: At, slots: Sequence[int]) -> list[str]:
-    """From p and y: the next (u, M) as c0 … c4, slip v0, v1, slopes f, r and d of `store_lines`, num and den of R.
+    """Lines that compute new, slopes, spin, (num, den) and power, as `solve` returns them, from p and y.
 
-    `slots` : where the history lies, newest first: slopes f{slot}_0 … 4 and slips v{slot}_0, 1
+    They also set `sound` and `accepted`.  `slots` are those of the history, newest first, with the slopes in
+    f{slot}_0 … 4 and the slip in v{slot}_0, 1.
     """
-    lines = [f"q{i} = g{i} = y{i}" for i in range(5)]
+    lines = [f"q{i} = g{i} = y[{i}]" for i in range(5)]
     lines += ["e0 = e1 = b0 = b1 = 0.0"]
     for j, slot in enumerate(slots):
         lines += [f"wp, wc = {at(f'predict{j}')}, {at(f'correct{j + 1}')}"]
         for i in range(5):
-            lines += [f"f = {at(f'f{slot}_{i}')}", f"q{i} += wp * f", f"g{i} += wc * f"]
+            lines += [f"f = {at(SLOPES[i].format(slot))}", f"q{i} += wp * f", f"g{i} += wc * f"]
         if j < len(BDF):
             for i in range(2):
-                value = at(f"v{slot}_{i}")
+                value = at(SLIPS[i].format(slot))
                 lines += [f"e{i} += {EXTRAPOLATE[j]!r} * {value}", f"b{i} += {BDF[j]!r} * {value}"]
+    weights = f"{at('correct0')}, {at('per_weight')}, {at('gamma')}, ({' '.join(f'{at(name)},' for name in MATRIX)})"
     return [
         *lines,
-        f"w0 = {at('correct0')}",
-        "f, geometry = slow(q0, q1, q2, q3, q4, e0, e1, p)",
-        f"v0, v1, num, den = newton(q0, q1, e0, e1, geometry, p, {at('gamma')}, b0, b1)",
-        *_correct_lines(at),
-        *(f"q{i} = q{i} + d{i}" for i in range(4)),
-        "q4 = g4 + w0 * f[4]",
-        "f, geometry = slow(q0, q1, q2, q3, q4, v0, v1, p)",
-        *_correct_lines(at),
-        *(f"c{i} = q{i} + d{i}" for i in range(4)),
-        "c4 = g4 + w0 * f[4]",
+        "q, g, e, b = (q0, q1, q2, q3, q4), (g0, g1, g2, g3, g4), (e0, e1), (b0, b1)",
+        f"new, slopes, spin, (num, den), power = solve(q, g, e, b, p, {weights})",
+        "sound = (num > 0.0) & (den > 0.0)",
+        "accepted = active & sound",
     ]
 
 
-def _correct_lines(at: At) -> list[str]:
-    """r = what the corrector asks beyond q, d = P r for the four rocking states."""
-    lines = [f"r{i} = g{i} + w0 * f[{i}] - q{i}" for i in range(4)]
-    products = [[at(f"P{i}{j}") + f" * r{j}" for j in range(4)] for i in range(4)]
-    return lines + [f"d{i} = {' + '.join(products[i])}" for i in range(4)]
-
-
 def store_lines(at: At, slot: int) -> list[str]:
-    """The new point into `slot` of the history; its slopes are those that the corrected states imply."""
+    """Lines that write the new point to `slot` of the history."""
     return [
-        *(f"{at(f'f{slot}_{i}')} = f[{i}] + (d{i} - r{i}) * {at('per_weight')}" for i in range(4)),
-        f"{at(f'f{slot}_4')} = f[4]",
-        *(f"{at(f'v{slot}_{i}')} = v{i}" for i in range(2)),
+        *(f"{at(name.format(slot))} = slopes[{i}]" for i, name in enumerate(SLOPES)),
+        *(f"{at(name.format(slot))} = new[{5 + i}]" for i, name in enumerate(SLIPS)),
     ]
 
 
 def accept_lines(at: At) -> list[str]:
-    """The new states where `accepted`; a status that says what failed where `active` but not `sound`."""
+    """Lines that write the new states if `accepted`, and the status of a failure if `active` but not `sound`."""
     return [
-        *(f"{at(SPLIT.states[i])} = c{i} if accepted else y{i}" for i in range(5)),
-        *(f"{at(SPLIT.states[5 + i])} = v{i} if accepted else y{5 + i}" for i in range(2)),
+        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(SPLIT.states)),
         f"failure = {PARADOX} if den <= 0.0 else ({LIFT_OFF} if num <= 0.0 else {DIVERGED})",
         f"{at('status')} = failure if active & (not sound) else status",
     ]

@@ -1,13 +1,13 @@
 """Weights of the Adams formulas, exact for powers and for the fastest rocking and its third harmonic.
 
-A formula on k nodes has k - 4 powers to be exact for and the pairs cos, sin of θ t and of 3 θ t, with θ the
-phase of the rocking in one step.  Its weights are those of the plain formula, exact for k powers, and
-a combination of the four that add nothing to the powers below k - 4:
+A formula on k nodes is to be exact for k - 4 powers of t, and for cos and sin of θ t and of 3 θ t, where θ is the
+phase of the rocking in one step.  Its weights are those of the plain formula, which is exact for k powers, plus a
+combination of four vectors that contribute nothing to the powers below k - 4:
 
-    w = w_plain + N c,   Σ_j t_j^q N_jr = δ_(q, k-4+r),
+    w = w_plain + N c,   Σ_j t_j^q N_jr = δ_(q, k-4+r).
 
-so that four unknowns are left, with coefficients that are power series in θ² whose terms depend on the
-nodes alone.  These are formed once, in fractions; a cell costs 20 polynomials and the elimination.
+So four unknowns c are left.  The coefficients of their equations are power series in θ² whose terms depend only on
+the nodes.  The terms are computed once, in exact fractions; a cell then costs 20 polynomials and the elimination.
 """
 
 from __future__ import annotations
@@ -20,28 +20,29 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import serial
-from sweep.kernels.lanes import LANES
-from sweep.kernels.stepper import compile_lanes
+from sweep.kernels.codegen import compile_lanes
+from sweep.kernels.layout import LANES
 from sweep.models.model import Array
 
 HARMONIC = 3
 
-# Terms of the series in θ²: rounding alone is left up to θ = 0.6, on nodes up to eight steps back.
+# Number of terms of the series in θ²: enough to leave only rounding errors up to θ = 0.6, on nodes up to eight
+# steps back.
 _TERMS = 30
 
 
 def plain_weights(nodes: tuple[int, ...]) -> Array:
-    """Weights w with ∫_0^1 p(t) dt = Σ w_j p(nodes_j), exact for powers below k, shape (k,)."""
+    """Weights w with ∫_0^1 p(t) dt = Σ w_j p(nodes_j) for all powers below k, shape (k,)."""
     return _tables(nodes)[0]
 
 
 def fitted_weights(nodes: tuple[int, ...], phase: Array) -> Array:
-    """Weights w with ∫_0^1 p(t) dt = Σ w_j p(nodes_j), exact for k - 4 powers and two frequencies.
+    """Weights w with ∫_0^1 p(t) dt = Σ w_j p(nodes_j) for k - 4 powers and two frequencies.
 
     Parameters
     ----------
-    nodes : k abscissae in steps
-    phase : θ, the lower frequency times the step, shape (cells,); zero gives the plain weights
+    nodes : k abscissae, in steps
+    phase : θ, the lower of the two frequencies times the step, shape (cells,); zero gives the plain weights
 
     Returns
     -------
@@ -54,11 +55,11 @@ def fitted_weights(nodes: tuple[int, ...], phase: Array) -> Array:
 
 @cache
 def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
-    """Plain weights (k,), N (k, 4) and the series in θ² of the four equations for c, shape (terms, 4 · 5).
+    """Plain weights (k,), N (k, 4), and the series in θ² of the four equations for c, shape (terms, 4 · 5).
 
-    cos and sin enter with their Taylor part removed, the first as Σ_m a_m θ^(2m) t^(n + 2m) with
-    a_m = (-1)^m n! / (n + 2m)!, n = k - 4, and the harmonic as a divided difference in θ², divided by
-    a_1: so the equations become c = 0 as θ goes to zero.
+    cos and sin enter with the part of their Taylor series removed that is met anyway: those of θ t as
+    Σ_m a_m θ^(2m) t^(n + 2m), with a_m = (-1)^m n! / (n + 2m)! and n = k - 4 or k - 3, and those of the harmonic as a
+    divided difference in θ², divided by a_1.  In this form the equations become c = 0 as θ goes to zero.
     """
     k = len(nodes)
     inverse = _invert([[F(t) ** q for t in nodes] for q in range(k)])
@@ -66,7 +67,7 @@ def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
     null = [row[k - 4 :] for row in inverse]
 
     def moments(q: int) -> list[F]:
-        """Σ t^q N, and what the plain weights miss of ∫ t^q."""
+        """Σ t^q N, and the part of ∫ t^q that the plain weights miss."""
         powers = [F(t) ** q for t in nodes]
         sums = [sum((t * row[r] for t, row in zip(powers, null, strict=True)), F(0)) for r in range(4)]
         return [*sums, F(1, q + 1) - sum((t * w for t, w in zip(powers, plain, strict=True)), F(0))]
@@ -84,7 +85,7 @@ def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
 
 
 def _invert(matrix: list[list[F]]) -> list[list[F]]:
-    """Inverse by Gauss and Jordan; the pivots of a Vandermonde matrix of distinct nodes may still vanish."""
+    """Inverse by Gauss-Jordan elimination, with a choice of pivots, as these may vanish even for distinct nodes."""
     n = len(matrix)
     rows = [[*row, *(F(int(i == j)) for j in range(n))] for i, row in enumerate(matrix)]
     for r in range(n):
@@ -98,8 +99,10 @@ def _invert(matrix: list[list[F]]) -> list[list[F]]:
 
 
 def _solve_lines() -> list[str]:
-    """Gauss and Jordan for one lane's equations `A`.  Without pivoting: up to θ = 0.6 the diagonal stays
-    away from zero."""
+    """Gauss-Jordan elimination for the equations `A` of one lane.
+
+    It does without pivoting, because up to θ = 0.6 the diagonal stays away from zero.
+    """
     lines = [f"a{r}{s} = A[{(5 * r + s) * LANES} + lane]" for r in range(4) for s in range(5)]
     for r in range(4):
         lines += [f"a{r}{s} = a{r}{s} / a{r}{r}" for s in range(4, r, -1)]
@@ -108,11 +111,12 @@ def _solve_lines() -> list[str]:
 
 
 def _make_fit() -> Callable[..., None]:
+    """Compiled (θ², plain weights, N, series, weights) -> None: writes the fitted weights of all cells to `weights`."""
     terms = [f"A[{i * LANES} + lane] = A[{i * LANES} + lane] * x[lane] + terms[{i}]" for i in range(20)]
     sums = ["w[lane] = plain" + "".join(f" + null[{r}] * c[{r * LANES} + lane]" for r in range(4))]
-    horner = compile_lanes("horner", "A, x, terms", terms, LANES, {})
-    solve = compile_lanes("solve", "A, c", _solve_lines(), LANES, {})
-    combine = compile_lanes("combine", "w, c, plain, null", sums, LANES, {})
+    horner = compile_lanes("horner", "A, x, terms", terms, {})
+    solve = compile_lanes("solve", "A, c", _solve_lines(), {})
+    combine = compile_lanes("combine", "w, c, plain, null", sums, {})
 
     def fit(squares: Any, plain: Any, null: Any, series: Any, weights: Any) -> None:
         cells = len(squares)

@@ -1,0 +1,37 @@
+"""What can be measured on a trajectory, one file per measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from sweep.kernels.measures.energy import EnergyError
+from sweep.kernels.measures.first_reversal import FirstReversal
+from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.noise import NoiseLimited
+from sweep.kernels.measures.reversal_times import ReversalTimes
+from sweep.kernels.measures.reversals import Reversals
+from sweep.models.model import Tier
+
+MEASURES: dict[str, type[Measurement]] = {
+    kind.name: kind for kind in (Reversals, EnergyError, FirstReversal, NoiseLimited, ReversalTimes)
+}
+
+
+def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
+    """The measurements for specs such as "reversals" or "reversal_times=12", in the order of `MEASURES`."""
+    settings = {name: value for name, _, value in (spec.partition("=") for spec in specs)}
+    return tuple(
+        kind(int(settings[name])) if settings[name] else kind()  # type: ignore[call-arg]
+        for name, kind in MEASURES.items()
+        if name in settings
+    )
+
+
+def possible(tier: Tier) -> tuple[str, ...]:
+    """Names of the measurements that a model supports."""
+    return tuple(name for name, kind in MEASURES.items() if kind.asks in tier.offers)
+
+
+def default(tier: Tier) -> tuple[str, ...]:
+    """Specs of the measurements that are made on a model if the configuration names none."""
+    return tuple(MEASURES[name]().spec for name in possible(tier) if MEASURES[name].by_default)

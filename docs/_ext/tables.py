@@ -1,0 +1,180 @@
+"""Tables of the reference, made from the sources that the program itself reads.
+
+Each directive is named after its table and takes no arguments: see `setup`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, get_args
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+from sweep.config import schema
+from sweep.kernels import measures, methods
+from sweep.kernels.status import FAILURES
+from sweep.models import TIERS
+from sweep.models.model import Model
+from sweep.parameters import PARAMETERS
+from sweep.results import dataset
+
+Row = tuple[str, ...]
+
+
+def _parameters() -> tuple[Row, list[Row]]:
+    rows = [
+        (
+            f"`{p.path}`",
+            p.long_name,
+            "rad" if p.units == "radian" else p.units,
+            "required" if p.default is None else f"{p.default:g}",
+            p.allowed,
+        )
+        for p in PARAMETERS.values()
+    ]
+    return ("name", "meaning", "unit", "default", "allowed"), rows
+
+
+# A setting's meaning; everything else in its row is read from the schema.
+_MEANINGS = {
+    "name": "name of the run and of its files; by default that of the configuration file",
+    "model": "which {ref}`model <models>` to integrate",
+    "cases": "CSV table with a column for each parameter and a row for each trajectory, instead of axes",
+    "integrator.method": "integration method; `auto` chooses the faster one for each cell",
+    "integrator.step": "fixed step in $\\sqrt{c/g}$, or `auto`",
+    "integrator.tolerance": "error in spin, at $t = 400$, that an automatic step keeps to",
+    "integrator.t_end": "time limit in $\\sqrt{c/g}$",
+    "integrator.stop_when_settled": "whether a trajectory ends when neither spin nor count can change any more",
+    "measure": "what to compute, of the {ref}`measurements <measurements>`; by default those marked there",
+    "verify": "share of the cells, drawn at random, to run again with finer steps",
+    "refine": "size of the largest blocks of a refined map, as a power of two; 0 simulates every cell",
+    "max_failed_fraction": "share of failed cells from which on the command exits with 3",
+}
+
+
+def _settings() -> tuple[Row, list[Row]]:
+    fields: dict[str, Any] = {}
+    for name, field in schema.Schema.model_fields.items():
+        if name == "integrator":
+            fields |= {f"integrator.{key}": f for key, f in schema.Integrator.model_fields.items()}
+        elif name not in schema.SECTIONS:
+            fields[name] = field
+    if missing := fields.keys() ^ _MEANINGS.keys():
+        raise ValueError(f"settings without a meaning here, or meanings without a setting: {sorted(missing)}")
+    rows = [(f"`{name}`", _MEANINGS[name], _default(f), _allowed(f)) for name, f in fields.items()]
+    return ("name", "meaning", "default", "allowed"), rows
+
+
+def _default(field: Any) -> str:
+    value = field.default
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if value is None or value == "":
+        return ""
+    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+
+
+def _allowed(field: Any) -> str:
+    signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+    bounds = [
+        f"{sign} {getattr(bound, kind):g}"
+        for bound in field.metadata
+        for kind, sign in signs.items()
+        if hasattr(bound, kind)
+    ]
+    if bounds:
+        return ", ".join(bounds)
+
+    def names(annotation: Any) -> Iterable[str]:
+        for part in get_args(annotation):
+            if isinstance(part, str):
+                yield f"`{part}`"
+            else:
+                yield from names(part)
+
+    return ", ".join(names(field.annotation))
+
+
+def _variables() -> tuple[Row, list[Row]]:
+    rows = []
+    for name, spec in dataset.VARIABLES.items():
+        words = spec.long_name
+        if spec.flags:
+            words += ": " + ", ".join(f"{code} {flag}" for code, flag in spec.flags.items())
+        over = "all but the start's" if spec.per_body else "all"
+        rows.append((f"`{name}`", spec.dtype, over, words))
+    for name, spec in dataset.VERIFIED.items():
+        rows.append((f"`verified_{name}`", spec.dtype, "`verified`", spec.long_name))
+    return ("variable", "type", "axes", "meaning"), rows
+
+
+_STATUS_MEANINGS = {
+    "not_run": "not simulated",
+    "settled": "upright spin is stable, and the rattle left can change neither that nor the count",
+    "time_limit": "`t_end` was reached first",
+    "lift_off": "the normal force fell to zero: the body leaves the plane",
+    "diverged": "the step was too long; the numbers are worth nothing",
+    "paradox": "Painlevé's paradox: no contact force solves the equations",
+}
+
+
+def _statuses() -> tuple[Row, list[Row]]:
+    failures = {dataset.STATUSES[code] for code in FAILURES}
+    rows = [
+        (str(code), f"`{name}`", _STATUS_MEANINGS[name], "yes" if name in failures else "no")
+        for code, name in dataset.STATUSES.items()
+    ]
+    return ("code", "status", "meaning", "counts as failed"), rows
+
+
+def _measurements() -> tuple[Row, list[Row]]:
+    rows = []
+    for name, kind in measures.MEASURES.items():
+        needs = ", ".join(f"`{n}`" for n in kind.needs)
+        rows.append((f"`{name}`", kind.summary, needs, "yes" if kind.by_default else "no"))
+    return ("measurement", "what it is", "needs", "by default"), rows
+
+
+def _methods() -> tuple[Row, list[Row]]:
+    rows = []
+    for method in methods.METHODS.values():
+        models = "all" if method.models is None else ", ".join(f"`{m}`" for m in sorted(method.models))
+        rows.append((f"`{method.name}`", method.summary, models))
+    return ("method", "what it is", "models"), rows
+
+
+def _models() -> tuple[Row, list[Row]]:
+    rows = []
+    for tier in TIERS.values():
+        used = ", ".join(f"`{m}`" for m in methods.allowed(tier)) if isinstance(tier, Model) else "a formula: none"
+        states = ", ".join(f"`{s}`" for s in tier.states) if isinstance(tier, Model) else ""
+        possible = ", ".join(f"`{m}`" for m in measures.possible(tier))
+        rows.append((f"`{tier.name}`", tier.summary, states, used, possible))
+    return ("model", "what it is", "states", "methods", "measures"), rows
+
+
+def _directive(make: Callable[[], tuple[Row, list[Row]]]) -> type[SphinxDirective]:
+    class Table(SphinxDirective):
+        def run(self) -> list[nodes.Node]:
+            head, rows = make()
+            lines = ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in (head, *rows)]
+            lines.insert(1, "|" + "---|" * len(head))
+            return self.parse_text_to_nodes("\n".join(lines))
+
+    return Table
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    for name, make in (
+        ("parameters", _parameters),
+        ("settings", _settings),
+        ("variables", _variables),
+        ("statuses", _statuses),
+        ("measurements", _measurements),
+        ("methods", _methods),
+        ("models", _models),
+    ):
+        app.add_directive(name, _directive(make))
+    return {"parallel_read_safe": True}

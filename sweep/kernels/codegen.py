@@ -1,0 +1,79 @@
+"""Generates source: straight-line code on scalars, under file names that tracebacks and debuggers can find.
+
+A loop over states would need arrays, and arrays inside the loop over lanes prevent LLVM from vectorising across
+trajectories.  So whatever depends on the number of states, or on a list of functions, is written out.
+`python -m sweep.kernels.source METHOD MODEL` prints the source that is generated for a kernel.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import linecache
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numba
+
+from sweep.jit import OPTIONS, inline
+from sweep.kernels.layout import LANES
+
+PREFIX = "<sweep "
+"""Beginning of the file names of generated sources."""
+
+
+def make_load(names: Sequence[str], layout: Any, record: Any = None) -> Any:
+    """Compiled (group, lane) -> the quantities `names` of one lane, as a tuple or as the `NamedTuple` `record`."""
+    values = " ".join(f"group[{layout.at(name)} + lane]," for name in names)
+    made = f"record({values})" if record else f"({values})"
+    return compile_inline("load", f"def load(group, lane):\n    return {made}", {"record": record})
+
+
+def make_store(names: Sequence[str], layout: Any) -> Any:
+    """Compiled (group, lane, keep, new, old) -> None: sets the quantities `names` to `new` if `keep`, else to `old`."""
+    lines = [f"    group[{layout.at(name)} + lane] = new[{i}] if keep else old[{i}]" for i, name in enumerate(names)]
+    return compile_inline("store", "\n".join(["def store(group, lane, keep, new, old):", *lines]), {})
+
+
+def make_rest(n_states: int, spin_state: int) -> Any:
+    """Compiled (states) -> states with the same spin and no rattle."""
+    rest = tuple_of(f"y[{i}]" if i == spin_state else "0.0" for i in range(n_states))
+    return compile_inline("rest", f"def rest(y):\n    return {rest}", {})
+
+
+def call_all(name: str, arguments: str, functions: Sequence[Any]) -> Any:
+    """Compiled (arguments) -> None: calls each of `functions`; if there is none, it leaves no instruction behind."""
+    calls = [f"    f{i}({arguments})" for i in range(len(functions))] or ["    pass"]
+    names = {f"f{i}": function for i, function in enumerate(functions)}
+    return compile_inline(name, "\n".join([f"def {name}({arguments}):", *calls]), names)
+
+
+def all_true(name: str, arguments: str, functions: Sequence[Any]) -> Any:
+    """Compiled (arguments) -> bool: whether each of `functions` is true; True if there is none."""
+    calls = " & ".join(f"f{i}({arguments})" for i in range(len(functions))) or "True"
+    names = {f"f{i}": function for i, function in enumerate(functions)}
+    return compile_inline(name, f"def {name}({arguments}):\n    return {calls}", names)
+
+
+def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]) -> Any:
+    """Compiled (arguments) -> None: runs `lines` for each lane.
+
+    The lines are the body of the loop itself.  If they were a function of their own, LLVM would unroll the loop over
+    lanes before inlining it, and nothing would be vectorised.
+    """
+    source = [f"def {name}({arguments}):", f"    for lane in range({LANES}):", *(f"        {line}" for line in lines)]
+    return numba.njit(compile_inline(name, "\n".join(source), names), **OPTIONS)
+
+
+def compile_inline(name: str, source: str, names: dict[str, Any]) -> Any:
+    """Compile generated source that may use `names`.  Equal sources have equal file names in every process."""
+    digest = hashlib.sha256(source.encode()).hexdigest()[:16]
+    filename = f"{PREFIX}{name} {digest}>"
+    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    namespace = dict(names)
+    exec(compile(source, filename, "exec"), namespace)
+    return inline(namespace[name])
+
+
+def tuple_of(items: Iterable[str]) -> str:
+    """The source of a tuple."""
+    return f"({' '.join(item + ',' for item in items)})"

@@ -1,0 +1,164 @@
+"""What the kernels of all methods share: many trajectories advance side by side, each to its own end.
+
+The whole state of a trajectory is its *image*, one row of a table: states, constants, step, progress and
+measurements.  `advance` takes a table and a list of unfinished cells, and advances each cell by a number of
+blocks of steps.  Nothing is remembered outside the table, so writing it to disk is a checkpoint.  Every image
+evolves by itself, block after block, so the numbers cannot depend on which thread, group, lane or call
+handled a cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from inspect import getfile
+from typing import Any
+
+import numba
+import numpy as np
+
+from sweep.jit import is_cached, parallel
+from sweep.kernels.codegen import all_true, call_all
+from sweep.kernels.lanes import STABLE, Look, make_advance, make_look
+from sweep.kernels.layout import Layout, Table
+from sweep.kernels.measures.measurement import Measurement
+from sweep.models.model import Array, Columns, Model, stack
+
+_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", *STABLE)
+
+
+class Kernel:
+    """The layout of the images, and the compiled loop around a block of steps.
+
+    Each method has a subclass, whose constructor calls `_lay_out` and `_compile_with`
+    (see `sweep.kernels.method`).
+    """
+
+    # Friction only takes energy away.  If a body gains more than this share from one look to the next, the
+    # integration has gone wrong.  Over 40 bodies at 0.3 to 2 times the stability limit, 1e-5 (together with the
+    # check of failures at a look) caught every spin that was off by more than 1e-4, and none that was right
+    # to 1e-6.
+    energy_gain = 1e-5
+
+    model: Model
+    layout: Layout
+    measurements: tuple[Measurement, ...]
+
+    def _lay_out(self, model: Model, measurements: Sequence[Measurement], more: Iterable[str] = ()) -> None:
+        """Name the quantities of an image: states, constants, what every kernel needs, measurements, and `more`."""
+        self.model, self.measurements = model, tuple(measurements)
+        self.constants = tuple(f"constant.{name}" for name in model.constants._fields)
+        measured = (row for each in self.measurements for row in each.rows)
+        self.layout = Layout((*model.states, *self.constants, *_BASE, *measured, *more))
+
+    @property
+    def measure(self) -> tuple[str, ...]:
+        """The specs of the measurements."""
+        return tuple(each.spec for each in self.measurements)
+
+    @property
+    def follows_work(self) -> bool:
+        """Whether a measurement needs the work of friction in each step."""
+        return any(each.follows_work for each in self.measurements)
+
+    def _make_watch(self) -> Any:
+        """Inline function of what all measurements do after a step, with the arguments of `Measurement.make_step`."""
+        hooks = [hook for each in self.measurements if (hook := each.make_at_reversal(self.layout))]
+        at_reversal = call_all("at_reversal", "group, lane, reverses, count, crossing", hooks)
+        steps = [step for each in self.measurements if (step := each.make_step(self.layout, at_reversal))]
+        return call_all("watch", "group, lane, accepted, spin, spin_integral, work, h, now", steps)
+
+    def _compile_with(self, run_block: Any, method: str) -> None:
+        """Set up `advance` around `run_block`, compiled (group) -> None; `method` names the method in the cache."""
+        settles = [f for each in self.measurements if (f := each.make_may_settle(self.layout))]
+        looks = [f for each in self.measurements if (f := each.make_look(self.layout))]
+        look = Look(
+            may_settle=all_true("may_settle", "group, lane, spin, at_rest", settles),
+            measure=call_all("measure", "group, lane, running, ended, spin, rattle, inertia, total", looks),
+            energy_gain=self.energy_gain,
+        )
+        advance = make_advance(run_block, make_look(self.model, self.constants, self.layout, look), self.layout)
+        name = f"{self.model.name}-{method}-{'+'.join(self.measure)}"
+        self._advance = parallel(advance, name, getfile(self.model.rhs))
+
+    def row(self, name: str) -> int:
+        """Index of the column of the images that holds a quantity."""
+        return self.layout.row(name)
+
+    def table(self, images: Array) -> Table:
+        """`images`, accessed by the names of their quantities."""
+        return Table(images, self.layout)
+
+    def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
+        """Images of trajectories at t = 0, shape (cells, rows).
+
+        Parameters
+        ----------
+        columns : physical parameters by name, each of shape (cells,)
+        step : the longest step wanted, in sqrt(c/g), shape (cells,)
+        t_end : time limit in sqrt(c/g), a number or of shape (cells,)
+        stable : lower and upper ends of the ranges of spin in which the rattle decays: about zero, the
+            next range below, and the next above; shape (6, cells).  NaN where there is no such range;
+            by default there is none anywhere
+        """
+        raise NotImplementedError
+
+    def _start(
+        self, columns: Columns, step: Array, goal: Array, stable_step: Array | bool, stable: Array | None
+    ) -> Array:
+        """Images at t = 0, with all quantities set that do not start at zero, except those of the method."""
+        states, constants = stack(self.model.start(columns)), self.model.constants.of(columns)
+        images = np.zeros((len(step), len(self.layout.names)))
+        table = self.table(images)
+        images[:, : len(states)] = states.T
+        for name, values in zip(self.constants, constants, strict=True):
+            table[name] = values
+        spin, rattle, inertia = self.model.energy(states, constants)
+        table["goal"], table["stable_step"], table["step"] = goal, stable_step, step
+        table["energy_start"] = table["energy"] = rattle + 0.5 * inertia * spin**2
+        for name, row in zip(STABLE, np.full((6, len(step)), np.nan) if stable is None else stable, strict=True):
+            table[name] = row
+        for each in self.measurements:
+            for name, values in each.start(columns, step, rattle).items():
+                table[name] = values
+        return images
+
+    def advance(self, images: Array, cells: Array, blocks: int, stop_when_settled: bool) -> None:
+        """Advance the trajectories `cells` (indices into `images`), in place.
+
+        Returns after `blocks` blocks of steps in every lane, or earlier when all cells have ended.
+        """
+        self._advance(images, cells, blocks, stop_when_settled, numba.get_num_threads())
+
+    def carry(self, images: Array) -> None:
+        """Carry the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""
+
+    def states(self, images: Array) -> Array:
+        """The states, shape (states, cells)."""
+        return images[:, : len(self.model.states)].T
+
+    def unpack(self, images: Array) -> tuple[Array, Any]:
+        """The states, shape (states, cells), and the constants by name, each of shape (cells,)."""
+        table = self.table(images)
+        return self.states(images), self.model.constants(*(table[name] for name in self.constants))
+
+    def times(self, images: Array, t_end: float | Array) -> Array:
+        """Times that the images have reached, in sqrt(c/g), shape (cells,)."""
+        table = self.table(images)
+        return np.asarray(table["done"] / table["goal"] * t_end)
+
+    def is_compiled(self) -> bool:
+        """Whether the first call of `advance` will find machine code, in memory or on disk."""
+        return bool(self._advance.signatures) or is_cached(self._advance, _SIGNATURE)
+
+    def compile(self) -> None:
+        """Compile `advance`, or load it from disk, so that no timing of a run includes that."""
+        self._advance.compile(_SIGNATURE)
+
+
+_SIGNATURE = (
+    numba.float64[:, ::1],
+    numba.int64[::1],
+    numba.int64,
+    numba.boolean,
+    numba.int64,
+)

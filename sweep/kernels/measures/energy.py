@@ -1,0 +1,69 @@
+"""The energy balance: the work of friction has to account for all the energy that is lost.
+
+dE/dt = -μ R |v_p|² holds exactly, so a violation is an error that a run measures by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.kernels.layout import BLOCK, Layout, Table
+from sweep.kernels.measures.measurement import Measurement, Stretch
+from sweep.models.model import ENERGY, Array
+from sweep.variables import Variable
+
+
+@dataclass(frozen=True)
+class EnergyError(Measurement):
+    name = "energy_error"
+    summary = "largest violation of the energy balance: an error that a run measures by itself"
+    asks = ENERGY
+    by_default = True
+    follows_work = True
+    rows = ("work", "violation")
+
+    variables = {
+        "energy_error": Variable(
+            "float64",
+            "1",
+            f"largest violation of the energy balance, looked at every {BLOCK} steps, "
+            "relative to the start energy above rest",
+            of_sound_runs=True,
+        )
+    }
+
+    def make_step(self, layout: Layout, at_reversal: Any) -> Any:
+        WORK = layout.at("work")
+
+        @inline
+        def step(
+            group: Any, lane: int, accepted: Any, spin: Any, spin_integral: Any, work: Any, h: Any, now: Any
+        ) -> None:
+            group[WORK + lane] += work if accepted else 0.0
+
+        return step
+
+    def make_look(self, layout: Layout) -> Any:
+        WORK, VIOLATION, START = map(layout.at, (*self.rows, "energy_start"))
+
+        @inline
+        def look(
+            group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, inertia: Any, total: Any
+        ) -> None:
+            violation = abs(total + group[WORK + lane] - group[START + lane])
+            worst = group[VIOLATION + lane]
+            group[VIOLATION + lane] = violation if violation > worst else worst
+
+        return look
+
+    def skip(self, table: Table, stretch: Stretch) -> None:
+        table["work"] += stretch.work
+
+    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
+        start, violation = table["energy_start"], table["violation"]
+        return {"energy_error": np.divide(violation, start, out=violation.copy(), where=start > 0)}

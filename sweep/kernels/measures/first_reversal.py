@@ -1,0 +1,46 @@
+"""The time of the first reversal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.kernels.layout import Layout, Table
+from sweep.kernels.measures.measurement import Measurement
+from sweep.models.model import SPIN, Array, Columns
+from sweep.variables import Variable
+
+
+@dataclass(frozen=True)
+class FirstReversal(Measurement):
+    name = "first_reversal"
+    summary = "time of the first reversal"
+    asks = SPIN
+    needs = ("reversals",)
+    rows = ("first_reversal",)
+
+    variables = {
+        "t_first_reversal": Variable(
+            "float64", "1", "time of the first spin reversal, in sqrt(c/g)", of_sound_runs=True
+        )
+    }
+
+    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+        return {"first_reversal": np.nan}
+
+    def make_at_reversal(self, layout: Layout) -> Any:
+        FIRST = layout.at("first_reversal")
+
+        @inline
+        def at_reversal(group: Any, lane: int, reverses: Any, count: Any, crossing: Any) -> None:
+            first = reverses & (count == 1.0)
+            group[FIRST + lane] = crossing if first else group[FIRST + lane]
+
+        return at_reversal
+
+    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
+        return {"t_first_reversal": table["first_reversal"]}

@@ -1,0 +1,162 @@
+"""What a measurement is, and how to add one.
+
+Subclass `Measurement` in a file of its own and enter the class in `MEASURES` of `sweep.kernels.measures`.  The
+configuration, the kernels of all methods, the dataset and the plots then know it.  `first_reversal` is the shortest
+example.
+
+A measurement keeps its numbers in quantities of its own in each image, named by `rows`.  It fills and reads them in
+hooks, all of which are optional:
+
+    start              once, when the images are made
+    make_step          for one lane after every step
+    make_at_reversal   for one lane after every step, by way of the measurement `reversals`
+    make_may_settle    for one lane at every look, before it is decided whether the trajectory ends
+    make_look          for one lane at every look, after that decision
+    skip               for many images, when they have covered a stretch without steps
+    mode_lost          for many images, when the lift of a mode has failed
+    read               once, when the trajectories have ended
+
+A hook `make_…` is itself called once, when the kernel is made.  It returns None, or a function marked
+`sweep.jit.inline`, which becomes part of the compiled loop and is called as listed.  That happens for every lane, even
+one that is idle or has ended, so the function has to leave the quantities alone where its arguments say that nothing
+counts.  After a step it has to do so by conditional expressions rather than branches, so that the loop over lanes
+stays vectorised.  A quantity of the lane is `group[layout.at("name") + lane]`.  In `skip`, `mode_lost` and `read` a
+quantity is `table["name"]`, of shape (images,).
+
+What a run does not measure takes no place in its images and leaves no instruction in its kernel.
+
+Units: times in sqrt(c/g), spins in sqrt(g/c), energies in m g c.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from sweep.kernels.layout import Layout, Table
+from sweep.models.model import Array, Columns
+from sweep.variables import Variable
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of time that images have covered without steps of the kernel; arrays of shape (images,)."""
+
+    time: Array
+    """Length of the stretch."""
+    mean_spin: Array
+    """Spin averaged over the stretch."""
+    spin: Array
+    """Spin at its end."""
+    work: Array
+    """Work of friction during the stretch: the energy that it has dissipated."""
+    mode_energies: Array | None
+    """Energies of the slower and the faster mode at its end, shape (images, 2); None if the modes are not resolved."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A measurement that a configuration can ask for."""
+
+    name: ClassVar[str]
+    """As in the configuration."""
+    summary: ClassVar[str]
+    """What it is, in one line for the documentation."""
+    asks: ClassVar[str]
+    """What a model has to offer for it: `COUNT`, `SPIN`, `ENERGY`, `MODES` or `FORMULAS` of `sweep.models.model`."""
+    needs: ClassVar[tuple[str, ...]] = ()
+    """Names of the measurements that it builds upon; a configuration has to ask for them too.  A measurement that
+    implements `make_at_reversal` needs "reversals"."""
+    by_default: ClassVar[bool] = False
+    """Whether it is made if the configuration names no measurement, provided that the model supports it."""
+    follows_work: ClassVar[bool] = False
+    """Whether it uses the work of friction in each step, which some methods compute only on request."""
+    variables: ClassVar[Mapping[str, Variable]] = {}
+    """The variables that it adds to the dataset, by name; `read` returns their values."""
+    bounds: ClassVar[tuple[int, int] | None] = None
+    """Smallest and largest value of its setting, an integer, which is then the only field of the dataclass; None if
+    it has no setting."""
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the quantities that it adds to an image.  They start at zero, except those that `start` sets."""
+        return ()
+
+    @property
+    def spec(self) -> str:
+        """How it is asked for: its name, or "name=setting" if it has a setting."""
+        return self.name
+
+    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+        """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.
+
+        Parameters
+        ----------
+        columns : physical parameters by name, each of shape (cells,)
+        step : length of the steps, shape (cells,)
+        rattle : energy of the rattle at t = 0, shape (cells,)
+        """
+        return {}
+
+    def make_step(self, layout: Layout, at_reversal: Any) -> Any:
+        """Inline (group, lane, accepted, spin, spin_integral, work, h, now) -> None, called after every step.
+
+        accepted : whether the step counts; if not, no quantity may change
+        spin : before the step
+        spin_integral, work : integral of the spin, and work of friction, over the step; `work` may be
+            zero unless some measurement has `follows_work`
+        h : length of the step
+        now : time at the end of the step
+
+        `at_reversal` calls what all measurements do at a reversal (see `make_at_reversal`).  It is for the
+        measurement that detects reversals.
+        """
+        return None
+
+    def make_at_reversal(self, layout: Layout) -> Any:
+        """Inline (group, lane, reverses, count, crossing) -> None, called after every step.
+
+        `reverses` says whether a reversal was detected in this step; if not, no quantity may change.  `count` is the
+        number of reversals so far, including this one, and `crossing` its time.
+        """
+        return None
+
+    def make_may_settle(self, layout: Layout) -> Any:
+        """Inline (group, lane, spin, at_rest) -> bool: whether what is measured is final if the rattle only decays.
+
+        A trajectory settles only if this holds for all measurements.  `at_rest` says that spin and rattle are
+        exactly zero.
+        """
+        return None
+
+    def make_look(self, layout: Layout) -> Any:
+        """Inline (group, lane, running, ended, spin, rattle, inertia, total) -> None, called at every look.
+
+        running : whether the trajectory was running before the look
+        ended : whether it has ended now
+        spin : at the time of the look
+        rattle : energy of the rattle
+        inertia : moment of inertia J of the spin
+        total : energy above rest, rattle + J spin²/2
+        """
+        return None
+
+    def skip(self, table: Table, stretch: Stretch) -> None:
+        """Account, in `table`, for a stretch that its images have covered without steps: start-up or a leap.
+
+        The other quantities of the images are already those at the end of the stretch.
+        """
+
+    def mode_lost(self, table: Table, images: Array) -> None:
+        """Account for a lifted mode that grew too large before it was lowered again, so that its lift is given up.
+
+        `images` is a mask over the images of `table`, shape (images,).
+        """
+
+    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
+        """Values of the variables, by name, from the images of trajectories that ended at `times`, shape (cells,).
+
+        Each is of shape (cells,), or (cells, length) for a variable `along` a further dimension.
+        """
+        return {}

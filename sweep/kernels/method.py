@@ -1,0 +1,68 @@
+"""What an integration method is, and how to add one.
+
+A method is a `Method` record and a subclass of `sweep.kernels.kernel.Kernel`, in a file of its own; `runge_kutta` is
+the shorter of the two examples.  Enter the record in `METHODS` of `sweep.kernels.methods`: the configuration, the
+choice of the cheapest method, the provenance and the benchmark then know it.  Times and steps are in sqrt(c/g),
+spins in sqrt(g/c).
+
+The constructor of the kernel calls three functions of `Kernel`, in this order:
+
+1. `_lay_out` names the quantities of an image, among them any that the method adds, such as weights or a history.
+2. `_make_watch` gives the inline function that has to be called after every step of every lane, for the measurements.
+3. `_compile_with` takes the compiled function `run_block`, (group) -> None, which takes `BLOCK` steps of all lanes.
+
+In `run_block` a lane is active while its status is `RUNNING` and its `done` is below its `goal`.  An accepted step of
+an active lane writes the states and adds one to `done`.  A step that fails leaves the states as they were and sets the
+status to `PARADOX`, `LIFT_OFF` or `DIVERGED`.  Lanes that are not active compute as well, but have to keep their
+states, `done` and status.
+
+A kernel has to implement `images`, which makes images at t = 0 with the help of `_start`.  It overrides `times` if its
+images do not begin at t = 0, and `carry` if it can cross stretches of small rattle without steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.measures.measurement import Measurement
+from sweep.models.model import Array, Columns, Model
+
+TOLERANCE = 1e-8
+"""Default tolerance: the error in spin at t = 400, in sqrt(g/c)."""
+
+FIXED, ACCURACY, STABILITY = range(3)
+STEP_RULES = {FIXED: "fixed", ACCURACY: "accuracy", STABILITY: "stability"}
+"""What determined a step: the configuration, the tolerance, or the stability limit of the method."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """The record of a method: how to make its kernel, how long its steps may be, and what they cost."""
+
+    name: str
+    """As in the configuration."""
+    summary: str
+    """One line for the documentation."""
+    kernel: Callable[[Model, Sequence[Measurement], float], Kernel]
+    """(model, measurements, tolerance) -> the kernel, not compiled yet."""
+    accurate_step: Callable[[Model, Columns, float], Array]
+    """(model, columns, tolerance) -> the step that keeps the error in spin at t = 400 within the tolerance,
+    shape (cells,), in sqrt(c/g)."""
+    stable_step: Callable[[Model, Columns], Array] | None = None
+    """(model, columns) -> the longest stable step, shape (cells,), in sqrt(c/g); None if no limit is near."""
+    step_words: str = ""
+    """What limits an automatic step in addition to the tolerance, in words, for the provenance; "" if nothing does."""
+    models: frozenset[str] | None = None
+    """Names of the models that it can integrate; None for all."""
+    step_cost: float = 1.0
+    """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""
+    start_up_cost: float = 0.0
+    """Time of the start-up of one trajectory, in steps of this method."""
+    stops_anywhere: bool = False
+    """Whether a run may stop after any step and go on from there towards another goal."""
+
+    def runs(self, model: Model) -> bool:
+        """Whether it can integrate a model."""
+        return self.models is None or model.name in self.models

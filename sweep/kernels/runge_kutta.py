@@ -1,0 +1,136 @@
+"""Explicit Runge-Kutta methods, with the step unrolled from a tableau into straight-line code on scalars.
+
+A loop over stages and states would need arrays, and arrays inside the loop over lanes prevent LLVM
+from vectorising across trajectories.  So the step is written out for each tableau and number of
+states, as plain assignments, which the compiler keeps in registers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numba
+import numpy as np
+
+from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.layout import BLOCK, LANES
+from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.method import TOLERANCE, Method
+from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
+from sweep.kernels.tableau import DOPRI5, Tableau
+from sweep.models import linear
+from sweep.models.model import Array, Columns, Model
+
+
+class RungeKuttaKernel(Kernel):
+    """The `Kernel` of a tableau, for any model."""
+
+    def __init__(self, model: Model, tableau: Tableau, measurements: Sequence[Measurement], block: int = BLOCK) -> None:
+        self.tableau = tableau
+        self._lay_out(model, measurements)
+        self._compile_with(self._make_run_block(block), f"{tableau.name}-{block}")
+
+    def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
+        """As `Kernel.images`; the steps taken are no longer than `step` and divide `t_end` evenly."""
+        goal = np.ceil(t_end / step)
+        stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
+        return self._start(columns, t_end / goal, goal, stable_step, stable)
+
+    def stepwise(self) -> RungeKuttaKernel:
+        """The same kernel with blocks of one step, and so with a look after every step."""
+        return RungeKuttaKernel(self.model, self.tableau, self.measurements, block=1)
+
+    def _make_run_block(self, block: int) -> Any:
+        """Compiled (group) -> None: takes `block` steps of all lanes, and calls the measurements after each."""
+        model, layout = self.model, self.layout
+        load_states = make_load(model.states, layout)
+        load_constants = make_load(self.constants, layout, model.constants)
+        store_states = make_store(model.states, layout)
+        step, watch = make_step(self.tableau, model.rhs, len(model.states)), self._make_watch()
+        STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
+        lanes = LANES
+
+        @numba.njit(error_model="numpy")
+        def run_block(group: Any) -> None:
+            for _ in range(block):
+                for lane in range(lanes):
+                    y = load_states(group, lane)
+                    p = load_constants(group, lane)
+                    h, done, status = group[STEP + lane], group[DONE + lane], group[STATUS + lane]
+                    new, spin, spin_integral, work, sound, airborne, jammed = step(y, p, h)
+                    active = (status == RUNNING) & (done < group[GOAL + lane])
+                    accepted = active & sound
+                    store_states(group, lane, accepted, new, y)
+                    group[DONE + lane] = done + (1.0 if accepted else 0.0)
+                    failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
+                    group[STATUS + lane] = failure if active & (not sound) else status
+                    watch(group, lane, accepted, spin, spin_integral, work, h, (done + 1.0) * h)
+
+        return run_block
+
+
+def make_step(tableau: Tableau, rhs: Any, n_states: int) -> Any:
+    """Inline (states, constants, h) -> (states, spin, ∫spin, work, sound, airborne, jammed): one step.
+
+    Returned are the states after the time h; the spin before the step; the integrals of the spin and of
+    the dissipated power over the step, with the weights of the method; whether the normal force and the
+    Painlevé denominator were positive in every stage (`sound`, which is also false where they are NaN);
+    and whether in some stage the force (`airborne`) or the denominator (`jammed`) was zero or negative.
+    """
+    return compile_inline("step", step_source(tableau, n_states), {"rhs": rhs})
+
+
+def step_source(tableau: Tableau, n_states: int) -> str:
+    """The Python source of a step."""
+    last = tableau.stages - 1
+    lines = ["def step(y, p, h):", "    k0, m0 = rhs(y, p)"]
+    for stage, row in enumerate(tableau.a, start=1):
+        weights = {j: f"h{stage}_{j}" for j, w in enumerate(row) if w}
+        lines += [f"    {name} = h * {float(row[j])!r}" for j, name in weights.items()]
+        sums = [_sum(f"{name} * k{j}[{i}]" for j, name in weights.items()) for i in range(n_states)]
+        lines.append(f"    k{stage}, m{stage} = rhs({tuple_of(f'y[{i}] + ({sums[i]})' for i in range(n_states))}, p)")
+    b = {j: repr(float(w)) for j, w in enumerate(tableau.b) if w}
+    stages = range(last + 1)
+    sums = [_sum(f"{w} * k{j}[{i}]" for j, w in b.items()) for i in range(n_states)]
+    result = tuple_of(f"y[{i}] + h * ({sums[i]})" for i in range(n_states))
+    return "\n".join(
+        [
+            *lines,
+            f"    spin_integral = h * ({_sum(f'{w} * m{j}[0]' for j, w in b.items())})",
+            f"    work = h * ({_sum(f'{w} * m{j}[1]' for j, w in b.items())})",
+            f"    sound = {' & '.join(f'(m{j}[2] > 0.0) & (m{j}[3] > 0.0)' for j in stages)}",
+            f"    airborne = {' | '.join(f'(m{j}[2] <= 0.0)' for j in stages)}",
+            f"    jammed = {' | '.join(f'(m{j}[3] <= 0.0)' for j in stages)}",
+            f"    return {result}, m0[0], spin_integral, work, sound, airborne, jammed",
+        ]
+    )
+
+
+def _sum(terms: Iterable[str]) -> str:
+    return " + ".join(terms)
+
+
+_STABILITY_SHARE = 0.9
+"""Share of the stability interval of dopri5 that an automatic step uses for the fastest decay."""
+
+
+def _accurate_step(model: Model, columns: Columns, tolerance: float) -> Array:
+    radians = model.radians_a_step * (tolerance / TOLERANCE) ** (1 / DOPRI5.order)
+    return np.asarray(radians / linear.fastest_motion(model, columns))
+
+
+def _stable_step(model: Model, columns: Columns) -> Array:
+    return np.asarray(_STABILITY_SHARE * DOPRI5.real_stability / model.fastest_decay(columns))
+
+
+DOPRI5_METHOD = Method(
+    name=DOPRI5.name,
+    summary="the Runge-Kutta formula of order five by Dormand and Prince, with a fixed step, for every model",
+    kernel=lambda model, measurements, tolerance: RungeKuttaKernel(model, DOPRI5, measurements),  # noqa: ARG005
+    accurate_step=_accurate_step,
+    stable_step=_stable_step,
+    step_words=f"{_STABILITY_SHARE:g} of the stability limit",
+    stops_anywhere=True,
+)

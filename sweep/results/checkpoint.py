@@ -1,0 +1,109 @@
+"""The store of a run that can be stopped at any moment and resumed."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sweep.config import files
+from sweep.grid import Array
+from sweep.results.identity import Identity, require_same
+from sweep.results.store import Running, StoreError
+from sweep.results.writing import replacing
+
+
+class Checkpoint:
+    """A folder with a file for each finished tile and one for the tiles at work.
+
+    A file that cannot be read counts as missing: its cells are computed again.
+    """
+
+    def __init__(self, folder: Path, identity: Identity, note: Callable[[str], None]) -> None:
+        """Resume from `folder`, or make it.
+
+        Parameters
+        ----------
+        note : called with a line for each damaged file
+
+        Raises
+        ------
+        StoreError
+            if `folder` is of another run.
+        """
+        self.folder, self.note, self.identity = folder, note, identity
+        head = folder / "identity.json"
+        if head.exists():
+            try:
+                found = Identity.of(json.loads(files.read(head, files.MIB)))
+            except (OSError, ValueError, RecursionError) as error:
+                raise StoreError(f"{head}: damaged ({error}); start again with --fresh") from None
+            require_same(folder, found, identity)
+        else:
+            folder.mkdir(exist_ok=True)
+            with replacing(head) as temporary:
+                temporary.write_text(json.dumps(identity.__dict__), encoding="utf-8")
+        for left in folder.glob(".*.part"):
+            left.unlink()
+        numbered = [path for path in folder.iterdir() if re.fullmatch(r"\d{6,}\.npz", path.name)]
+        self.done = {int(path.stem) for path in numbered if self._read(path) is not None}
+
+    def save(self, tile: int, arrays: Mapping[str, Array]) -> None:
+        self._write(self.folder / f"{tile:06d}.npz", arrays)
+        self.done.add(tile)
+
+    def load(self, tile: int) -> dict[str, Array]:
+        path = self.folder / f"{tile:06d}.npz"
+        arrays = self._read(path)
+        if arrays is None:
+            raise StoreError(f"{path}: damaged during the run; the same command computes it again")
+        return arrays
+
+    def save_running(self, running: Running) -> None:
+        head = {"tiles": np.array(running.tiles), "seconds": np.array(running.seconds)}
+        self._write(self.folder / "running.npz", {**head, **running.tables})
+
+    def load_running(self) -> Running | None:
+        tables = self._read(self.folder / "running.npz")
+        if tables is None or not {"tiles", "seconds"} <= set(tables):
+            return None
+        numbers, spent = tables.pop("tiles"), tables.pop("seconds")
+        if (numbers.ndim, numbers.dtype.kind, spent.ndim, spent.dtype.kind) != (1, "i", 0, "f"):
+            return None
+        tiles, seconds = numbers.tolist(), float(spent)
+        if not tiles or len(set(tiles)) < len(tiles) or any(table.dtype.kind != "f" for table in tables.values()):
+            return None
+        return None if self.done & set(tiles) else Running(tiles, tables, seconds)
+
+    def _stamp(self, path: Path, names: Iterable[str]) -> str:
+        """Text in a file by which one of another tile or run, or one that lost an array, is recognised."""
+        run = self.identity
+        return f"{path.stem}: {', '.join(names)}; {run.config_hash} {run.source_hash}, {run.versions}"
+
+    def _write(self, path: Path, arrays: Mapping[str, Array]) -> None:
+        named: dict[str, Any] = {**arrays, "stamp": np.array(self._stamp(path, arrays))}
+        with replacing(path) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, **named)
+
+    def _read(self, path: Path) -> dict[str, Array] | None:
+        """The arrays of a file, its checksums verified; None if it is missing or cannot be used."""
+        try:
+            if path.exists() and not path.is_file():
+                raise OSError("not a file")  # opening a pipe would wait for its other end
+            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+                if damaged := archive.zip.testzip():  # numpy stops reading where a damaged header tells it to
+                    raise ValueError(f"checksum of {damaged}")
+                arrays = {name: archive[name] for name in archive.files}
+            if arrays.pop("stamp", None) != self._stamp(path, arrays):
+                raise ValueError("not a file of this run")
+            return arrays
+        except FileNotFoundError:
+            return None
+        except Exception as error:  # what zipfile and numpy raise for a damaged archive is documented nowhere
+            self.note(f"{path}: damaged ({error}); its cells are computed again")
+            path.unlink()
+            return None

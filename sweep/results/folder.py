@@ -1,0 +1,107 @@
+"""The files of a run in its output folder: dataset, picture, checkpoint and lock."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import xarray as xr
+
+from sweep.results import netcdf
+from sweep.results.identity import Identity, require_same
+from sweep.results.store import StoreError
+from sweep.results.writing import remove_unfinished, replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """The files of the run `name` in `folder`."""
+
+    folder: Path
+    name: str
+
+    @property
+    def dataset(self) -> Path:
+        return self.folder / f"{self.name}.nc"
+
+    @property
+    def picture(self) -> Path:
+        return self.folder / f"{self.name}.png"
+
+    @property
+    def checkpoint(self) -> Path:
+        return self.folder / f"{self.name}.checkpoint"
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs of this name out of the folder; `StoreError` if one is at work there.
+
+        The operating system holds the lock, and lets go of it when the process ends, however it ends.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f".{self.name}.lock"
+        while True:
+            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(handle)
+                raise StoreError(
+                    f"{self.folder / self.name}: another run is at work there; allowed: wait, or another --output"
+                ) from None
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), path.stat()):
+                    break
+            os.close(handle)  # a run that has just ended removed this lock file after we opened it
+        try:
+            for target in (self.dataset, self.picture):
+                remove_unfinished(target)
+            yield
+        finally:
+            path.unlink(missing_ok=True)
+            os.close(handle)
+
+    def has_dataset(self, identity: Identity) -> bool:
+        """Whether the finished dataset of `identity` is there.
+
+        Raises
+        ------
+        StoreError
+            if the file is of another run, or not a dataset of this program.
+        """
+        if not self.dataset.exists():
+            return False
+        with netcdf.open_dataset(self.dataset, load=False) as dataset:
+            found = Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
+        require_same(self.dataset, found, identity)
+        return True
+
+    def save_result(self, dataset: xr.Dataset, figure: Figure) -> None:
+        """Write a dataset that needed no checkpoint, and its picture."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        netcdf.write(self.dataset, dataset)
+        self.save_picture(figure)
+
+    def save_picture(self, figure: Figure) -> None:
+        with replacing(self.picture) as temporary:
+            figure.savefig(temporary, format="png")
+
+    def discard(self) -> None:
+        """Remove all that an earlier run left."""
+        # The picture goes first: without its dataset it would pass for the next one's.
+        for path in (self.picture, self.dataset):
+            path.unlink(missing_ok=True)
+        self.discard_checkpoint()
+
+    def discard_checkpoint(self) -> None:
+        if self.checkpoint.exists():
+            shutil.rmtree(self.checkpoint)

@@ -1,0 +1,50 @@
+"""What the numbers of a run depend on, and so which runs may resume each other's files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sweep.config.faults import printable
+from sweep.results.store import StoreError
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What the numbers of a run depend on.  A run resumes only files of its own identity."""
+
+    config: str
+    """The resolved configuration, as YAML."""
+    config_hash: str
+    source_hash: str
+    """Hash of the source code that decides the numbers."""
+    versions: str
+    """Versions of this program and of the libraries that compile it."""
+
+    @classmethod
+    def of(cls, raw: Any) -> Identity:
+        """The identity read from a file; `ValueError` if `raw` is not one."""
+        if not isinstance(raw, dict) or {str} != set(map(type, raw.values())) or set(raw) != set(cls.__annotations__):
+            raise ValueError("not the identity of a run")
+        return cls(**raw)
+
+    def difference(self, other: Identity) -> str:
+        """Why a run of `other` cannot resume files of this identity; "" if it can."""
+        if self.config_hash != other.config_hash:
+            old, new = (c.config.splitlines() for c in (self, other))
+            changed = [f"- {printable(line.strip())}" for line in old if line not in new]
+            changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
+            return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs"])
+        if self.versions != other.versions:
+            return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
+        return "other sources of the model or kernel" if self.source_hash != other.source_hash else ""
+
+
+def require_same(path: Path, found: Identity, wanted: Identity) -> None:
+    """Raise `StoreError` if the file at `path`, whose identity is `found`, is not of the run `wanted`."""
+    if reason := found.difference(wanted):
+        raise StoreError(
+            f"{path}: not resumed, it comes from {reason}\n"
+            "  allowed: the same configuration, another --output, or --fresh to discard that run"
+        )

@@ -1,0 +1,92 @@
+"""Datasets as netCDF4 files: written in blocks, read whole or when asked for.
+
+A dataset is one file that opens without this program, with one chunk per tile.  It is written at the
+end of a run, from the tiles in the store: an HDF5 file that a killed process was writing can be lost
+as a whole, and a zarr folder written in place opens before it is complete.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import xarray as xr
+
+from sweep.grid import Array
+from sweep.results.store import StoreError
+from sweep.results.writing import probe, replacing
+
+Chunked = tuple[xr.Variable, tuple[int, ...]]
+"""An empty variable with its attributes, and the shape of the chunks in which it is stored."""
+
+
+def write(
+    path: Path,
+    frame: xr.Dataset,
+    variables: Mapping[str, Chunked] | None = None,
+    blocks: Iterable[tuple[str, Any, Array]] = (),
+) -> None:
+    """Write a dataset of which only `frame` has to fit into memory.
+
+    Parameters
+    ----------
+    frame : coordinates, attributes and the variables written at once
+    variables : the variables filled from `blocks`, by name
+    blocks : name, place in the array, values
+    """
+    with replacing(path) as temporary:
+        try:
+            _write_frame(frame, temporary)
+            with netCDF4.Dataset(temporary, "a") as file:
+                for name, (variable, chunks) in (variables or {}).items():
+                    fill = np.nan if variable.dtype.kind == "f" else None
+                    target = file.createVariable(
+                        name,
+                        variable.dtype,
+                        tuple(map(str, variable.dims)),
+                        fill_value=fill,
+                        chunksizes=chunks or None,
+                    )
+                    target.setncatts(variable.attrs)
+                for name, place, values in blocks:
+                    file[name][place] = values
+        except RuntimeError as error:  # netCDF's own, which does not say what the system said
+            probe(temporary)
+            raise StoreError(f"{path}: cannot be written: {error}") from None
+
+
+def _write_frame(frame: xr.Dataset, path: Path) -> None:
+    filled = {name for name, variable in frame.data_vars.items() if variable.dtype.kind == "f"}
+    encoding = {name: {"_FillValue": None} for name in set(frame.variables) - filled}
+    frame.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
+
+
+def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
+    """Read a dataset, into memory or (`load=False`) when it is asked for; `StoreError` if it is not one."""
+    if not path.is_file():
+        raise StoreError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+    try:
+        if load:
+            _refuse_larger_than_memory(path)
+        dataset = xr.open_dataset(path, engine="netcdf4", decode_times=False)
+        if load:
+            with dataset:
+                dataset.load()
+        return dataset
+    except StoreError:
+        raise
+    except Exception as error:  # what HDF5, netCDF and xarray raise for damaged files is documented nowhere
+        raise StoreError(f"{path}: not a netCDF dataset: {error}") from None
+
+
+def _refuse_larger_than_memory(path: Path) -> None:
+    # A file of a few bytes can declare any number of values.
+    with netCDF4.Dataset(path) as file:
+        size = sum(variable.size * np.dtype(variable.dtype).itemsize for variable in file.variables.values())
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if size > memory:
+        raise StoreError(f"{path}: {size / 2**30:.3g} GiB of data; allowed: at most {memory / 2**30:.3g}, the memory")

@@ -1,0 +1,69 @@
+"""A dataset in words: how its cells ended, how exact they are, what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from sweep.kernels.method import STEP_RULES
+from sweep.kernels.status import FAILURES, SETTLED, TIME_LIMIT
+from sweep.results.dataset import STATUSES
+
+
+def failed_fraction(dataset: xr.Dataset) -> float:
+    """Share of the cells whose simulation failed."""
+    return float(dataset["status"].isin(FAILURES).mean())
+
+
+def summarize(dataset: xr.Dataset) -> str:
+    """A few lines on the results of a run."""
+    return "\n".join(_summary(dataset))
+
+
+def contents(dataset: xr.Dataset) -> str:
+    """The variables, attributes and configuration of a dataset, a line each."""
+    variables = [
+        f"  {name} ({', '.join(map(str, variable.dims))}): {variable.attrs.get('long_name', '')}"
+        for name, variable in dataset.data_vars.items()
+    ]
+    attributes = [f"{key}: {dataset.attrs[key]}" for key in sorted(set(dataset.attrs) - {"title", "config"})]
+    return "\n".join([*variables, *attributes, f"config:\n{dataset.attrs.get('config', '')}"])
+
+
+def _summary(dataset: xr.Dataset) -> Iterator[str]:
+    status = np.ravel(dataset["status"].values)
+    dims = " × ".join(f"{d} {n}" for d, n in dataset["status"].sizes.items()) or "one cell"
+    ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if code in status)
+    yield f"{status.size} cells ({dims}): {ends}"
+    if "simulated_share" in dataset.attrs:
+        yield f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the others are inferred"
+    if "reversals" in dataset:
+        valid = np.isin(status, (SETTLED, TIME_LIMIT))
+        if valid.any():
+            yield _reversals(dataset, valid)
+    if "energy_error" in dataset:
+        error = np.ravel(dataset["energy_error"].values)
+        yield f"energy error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}"
+    if "step_rule" in dataset:
+        rule, step = np.ravel(dataset["step_rule"].values), np.ravel(dataset["step"].values)
+        who = ", ".join(f"{name} in {(rule == code).sum()}" for code, name in STEP_RULES.items() if code in rule)
+        yield f"step: {step.min():.3g} to {step.max():.3g}, set by {who} cells"
+    if "verified_cell" in dataset:
+        changed = dataset.attrs.get("verified_counts_changed")
+        counts = f"{changed} counts changed, " if changed is not None else ""
+        spin = f"the largest difference in spin is {dataset.attrs['verified_largest_spin_difference']:.1e}"
+        yield f"verified: {dataset.sizes['verified']} cells run again with finer steps: {counts}{spin}"
+    if "wall_time" in dataset.attrs:
+        seconds, rate = dataset.attrs["wall_time"], dataset.attrs["trajectories_per_second"]
+        yield f"cost: {seconds:.3g} s, {rate:.3g} trajectories/s"
+
+
+def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:
+    counted = np.ravel(dataset["reversals"].values)[valid].astype(int)
+    line = f"reversals: {counted.min()} to {counted.max()}"
+    if "reversals_predicted" not in dataset:
+        return line
+    off = abs(counted - np.ravel(dataset["reversals_predicted"].values)[valid])
+    return f"{line}; as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"

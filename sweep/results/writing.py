@@ -1,0 +1,62 @@
+"""How every file is written: whole or not at all.
+
+The bytes go to a temporary file in the same folder, are flushed to the disk, and the file is then
+renamed over the old one.  A file that has its final name is complete.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sweep.results.store import StoreError
+
+_PROBE = 1 << 22
+"""Bytes; more than HDF5 writes at once."""
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary path that becomes `path`, all at once, if the block succeeds.
+
+    Raises
+    ------
+    StoreError
+        if the file cannot be written.
+    """
+    if path.is_dir() or not path.parent.is_dir():
+        raise StoreError(f"{path}: cannot be written: {'a folder' if path.is_dir() else f'no folder {path.parent}'}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield temporary
+        _flush(temporary)
+        os.replace(temporary, path)
+        _flush(path.parent)
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def remove_unfinished(path: Path) -> None:
+    """Remove the temporary files that killed processes left of `path`."""
+    for left in path.parent.glob(f".{path.name}.*.part"):
+        if left.suffixes[-2][1:].isdigit():  # otherwise of another file, whose name only begins like this one's
+            left.unlink()
+
+
+def probe(path: Path) -> None:
+    """Write to a file that another library failed to write, to get the system's own error."""
+    with path.open("ab") as stream:
+        stream.write(bytes(_PROBE))
+        os.fsync(stream.fileno())
+
+
+def _flush(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

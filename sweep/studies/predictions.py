@@ -1,0 +1,32 @@
+"""What theory says of the cells of a sweep, without running it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from sweep import prediction
+from sweep.config import Config, as_config
+from sweep.grid import Grid
+from sweep.models import TIERS
+from sweep.results import dataset
+
+
+def predict(config: Config | str | Path, **overrides: Any) -> xr.Dataset:
+    """The predictions alone, of the paper and of the linear theory, on the grid of `config`.
+
+    Parameters
+    ----------
+    config : a configuration or the path of one
+    overrides : values that replace those of the file, such as ``mu=60``
+
+    Raises
+    ------
+    ConfigError
+        if the configuration cannot be used.
+    """
+    config = as_config(config, overrides)
+    grid = Grid.of(config)
+    return dataset.label(config, grid, dataset.predicted(prediction.predict(TIERS[config.model], grid)), {})

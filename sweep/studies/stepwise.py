@@ -1,0 +1,28 @@
+"""What a study that stops between steps needs of a configuration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sweep.config import Config, ConfigError, Fault
+from sweep.kernels.methods import METHODS, PLAIN
+from sweep.models import MODELS
+
+
+def stepwise(config: Config) -> Config:
+    """`config` with a method that can be stopped after any step, which takes one without a history.
+
+    A step that was fixed for another method is dropped, as it may be unstable with this one.
+
+    Raises
+    ------
+    ConfigError
+        if the model is a formula, which takes no steps.
+    """
+    if config.model not in MODELS:
+        message = f"the {config.model} model is not simulated; allowed: {', '.join(MODELS)}"
+        raise ConfigError([Fault("config", None, None, ("model",), message)])
+    method = METHODS.get(config.integrator.method)
+    if method and method.stops_anywhere:
+        return config
+    return replace(config, integrator=config.integrator.model_copy(update={"method": PLAIN, "step": "auto"}))

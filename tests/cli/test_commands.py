@@ -1,0 +1,77 @@
+"""The commands run, info and plot: what they write, say and return."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from support.cli import invoke
+from support.runs import same_numbers
+
+import sweep
+
+Write = Callable[..., Path]
+
+
+def test_command_writes_dataset_and_maps(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
+    result = invoke("run", write(), "--output", tmp_path / "out")
+    assert result.exit_code == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"small.nc", "small.png"}
+    assert "12 cells (mu 2 × b 3 × n0 2)" in result.stdout
+    with xr.open_dataset(tmp_path / "out" / "small.nc") as stored:
+        same_numbers(stored.load(), small)
+        assert all("_FillValue" not in v.encoding for v in stored.variables.values() if v.dtype.kind == "i")
+    again = invoke("run", write(), "--output", tmp_path / "out")
+    assert "already complete" in again.stderr
+    assert again.exit_code == 0
+
+
+def test_info_and_plot(write: Write, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    sweep.run(write(), out)
+    told = invoke("info", out / "small.nc").stdout
+    assert "12 cells (mu 2 × b 3 × n0 2)" in told
+    assert "numba_version" in told
+    (out / "small.png").unlink()
+    assert invoke("plot", out / "small.nc").exit_code == 0
+    assert invoke("plot", out / "small.nc", "--var", "status", "--output", out / "s.png").exit_code == 0
+    assert all((out / name).read_bytes().startswith(b"\x89PNG") for name in ("small.png", "s.png"))
+    result = invoke("plot", out / "small.nc", "--var", "colour")
+    assert (result.exit_code, "no variable colour; allowed: reversals," in result.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("verb", ["info", "plot"])
+def test_files_that_are_not_datasets(verb: str, tmp_path: Path) -> None:
+    (tmp_path / "x.nc").write_text("hello", encoding="utf-8")
+    xr.Dataset({"t": 1.0}).to_netcdf(tmp_path / "other.nc")
+    for name, said in (("x.nc", "not a netCDF"), ("none.nc", "no such file"), ("other.nc", "no variable")):
+        result = invoke(verb, tmp_path / name)
+        assert result.exit_code == 2
+        assert f"{name}: " in result.stderr
+        assert said in result.stderr
+
+
+def test_help_tells_every_verb_and_exit_code() -> None:
+    text = invoke("--help").stdout
+    assert all(word in text for word in ("run", "plot", "info", "130", "interrupted"))
+    assert "PATH=VALUE" in invoke("run", "--help").stdout
+
+
+def test_dry_run_computes_and_writes_nothing(write: Write, tmp_path: Path) -> None:
+    result = invoke("run", write(), "--output", tmp_path / "out", "--dry-run")
+    assert result.exit_code == 0
+    assert [line.split(":")[0] for line in result.stdout.splitlines()] == ["cells", "steps", "memory", "time"]
+    assert not (tmp_path / "out").exists()
+
+
+def test_too_many_failures(write: Write, tmp_path: Path) -> None:
+    settings = ("--set", "n0=[0.05, 3.0]", "--set", "x0=1", "--set", "mu=20", "--set", "b=3", "--set", "t_end=5")
+    result = invoke("run", write(), "--output", tmp_path / "out", *settings)
+    assert result.exit_code == 3
+    assert "50.00% of the cells failed; allowed: max_failed_fraction 1.00%" in result.stderr
+    assert (tmp_path / "out" / "small.nc").exists()
+    assert (
+        invoke("run", write(), "--output", tmp_path / "b", *settings, "--set", "max_failed_fraction=0.5").exit_code == 0
+    )

@@ -1,0 +1,124 @@
+"""Odd requests: each ends in an answer, or in one line that says what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from support.cli import invoke
+
+import sweep
+from sweep import ConfigError
+from sweep.cli import main
+from sweep.kernels.status import DIVERGED
+from sweep.studies.trajectory import trajectory
+
+Write = Callable[..., Path]
+TEXT = "name: odd\nfriction: {mu: 60}\nintegrator: {t_end: 30}\n"
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (["integrator.step=5"], "integrator.step: 5; allowed: auto, or at most 1.83"),
+        (["integrator.step=1e-320"], "steps to t_end; allowed: at most 1e+15"),
+        (["mu=1e300"], "allowed: a finite number >= 0 and < 1e+12"),
+        (["n0=1e200"], "< 1000"),
+        (["mu={start: 1, stop: 2, num: 100000}", "n0={start: 1, stop: 2, num: 100000}"], "10000000000 cells; allowed"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("dry", [[], ["--dry-run"]], ids=["run", "dry"])
+def test_sizes_out_of_reach(settings: list[str], said: str, dry: list[str], write: Write, tmp_path: Path) -> None:
+    flags = [part for setting in settings for part in ("--set", setting)]
+    result = invoke("run", write(TEXT), "--output", tmp_path / "o", *flags, *dry)
+    assert (result.exit_code, said in result.stderr) == (2, True), result.output
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_model_that_never_settles_is_summed_up(write: Write, tmp_path: Path) -> None:
+    settings = ("--set", "model=noslip", "--set", "t_end=300")
+    result = invoke("run", write(TEXT), "--output", tmp_path / "o", *settings)
+    assert (result.exit_code, "reversals: 1 to 1\n" in result.stdout) == (0, True)
+    assert invoke("info", tmp_path / "o" / "odd.nc").exit_code == 0
+
+
+def test_an_axis_of_any_parameter_is_drawn(write: Write, tmp_path: Path) -> None:
+    for axis in ("c=[1,2]", "a=[9,10]", "b=[2,3,4,5,6]", "delta=[0.01,0.03]"):
+        result = invoke("run", write(TEXT), "--output", tmp_path / axis[0], "--set", axis, "--set", "n0=[0.04,0.05]")
+        assert result.exit_code == 0
+        assert (tmp_path / axis[0] / "odd.png").exists()
+    for variable in ("n_c1_plus", "form_factor", "energy_error", "step_rule"):
+        assert invoke("plot", tmp_path / "b" / "odd.nc", "--var", variable).exit_code == 0
+
+
+@pytest.mark.parametrize("verb", ["critical", "trajectory"])
+def test_formulas_are_not_simulated(verb: str, write: Write) -> None:
+    result = invoke(verb, write(TEXT), "--set", "model=analytic")
+    assert (result.exit_code, "the analytic model is not simulated; allowed: slip" in result.stderr) == (2, True)
+
+
+def test_critical_spins_are_of_one_start_point(write: Write) -> None:
+    result = invoke("critical", write(TEXT), "--set", "x0=[0.01,0.02]")
+    assert (result.exit_code, "start.x0: an axis; allowed: a number" in result.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["every", "config", "at", "t_end"])
+def test_at_takes_only_parameters(name: str, write: Write) -> None:
+    result = invoke("trajectory", write(TEXT), "--at", f"{name}=1")
+    assert (result.exit_code, "unknown parameter; allowed: a, b" in result.stderr) == (2, True)
+
+
+def test_a_step_fixed_for_another_method_is_not_used_by_dopri5(write: Write) -> None:
+    config = sweep.load_config(write(TEXT), {"method": "adams", "step": 0.1, "mu": 400.0})
+    series = trajectory(config)
+    assert int(series.status[0]) != DIVERGED
+    assert float(series.step[0]) < 0.01
+    assert series.attrs["integrator"].startswith("dopri5")
+
+
+@pytest.mark.parametrize("target", [".", "nowhere/x.png"])
+def test_pictures_that_cannot_be_written(target: str, write: Write, tmp_path: Path) -> None:
+    invoke("run", write(TEXT), "--output", tmp_path / "o")
+    result = invoke("plot", tmp_path / "o" / "odd.nc", "--output", tmp_path / target)
+    assert (result.exit_code, "cannot be written" in result.stderr) == (2, True)
+
+
+def test_brackets_in_a_path_are_not_markup(write: Write, tmp_path: Path) -> None:
+    for _ in range(2):
+        result = invoke("run", write(TEXT), "--output", tmp_path / "o[/red]")
+    assert "o[/red]" in result.stderr
+    assert result.exit_code == 0
+
+
+def test_a_changed_table_is_named(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("mu\n60\n")
+    file = write("name: odd\ncases: t.csv\nintegrator: {t_end: 10}\n")
+    assert invoke("run", file, "--output", tmp_path / "o").exit_code == 0
+    (tmp_path / "t.csv").write_text("mu\n61\n")
+    result = invoke("run", file, "--output", tmp_path / "o")
+    assert (result.exit_code, "the table of cases differs" in result.stderr) == (2, True)
+
+
+def test_overrides_may_be_numpy_values(write: Write) -> None:
+    config = sweep.load_config(write(TEXT), {"n0": np.array([0.01, 0.02]), "mu": np.float64(70)})
+    assert config.parameters["n0"].numbers == (0.01, 0.02)
+    with pytest.raises(ConfigError):
+        sweep.load_config(write(TEXT), {"n0": np.array([np.nan])})
+
+
+def test_reduced_models_that_blow_up_are_diverged(write: Write) -> None:
+    """A rattle far beyond what the averaged equations mean, at a step far too long for it."""
+    dataset = sweep.run(write(TEXT), model="averaged", n0=900.0, x0=9.0, step=1.5, t_end=3000.0)
+    assert int(dataset.status) == DIVERGED
+
+
+def test_an_interrupt_outside_a_sweep_is_one_line(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sweep.config.load_config", interrupt)
+    result = CliRunner().invoke(main, ["critical", str(write(TEXT))])
+    assert (result.exit_code, result.stderr) == (130, "interrupted\n")

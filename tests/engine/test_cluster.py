@@ -1,0 +1,276 @@
+"""Runs in other processes: the same files as by threads, whatever happens to the workers."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import distributed
+import pytest
+import xarray as xr
+from support import ROOT
+from support.cli import invoke, refused
+from support.kernels import threads
+from support.same import contents
+
+import sweep
+from sweep.engine.cluster import Cluster
+from sweep.engine.reporter import Progress, Reporter
+from sweep.results.provenance import sources
+from sweep.results.store import StoreError
+
+TEXT = """\
+name: tiles
+body: {b: {start: 2, stop: 6, num: 40}}
+friction: {mu: {start: 40, stop: 60, num: 40}}
+start: {n0: [0.02, 0.05, 0.07]}
+integrator: {t_end: 100}
+verify: 0.01
+"""
+TILES = 5
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _two_threads() -> Iterator[None]:
+    """As processes of their own have, for datasets say how many."""
+    with threads(2):
+        yield
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("config") / "tiles.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def by_threads(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    out = tmp_path_factory.mktemp("threads")
+    sweep.run(config, out)
+    return contents(out)
+
+
+@pytest.fixture(scope="module")
+def local() -> Iterator[distributed.LocalCluster]:
+    """Two worker processes, of one thread and of two."""
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
+    ) as cluster:
+        cluster.new_spec["options"]["nthreads"] = 2
+        cluster.scale(2)
+        cluster.wait_for_workers(2)
+        yield cluster
+
+
+@pytest.fixture
+def client(local: distributed.LocalCluster) -> Iterator[distributed.Client]:
+    with distributed.Client(local) as client:
+        client.wait_for_workers(2)
+        yield client
+
+
+@contextmanager
+def patched(client: distributed.Client, module: str, name: str, value: Any, **which: Any) -> Iterator[None]:
+    """Another `module.name` in workers."""
+
+    def put() -> None:
+        there = importlib.import_module(module)
+        there.kept = getattr(there, name)
+        setattr(there, name, value)
+
+    def put_back() -> None:
+        there = importlib.import_module(module)
+        setattr(there, name, there.kept)
+
+    client.run(put, **which)
+    yield
+    client.run(put_back, **which)
+
+
+def test_workers_of_a_scheduler_give_the_same_files(
+    config: Path, tmp_path: Path, local: distributed.LocalCluster, by_threads: dict[str, bytes]
+) -> None:
+    result = invoke("run", config, "--output", tmp_path, "--scheduler", local.scheduler_address, "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+    assert contents(tmp_path) == by_threads
+
+
+class KillAWorker(Reporter):
+    """When the first tile is back, kills the one that has most of the others."""
+
+    def __init__(self, client: distributed.Client) -> None:
+        self.client, self.killed = client, list[int]()
+
+    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
+        if not self.killed:
+            time.sleep(0.1)  # into the next
+            tiles = self.client.processing()
+            busiest = max(tiles, key=lambda worker: len(tiles[worker]))
+            self.killed.append(self.client.run(os.getpid)[busiest])
+            os.kill(self.killed[0], signal.SIGKILL)
+
+
+@pytest.mark.campaign
+def test_a_killed_worker_costs_only_its_tile(
+    config: Path,
+    tmp_path: Path,
+    client: distributed.Client,
+    local: distributed.LocalCluster,
+    by_threads: dict[str, bytes],
+) -> None:
+    local.scheduler.transition_log.clear()
+    reporter = KillAWorker(client)
+    sweep.run(config, tmp_path, reporter=reporter, cluster=Cluster(client))
+    assert contents(tmp_path) == by_threads
+    assert reporter.killed
+    moves = [(start, end) for key, start, end, *_ in local.scheduler.transition_log if str(key).startswith("_work")]
+    assert TILES <= moves.count(("processing", "memory")) <= TILES + 1
+    assert moves.count(("processing", "released")) >= 1
+
+
+@pytest.mark.campaign
+def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> None:
+    # One worker may take all tiles, so each says both.
+    types = iter(["one", "another"] * TILES)
+    with patched(client, "sweep.engine.local", "this_cpu", lambda: next(types)):
+        dataset = sweep.run(config, cluster=Cluster(client), t_end=20)
+    assert dataset.attrs["cpu"] == "another, one"
+
+
+def test_a_worker_of_other_sources_is_refused(config: Path, client: distributed.Client) -> None:
+    _, versions = sources()
+    said = r"tcp://.*: the worker has other sources of the model or kernel"
+    with (
+        patched(client, "sweep.engine.cluster", "_own_sources", lambda: ("0" * 16, versions)),
+        pytest.raises(StoreError, match=said),
+    ):
+        sweep.run(config, cluster=Cluster(client))
+
+
+def test_a_tile_that_kills_its_workers_is_reported(config: Path, client: distributed.Client, local: Any) -> None:
+    def die() -> None:
+        import sweep.engine.cluster
+
+        sweep.engine.cluster.run_group = lambda *_: os._exit(1)
+
+    allowed, local.scheduler.allowed_failures = local.scheduler.allowed_failures, 0
+    try:
+        client.run(die)
+        with pytest.raises(StoreError, match="workers died computing it"):
+            sweep.run(config, cluster=Cluster(client))
+    finally:
+        local.scheduler.allowed_failures = allowed
+
+
+def command(config: Path, out: Path) -> list[str]:
+    return [sys.executable, "-m", "sweep", "run", str(config), "--output", str(out), "--workers", "2"]
+
+
+@pytest.mark.campaign
+def test_local_processes_give_the_same_files(config: Path, tmp_path: Path, by_threads: dict[str, bytes]) -> None:
+    done = subprocess.run(
+        [*command(config, tmp_path), "--quiet"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert contents(tmp_path) == by_threads
+
+
+def in_session(leader: int) -> list[str]:
+    """Command lines of the processes of a session."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state, *_, session = (folder / "stat").read_text().rpartition(")")[2].split()[:4]
+            if int(session) == leader and state != "Z":
+                found.append((folder / "cmdline").read_text().replace("\0", " "))
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+    return found
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "terminal"])
+def test_ctrl_c_ends_all_processes(
+    config: Path, tmp_path: Path, by_threads: dict[str, bytes], send: Callable[[int, int], None]
+) -> None:
+    with subprocess.Popen(
+        [*command(config, tmp_path), "--set", "t_end=5000"],
+        cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as process:  # fmt: skip
+        while not list(tmp_path.glob("tiles.checkpoint/identity.json")):
+            assert process.poll() is None
+            time.sleep(0.05)
+        time.sleep(1)
+        assert len(in_session(process.pid)) > 2
+        send(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == 130
+    assert "the same command resumes the run" in said
+    assert "Traceback" not in said
+    patience = time.monotonic() + 60
+    while left := in_session(process.pid):
+        assert time.monotonic() < patience, left
+    sweep.run(config, tmp_path, fresh=True)
+    assert contents(tmp_path) == by_threads
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "foo://here:1"])
+def test_a_scheduler_that_does_not_answer_is_reported(
+    address: str, config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sweep.engine.cluster.PATIENCE", "1s")
+    refused(
+        invoke("run", config, "--output", tmp_path, "--scheduler", address, "--quiet"), address, "no dask scheduler"
+    )
+
+
+@pytest.mark.campaign
+def test_a_lost_scheduler_leaves_finished_tiles(config: Path, tmp_path: Path, by_threads: dict[str, bytes]) -> None:
+    program = (
+        "import time, distributed\n"
+        "if __name__ == '__main__':\n"
+        "    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=':0')\n"
+        "    print(cluster.scheduler_address, flush=True)\n"
+        "    time.sleep(600)\n"
+    )
+    (tmp_path / "cluster.py").write_text(program, encoding="utf-8")
+    out = tmp_path / "out"
+    with subprocess.Popen(
+        [sys.executable, tmp_path / "cluster.py"],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as scheduler:
+        try:
+            assert scheduler.stdout
+            address = scheduler.stdout.readline().strip()
+            run = [sys.executable, "-m", "sweep", "run", config, "--output", out, "--quiet", "--scheduler", address]
+            process = subprocess.Popen(run, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+            while not list(out.glob("tiles.checkpoint/0*.npz")):
+                assert process.poll() is None
+                time.sleep(0.002)
+        finally:
+            scheduler.kill()
+        _, said = process.communicate(timeout=60)
+    assert (process.returncode, said) == (
+        2,
+        "the dask scheduler is gone; finished tiles are kept, and the same command resumes the run\n",
+    )
+    sweep.run(config, out)
+    assert contents(out) == by_threads
+
+
+def test_formulas_run_on_a_cluster(config: Path, client: distributed.Client) -> None:
+    asked = {"model": "analytic", "verify": 0}
+    here, there = sweep.run(config, **asked), sweep.run(config, cluster=Cluster(client), **asked)
+    xr.testing.assert_identical(here.drop_attrs(deep=False), there.drop_attrs(deep=False))

@@ -1,0 +1,263 @@
+"""What a run does with a checkpoint or dataset that is damaged, foreign or of another configuration or version.
+
+Damaged tiles and images are computed again, and the files come out as of an undisturbed run, byte for byte.
+What would mix other numbers in is refused.  Real processes that are killed are in `test_faults`.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from support import SMALL
+from support.cli import invoke, refused
+from support.same import contents
+
+import sweep
+from sweep.engine import executor, local
+from sweep.engine.reporter import Progress, Reporter
+from sweep.results.checkpoint import Checkpoint
+from sweep.results.folder import RunFiles
+from sweep.results.identity import Identity
+from sweep.results.provenance import identify
+from sweep.results.store import StoreError
+
+TILE = 3
+"""Cells a tile at the most; of twelve cells there are then six tiles in two groups."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _many_tiles() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sweep.engine.run.tile_size", lambda cells: TILE)  # noqa: ARG005
+        patch.setattr(local, "GROUP", 2 * TILE)
+        yield
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("config") / "small.yaml"
+    path.write_text(SMALL + "verify: 0.3\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def undisturbed(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    out = tmp_path_factory.mktemp("undisturbed")
+    sweep.run(config, out)
+    return contents(out)
+
+
+class StopInTheSecondGroup(Reporter):
+    """Interrupts once a group of tiles is finished and images of the next are saved."""
+
+    def __init__(self, checkpoint: Path) -> None:
+        self.running, self.last_of_first = checkpoint / "running.npz", checkpoint / "000002.npz"
+
+    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
+        if self.last_of_first.exists() and 3 in np.load(self.running)["tiles"]:
+            raise KeyboardInterrupt
+
+
+@pytest.fixture(scope="module")
+def half(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What an interrupted run leaves: three finished tiles, images of the three others."""
+    out = tmp_path_factory.mktemp("half")
+    stop = StopInTheSecondGroup(out / "small.checkpoint")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(executor, "_rescale", lambda *_: 20)
+        with pytest.raises(KeyboardInterrupt):
+            sweep.run(config, out, reporter=stop)
+    return out
+
+
+@pytest.fixture
+def out(half: Path, tmp_path: Path) -> Path:
+    """A copy of it."""
+    return Path(shutil.copytree(half, tmp_path / "out"))
+
+
+def cut(share: float) -> Callable[[Path], None]:
+    return lambda path: os.truncate(path, int(share * path.stat().st_size))
+
+
+def flip(share: float) -> Callable[[Path], None]:
+    def flip_byte(path: Path) -> None:
+        whole = bytearray(path.read_bytes())
+        whole[int(share * (len(whole) - 1))] ^= 0xFF
+        path.write_bytes(whole)
+
+    return flip_byte
+
+
+def foreign(path: Path) -> None:
+    with path.open("wb") as stream:
+        np.savez(stream, status=np.ones(2), seconds=np.ones(()), cpu=np.array("x"), tiles=np.arange(3))
+
+
+def another_tile(path: Path) -> None:
+    """Each gets what the next one had."""
+    files = sorted(path.parent.glob("*.npz"))
+    shutil.copy(files[(files.index(path) + 1) % len(files)], path)
+
+
+DAMAGES: dict[str, Callable[[Path], None]] = {
+    **{f"cut{i}": cut(i) for i in (0, 0.4, 0.999)},
+    **{f"flip{i}": flip(i) for i in (0, 0.3, 0.7, 1)},
+    "removed": Path.unlink,
+    "foreign": foreign,
+    "another's": another_tile,
+}
+
+
+@pytest.mark.parametrize("how", DAMAGES)
+def test_damaged_files_are_not_taken(out: Path, config: Path, how: str) -> None:
+    said: list[str] = []
+    identity = identify(sweep.load_config(config))
+    folder = out / "small.checkpoint"
+    sound = Checkpoint(folder, identity, said.append)
+    assert (sound.done, said) == ({0, 1, 2}, [])
+    assert sound.load_running() is not None
+    damaged = sorted(folder.glob("*.npz"))
+    assert [path.stem for path in damaged] == ["000000", "000001", "000002", "running"]
+    for path in damaged:
+        DAMAGES[how](path)
+    checkpoint = Checkpoint(folder, identity, said.append)
+    unseen = how == "flip1"  # the last byte is the length of a comment
+    assert checkpoint.done == ({0, 1, 2} if unseen else set())
+    assert (checkpoint.load_running() is None) == (not unseen)
+    quiet = how in ("removed", "flip1")
+    assert quiet or all(any(f"{path.name}: damaged" in line for line in said) for path in damaged), said
+
+
+def campaign_unless(quick: Sequence[str]) -> list[Any]:
+    return [how if how in quick else pytest.param(how, marks=pytest.mark.campaign) for how in DAMAGES]
+
+
+@pytest.mark.parametrize("how", campaign_unless(["cut0.4", "another's"]))
+def test_damaged_tiles_and_images_are_computed_again(
+    config: Path, out: Path, undisturbed: dict[str, bytes], how: str
+) -> None:
+    for path in (out / "small.checkpoint").glob("*.npz"):
+        DAMAGES[how](path)
+    result = invoke("run", config, "--output", out)
+    assert (result.exit_code, ".npz: damaged" in result.stderr) == (0, how not in ("removed", "flip1"))
+    assert contents(out) == undisturbed
+
+
+@pytest.mark.parametrize("how", [name for name in DAMAGES if name not in ("removed", "another's")])
+def test_a_damaged_identity_is_refused(config: Path, out: Path, how: str) -> None:
+    DAMAGES[how](out / "small.checkpoint" / "identity.json")
+    refused(invoke("run", config, "--output", out, "--quiet"), "identity.json: damaged", "--fresh")
+
+
+def test_a_fresh_run_ignores_a_damaged_identity(config: Path, out: Path, undisturbed: dict[str, bytes]) -> None:
+    cut(0.4)(out / "small.checkpoint" / "identity.json")
+    assert invoke("run", config, "--output", out, "--fresh").exit_code == 0
+    assert contents(out) == undisturbed
+
+
+@pytest.mark.parametrize("settings", [(), ("--set", "delta=0.04")], ids=["same", "other"])
+def test_tiles_without_an_identity_are_known_by_their_stamp(
+    config: Path, out: Path, undisturbed: dict[str, bytes], settings: tuple[str, ...]
+) -> None:
+    (out / "small.checkpoint" / "identity.json").unlink()
+    result = invoke("run", config, "--output", out, *settings)
+    assert (result.exit_code, "not a file of this run" in result.stderr) == (0, bool(settings)), result.stderr
+    assert (contents(out) == undisturbed) == (not settings)
+
+
+def test_foreign_files_in_the_folder_are_ignored(config: Path, out: Path, undisturbed: dict[str, bytes]) -> None:
+    for name in ("1.npz", "0abc.npz", "notes.txt", "000099.npz", ".x.part", "000099.npz.orig"):
+        (out / "small.checkpoint" / name).write_bytes(b"mine")
+    assert invoke("run", config, "--output", out).exit_code == 0
+    assert contents(out) == undisturbed
+
+
+def test_another_configuration_is_refused(config: Path, out: Path) -> None:
+    result = invoke("run", config, "--output", out, "--set", "t_end=1400")
+    assert (result.exit_code, *(f"t_end: {t}.0" in result.stderr for t in (1400, 1500))) == (2, True, True)
+    assert invoke("run", config, "--output", out).exit_code == 0
+    result = invoke("run", config, "--output", out, "--set", "delta=0.04")
+    assert (result.exit_code, "small.nc: not resumed" in result.stderr) == (2, True)
+    assert "+ delta: 0.04" in result.stderr.replace("{", "").replace("}", "")
+
+
+@pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.campaign)], ids=["half", "whole"])
+@pytest.mark.parametrize("package", ["rattleback-sweep", "numba"])
+def test_another_version_is_refused(
+    config: Path, out: Path, whole: bool, package: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if whole:
+        assert invoke("run", config, "--output", out).exit_code == 0
+    before = {path: path.read_bytes() for path in out.rglob("*.*") if path.is_file()}
+    true = metadata.version
+    with monkeypatch.context() as patch:
+        patch.setattr(metadata, "version", lambda name: "9.9" if name == package else true(name))
+        if package == "numba":
+            patch.setattr(numba, "__version__", "9.9")
+        result = invoke("run", config, "--output", out)
+    assert (result.exit_code, "not resumed, it comes from other versions: sweep" in result.stderr) == (2, True)
+    assert f"{package.removeprefix('rattleback-')} 9.9" in result.stderr.partition(", now")[2]
+    assert {path: path.read_bytes() for path in out.rglob("*.*") if path.is_file()} == before
+
+
+def test_other_sources_are_refused(config: Path, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.results.provenance.fingerprint", lambda *_: "0" * 16)
+    result = invoke("run", config, "--output", out)
+    assert (result.exit_code, "other sources of the model or kernel" in result.stderr) == (2, True)
+
+
+def test_a_damaged_dataset_is_refused(config: Path, tmp_path: Path) -> None:
+    (tmp_path / "small.nc").write_bytes(b"not a dataset")
+    result = invoke("run", config, "--output", tmp_path)
+    assert (result.exit_code, "not a netCDF dataset" in result.stderr) == (2, True)
+
+
+def test_two_runs_at_once_are_refused(config: Path, tmp_path: Path) -> None:
+    with RunFiles(tmp_path, "small").locked():
+        result = invoke("run", config, "--output", tmp_path)
+        assert (result.exit_code, "another run is at work there" in result.stderr) == (2, True)
+        result = invoke("run", config, "--output", tmp_path, "--set", "name=other", "--set", "t_end=5")
+        assert result.exit_code == 0
+    assert invoke("run", config, "--output", tmp_path, "--set", "t_end=5").exit_code == 0
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_another_name_is_another_run(config: Path, out: Path) -> None:
+    sweep.run(config, out, name="second", mu=40.0, b=2.0)
+    assert {path.name for path in out.iterdir()} == {"small.checkpoint", "second.nc", "second.png"}
+
+
+@pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.campaign)])
+def test_every_flipped_bit_of_a_tile_is_seen(every: int, tmp_path: Path) -> None:
+    """Numpy alone reads past some: a header that tells a smaller shape ends before the checksum."""
+    identity = Identity("name: x", "0" * 16, "1" * 16, "sweep 0")
+    # The directory's entry of the second takes 64 bytes: one bit makes it the comment of the first.
+    tile = {"status": np.arange(3000.0), "fourteen_chars": np.ones(1), "cpu": np.array("zen")}
+    checkpoint = Checkpoint(tmp_path / "c", identity, lambda _: None)
+    checkpoint.save(0, tile)
+    path = tmp_path / "c" / "000000.npz"
+    whole, missed = path.read_bytes(), 0
+    data = whole.index(tile["status"].tobytes())
+    places = [*range(data + 16), *range(data + tile["status"].nbytes - 16, len(whole))]
+    bits = [(place, bit) for place in places for bit in range(8)][::every]
+    for place, bit in bits:
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << bit
+        path.write_bytes(damaged)
+        try:
+            found = checkpoint.load(0)
+        except StoreError:
+            continue
+        missed += 1
+        assert found.keys() == tile.keys()
+        assert all(np.array_equal(found[name], tile[name]) for name in tile)
+    assert missed < len(bits) / 2  # dates and rights of the entries

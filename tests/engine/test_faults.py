@@ -1,0 +1,375 @@
+"""Real processes that are killed, interrupted, run twice at once, or find no room or no rights.
+
+Whatever happens, the same command goes on and ends in the files of an undisturbed run, byte for byte.  Damage to
+files that a run left is in `test_damage`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import ROOT, SMALL, nursery
+from support.same import contents, without_clock
+
+TEXT = SMALL + "verify: 0.3\n"
+
+Start = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("config") / "small.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@dataclass
+class Runs:
+    """The command `run CONFIG --output OUT`, again and again."""
+
+    config: Path
+    out: Path
+    started: list[Any] = field(default_factory=list)
+
+    def start(self, *arguments: str, **settings: Any) -> Any:
+        """A process that runs it."""
+        asked = ["run", str(self.config), "--output", str(self.out), *arguments]
+        log = self.out.parent / f"{self.out.name}.log{len(self.started)}"
+        process = nursery.context().Process(target=nursery.command, args=(asked, log), kwargs=settings)
+        process.start()
+        process.log = log
+        self.started.append(process)
+        return process
+
+    def finish(self, *arguments: str, **settings: Any) -> tuple[int, str]:
+        """Exit code and output of a process that runs it."""
+        process = self.start(*arguments, **settings)
+        process.join(120)
+        return process.exitcode, process.log.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def runs(config: Path, tmp_path: Path) -> Iterator[Runs]:
+    runs = Runs(config, tmp_path / "out")
+    yield runs
+    for process in runs.started:
+        process.kill()
+        process.join()
+        process.close()
+
+
+@pytest.fixture(scope="module")
+def first(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that nothing happened to."""
+    runs = Runs(config, tmp_path_factory.mktemp("undisturbed") / "out")
+    code, said = runs.finish()
+    assert code == 0, said
+    return runs.out
+
+
+@pytest.fixture(scope="module")
+def undisturbed(first: Path) -> dict[str, bytes]:
+    return contents(first)
+
+
+@pytest.fixture(scope="module")
+def values(first: Path) -> xr.Dataset:
+    return xr.load_dataset(first / "small.nc")
+
+
+def same_values(path: Path, values: xr.Dataset) -> None:
+    """Every variable bit for bit; the file is cut otherwise, for its tiles are of another size."""
+    found = xr.load_dataset(path)
+    assert set(found.variables) == set(values.variables)
+    for name, variable in values.variables.items():
+        assert found[name].values.tobytes() == variable.values.tobytes(), name
+
+
+class Watch:
+    """Looks at the files of a run while they come and go: one with its final name is complete."""
+
+    def __init__(self, folder: Path, undisturbed: dict[str, bytes]) -> None:
+        self.folder, self.undisturbed, self.seen = folder, undisturbed, set[tuple[int, int]]()
+        self.names: set[str] = set()
+
+    def look(self) -> None:
+        files = [*_listed(self.folder), *_listed(self.folder / "small.checkpoint")]
+        self.names = {path.name for path in files}
+        for path in files:
+            try:
+                stat = path.stat()
+                if path.name.startswith(".") or path.is_dir() or (stat.st_ino, stat.st_mtime_ns) in self.seen:
+                    continue
+                self._open(path)
+            except FileNotFoundError:
+                continue  # replaced or removed just now
+            self.seen.add((stat.st_ino, stat.st_mtime_ns))
+
+    def _open(self, path: Path) -> None:
+        if path.suffix == ".nc":
+            assert without_clock(path) == self.undisturbed[path.name]
+        elif path.suffix == ".png":
+            assert path.read_bytes() == self.undisturbed[path.name]
+        elif path.suffix == ".npz":
+            with np.load(path, allow_pickle=False) as archive:
+                assert archive.zip.testzip() is None
+        else:
+            assert json.loads(path.read_bytes()), path
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return [folder / name for name in os.listdir(folder)]
+    except FileNotFoundError:
+        return []
+
+
+class Moments:
+    """When to strike, told from the names of the files: each method says whether it is now."""
+
+    def __init__(self, watch: Watch) -> None:
+        self.watch = watch
+        self.before = self._images()
+        self.tiles = len(self._tiles())
+
+    def _images(self) -> int:
+        try:
+            return (self.watch.folder / "small.checkpoint" / "running.npz").stat().st_mtime_ns
+        except FileNotFoundError:
+            return 0
+
+    def _tiles(self) -> list[str]:
+        return [name for name in self.watch.names if name.startswith("0")]
+
+    def _unfinished(self, *names: str) -> bool:
+        return any(name.endswith(".part") and name.startswith(names) for name in self.watch.names)
+
+    def start(self) -> bool:
+        """The lock is taken, no chunk is done."""
+        return ".small.lock" in self.watch.names
+
+    def kernel(self) -> bool:
+        """A chunk is done and saved, the next one is at work."""
+        return self._images() != self.before and not self._unfinished(".")
+
+    def checkpoint(self) -> bool:
+        return self._images() != self.before and self._unfinished(".running", ".0")
+
+    def tile(self) -> bool:
+        """A tile is saved, others of its group are not."""
+        return len(self._tiles()) > self.tiles
+
+    def dataset(self) -> bool:
+        return self._unfinished(".small.nc")
+
+    def files(self) -> bool:
+        """The dataset is there, its picture is not."""
+        return "small.nc" in self.watch.names and "small.png" not in self.watch.names
+
+    def picture(self) -> bool:
+        return self._unfinished(".small.png")
+
+
+def strike(runs: Runs, undisturbed: dict[str, bytes], moment: str, delay: float, with_signal: int) -> Any:
+    """Start the command and send the signal at the moment; None where it ended before that came."""
+    watch = Watch(runs.out, undisturbed)
+    watch.look()
+    now = getattr(Moments(watch), moment)
+    process = runs.start()
+    while not now():
+        if not process.is_alive():
+            return None
+        watch.look()
+        time.sleep(2e-4)
+    time.sleep(delay)
+    os.kill(process.pid, with_signal)
+    process.join(60)
+    watch.look()
+    return process
+
+
+MOMENTS = ("start", "kernel", "checkpoint", "tile", "dataset", "files", "picture")
+SOME = Counter(kernel=1, tile=1, dataset=1)
+MANY = Counter(start=4, kernel=14, checkpoint=14, tile=6, dataset=12, files=5, picture=5)
+"""How often to strike at each moment, sixty times in all."""
+
+
+@pytest.mark.parametrize("wanted", [SOME, pytest.param(MANY, marks=pytest.mark.campaign)], ids=["some", "many"])
+def test_killed_at_any_moment(
+    config: Path, tmp_path: Path, undisturbed: dict[str, bytes], wanted: Counter[str]
+) -> None:
+    rng = random.Random(1)
+    survived: Counter[str] = Counter()
+    for lane in range(40):
+        runs = Runs(config, tmp_path / f"{lane}")
+        for moment in sorted((m for m in MOMENTS for _ in range(3) if survived[m] < wanted[m]), key=MOMENTS.index):
+            # Up to a whole chunk later where the moment lasts, at once where it is over soon.
+            delay = rng.uniform(0, 0.03) if moment in ("start", "kernel", "files") else 0.0
+            process = strike(runs, undisturbed, moment, delay, signal.SIGKILL)
+            if process is None:
+                assert runs.started[-1].exitcode == 0, runs.started[-1].log.read_text()
+                break
+            if process.exitcode == -signal.SIGKILL:
+                survived[moment] += 1
+                assert ".small.lock" in os.listdir(runs.out)
+        code, said = runs.finish()
+        assert code == 0, said
+        assert contents(runs.out) == undisturbed
+        if survived >= wanted:
+            break
+    print(f"killed: {dict(survived)}, {survived.total()} times; {lane + 1} runs")
+    assert survived >= wanted, survived
+
+
+@pytest.mark.parametrize(
+    "moments",
+    [
+        ("kernel", "dataset"),
+        pytest.param(("kernel", "checkpoint", "kernel", "dataset", "files"), marks=pytest.mark.campaign),
+    ],
+    ids=["some", "many"],
+)
+def test_interrupted(runs: Runs, undisturbed: dict[str, bytes], moments: tuple[str, ...]) -> None:
+    for moment in moments:
+        process = strike(runs, undisturbed, moment, 0.0, signal.SIGINT)
+        assert process is not None
+        said = process.log.read_text()
+        assert (process.exitcode, "Traceback" in said) == (130, False), said
+        assert "finished and kept; the same command resumes the run" in said
+        assert not [name for name in os.listdir(runs.out) if name.startswith(".")]
+    code, said = runs.finish()
+    assert code == 0, said
+    assert contents(runs.out) == undisturbed
+
+
+@pytest.mark.campaign
+def test_killed_and_interrupted_from_the_shell(runs: Runs, values: xr.Dataset) -> None:
+    """The command as a user types it, with tiles and chunks as they are; its numbers are the same."""
+    command = [sys.executable, "-m", "sweep", "run", str(runs.config), "--output", str(runs.out)]
+    running = runs.out / "small.checkpoint" / "running.npz"
+    for with_signal, code in ((signal.SIGKILL, -9), (signal.SIGINT, 130)):
+        running.unlink(missing_ok=True)
+        with subprocess.Popen(
+            [*command, "--set", "t_end=1e6", "--set", "mu=[180, 200]"], cwd=ROOT, stderr=subprocess.PIPE, text=True
+        ) as process:
+            while not running.exists():
+                assert process.poll() is None
+                time.sleep(0.01)
+            process.send_signal(with_signal)
+            _, said = process.communicate(timeout=60)
+        assert process.returncode == code
+    assert "the same command resumes the run" in said
+    assert [path.name for path in runs.out.iterdir()] == ["small.checkpoint"]
+    done = subprocess.run([*command, "--fresh", "--quiet"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    same_values(runs.out / "small.nc", values)
+
+
+def refused(result: tuple[int, str], *words: str) -> None:
+    """One line that says these words, exit code 2."""
+    code, said = result
+    assert code == 2, said
+    assert all(word in said for word in words), said
+    assert "Traceback" not in said
+    assert len(said.splitlines()) == 1, said
+
+
+# Bytes a file may have: less than the images of a group, than the dataset, than the picture.
+ROOM = {"running.npz": 2_000, "small.nc": 30_000, "small.png": 90_000}
+
+
+@pytest.mark.parametrize(
+    "file",
+    ["small.nc", *(pytest.param(name, marks=pytest.mark.campaign) for name in ("running.npz", "small.png"))],
+)
+def test_a_file_that_finds_no_room_is_reported(runs: Runs, undisturbed: dict[str, bytes], file: str) -> None:
+    refused(runs.finish("--quiet", room=ROOM[file]), file, "cannot be written: File too large")
+    Watch(runs.out, undisturbed).look()
+    assert not list(runs.out.rglob(".*"))
+    code, said = runs.finish()
+    assert code == 0, said
+    assert contents(runs.out) == undisturbed
+
+
+@pytest.mark.campaign
+def test_a_full_disk_is_reported(runs: Runs, values: xr.Dataset) -> None:
+    """A disk that grows, in a name space of its own; files that may grow where there is no such thing."""
+    # Kilobytes of the disk, or of a file.
+    sizes = {"running.npz": (12, 4), "small.nc": (64, 32), "small.png": (160, 90), "": (4096, 4096)}
+    runs.out.mkdir()
+    own = subprocess.run(["unshare", "-rm", "mount", "-t", "tmpfs", "x", runs.out], capture_output=True, check=False)
+    disk = own.returncode == 0
+    print("a disk of its own" if disk else "no name space: files of limited size instead")
+    lines = [f'mount -t tmpfs -o size=4k tmpfs "{runs.out}"'] if disk else []
+    for i, (whole, each) in enumerate(sizes.values()):
+        lines.append(f'mount -o remount,size={whole}k "{runs.out}"' if disk else f"ulimit -S -f {each}")
+        command = f'"{sys.executable}" -m sweep run "{runs.config}" --output "{runs.out}" --quiet'
+        lines.append(
+            f'{command} >"{runs.out}.{i}" 2>&1; echo $? >>"{runs.out}.{i}"; cp -a "{runs.out}" "{runs.out}-{i}"'
+        )
+    script = "\n".join(lines)
+    subprocess.run([*(["unshare", "-rm"] if disk else []), "bash", "-c", script], cwd=ROOT, check=True)
+    for i, file in enumerate(sizes):
+        *said, code = (runs.out.parent / f"{runs.out.name}.{i}").read_text().splitlines()
+        if file:
+            reason = "No space left on device" if disk else "File too large"
+            refused((int(code), "\n".join(said)), file, reason)
+        else:
+            assert (int(code), said) == (0, [])
+        left = runs.out.parent / f"{runs.out.name}-{i}"
+        assert not list(left.rglob(".*"))
+        for path in left.glob("*.nc"):
+            same_values(path, values)
+
+
+@pytest.mark.parametrize(
+    "what", ["folder", *(pytest.param(w, marks=pytest.mark.campaign) for w in ("parent", "checkpoint"))]
+)
+def test_a_read_only_folder_is_reported(runs: Runs, undisturbed: dict[str, bytes], what: str) -> None:
+    assert strike(runs, undisturbed, "kernel", 0.0, signal.SIGKILL)
+    checkpoint = runs.out / "small.checkpoint"
+    if what == "parent":
+        shutil.rmtree(runs.out)
+    (runs.out / ".small.lock").unlink(missing_ok=True)
+    folder = {"folder": runs.out, "parent": runs.out.parent / "closed", "checkpoint": checkpoint}[what]
+    folder.mkdir(exist_ok=True)
+    folder.chmod(0o555)
+    if what == "parent":
+        runs.out = folder / "out"
+    refused(runs.finish("--quiet", unprivileged=True), str(folder), "Permission denied")
+    folder.chmod(0o755)
+    code, said = runs.finish(unprivileged=True)
+    assert code == 0, said
+    assert contents(runs.out) == undisturbed
+
+
+@pytest.mark.campaign
+def test_two_processes_at_once(runs: Runs, undisturbed: dict[str, bytes]) -> None:
+    watch = Watch(runs.out, undisturbed)
+    now = Moments(watch).kernel
+    first = runs.start()
+    while not now():
+        assert first.is_alive()
+        watch.look()
+    os.kill(first.pid, signal.SIGSTOP)  # at work for as long as it takes
+    refused(runs.finish("--quiet"), f"{runs.out / 'small'}: another run is at work there")
+    refused(runs.finish("--quiet", "--fresh"), "another run is at work there")
+    os.kill(first.pid, signal.SIGCONT)
+    first.join(60)
+    assert first.exitcode == 0, first.log.read_text()
+    assert contents(runs.out) == undisturbed

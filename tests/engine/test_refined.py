@@ -1,0 +1,294 @@
+"""Refined runs: which nodes are simulated, what is inferred of the others, and the run around it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.runs import Stop, same_numbers
+
+import sweep
+from sweep import ConfigError
+from sweep.cli import main
+from sweep.engine import local
+from sweep.engine.cluster import connected
+from sweep.engine.local import Done
+from sweep.engine.refinement import UNKNOWN, missing, sources
+from sweep.results.dataset import STATUSES, VARIABLES
+
+Write = Callable[..., Path]
+
+
+def refine(full: np.ndarray, depth: int, refined: tuple[int, ...] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """What a search that can look nodes up in `full` infers, and which it has looked up."""
+    axes = tuple(range(full.ndim)) if refined is None else refined
+    outcome = np.full(full.shape, UNKNOWN, np.int32)
+    while len(nodes := missing(outcome, axes, depth)):
+        assert (np.diff(nodes) > 0).all()
+        assert (outcome.ravel()[nodes] == UNKNOWN).all()  # nothing twice
+        outcome.ravel()[nodes] = full.ravel()[nodes]
+    simulated, source = outcome != UNKNOWN, sources(outcome, axes, depth)
+    assert simulated.ravel()[source].all()
+    assert (source[simulated] == np.flatnonzero(simulated)).all()
+    return full.ravel()[source], simulated
+
+
+def lattice(shape: tuple[int, ...]) -> np.ndarray:
+    """Places of the nodes, shape (axes, *shape)."""
+    return np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij")).astype(float)
+
+
+@st.composite
+def maps(draw: Any, axes: int, most: int) -> tuple[tuple[int, ...], int, np.ndarray]:
+    """Shape, depth and a place on the map; each axis has a block at least."""
+    depth = draw(st.integers(1, 3))
+    shape = tuple(draw(st.integers(2**depth + 1, most)) for _ in range(axes))
+    return shape, depth, np.array([draw(st.floats(0, n - 1)) for n in shape])
+
+
+directions = st.floats(-1, 1).filter(lambda x: abs(x) > 1e-3)
+
+
+@settings(max_examples=80)
+@given(maps(2, 60), directions, directions)
+def test_half_planes(case: tuple[tuple[int, ...], int, np.ndarray], x: float, y: float) -> None:
+    shape, depth, through = case
+    full = (np.tensordot([x, y], lattice(shape) - through[:, None, None], 1) > 0).astype(np.int32)
+    inferred, _ = refine(full, depth)
+    np.testing.assert_array_equal(inferred, full)
+
+
+@given(maps(2, 60), st.floats(1.01, 3))
+def test_discs_wider_than_the_largest_blocks(case: tuple[tuple[int, ...], int, np.ndarray], radius: float) -> None:
+    shape, depth, centre = case
+    distance = np.linalg.norm(lattice(shape) - centre[:, None, None], axis=0) - radius * 2**depth
+    full = np.where(distance < 0, 7, 3)
+    inferred, _ = refine(full, depth)
+    # Between two nodes outside the line may come in by 1/8 of its curvature times their distance squared.
+    assert (abs(distance[inferred != full]) < 0.5).all()
+
+
+@given(st.integers(1, 4), st.lists(st.integers(1, 40), min_size=1, max_size=5))
+def test_stretches_longer_than_the_largest_blocks(depth: int, lengths: list[int]) -> None:
+    full = np.repeat(np.arange(len(lengths)), [2**depth + n for n in lengths])
+    inferred, simulated = refine(full, depth)
+    np.testing.assert_array_equal(inferred, full)
+    # Each change is found by halving: a node a level.
+    assert simulated.sum() <= len(full) / 2**depth + 2 + (len(lengths) - 1) * (2 * depth + 1)
+
+
+@settings(max_examples=30)
+@given(maps(3, 17), directions, directions, st.floats(1.01, 2))
+def test_three_axes(case: tuple[tuple[int, ...], int, np.ndarray], x: float, y: float, radius: float) -> None:
+    shape, depth, place = case
+    away = lattice(shape) - place[:, None, None, None]
+    half = (np.tensordot([x, y, 1.0], away, 1) > 0).astype(np.int32)
+    np.testing.assert_array_equal(refine(half, depth)[0], half)
+    distance = np.linalg.norm(away, axis=0) - radius * 2**depth
+    ball = (distance < 0).astype(np.int32)
+    assert (abs(distance[refine(ball, depth)[0] != ball]) < 0.75).all()
+
+
+@settings(max_examples=30)
+@given(maps(3, 20), st.floats(0.1, 2))
+def test_each_value_of_an_unrefined_axis_is_a_map_of_its_own(
+    case: tuple[tuple[int, ...], int, np.ndarray], slope: float
+) -> None:
+    shape, depth, through = case
+    x, y, z = lattice(shape) - through[:, None, None, None]
+    full = (x + slope * z > 3 * np.sin(7 * y)).astype(np.int32)
+    inferred, simulated = refine(full, depth, (0, 2))
+    np.testing.assert_array_equal(inferred, full)
+    for i in range(shape[1]):
+        np.testing.assert_array_equal(refine(full[:, i], depth)[1], simulated[:, i])
+
+
+@given(maps(2, 60), st.integers(1, 4))
+def test_where_all_nodes_differ_all_are_simulated(case: tuple[tuple[int, ...], int, np.ndarray], blocks: int) -> None:
+    shape, depth, place = case
+    first = [min(int(p), n - 2**depth) for p, n in zip(place, shape, strict=True)]  # so that a coarse node is in it
+    speckle = tuple(slice(i, i + blocks * 2**depth) for i in first)
+    full = np.zeros(shape, np.int32)
+    full[speckle] = 1 + np.arange(full[speckle].size).reshape(full[speckle].shape)
+    inferred, simulated = refine(full, depth)
+    assert simulated[speckle].all()
+    np.testing.assert_array_equal(inferred, full)
+
+
+def test_one_outcome_is_known_from_the_coarse_nodes() -> None:
+    _, simulated = refine(np.zeros((70, 33, 2), np.int32), 4, (0, 1))
+    assert simulated.sum() == 6 * 3 * 2  # 0, 16 … 64, 69 × 0, 16, 32 × both
+    assert simulated[::16, ::16].all()
+    assert simulated[-1, ::16].all()
+
+
+def test_a_change_that_shows_late_halves_the_blocks_it_reaches() -> None:
+    # A finger that no coarse node sees but where it starts.
+    full = np.zeros((65, 65), np.int32)
+    full[16:19, 5:] = 1
+    inferred, simulated = refine(full, 4)
+    np.testing.assert_array_equal(inferred, full)
+    assert simulated.mean() < 0.4
+
+
+@settings(max_examples=40)
+@given(st.integers(1, 3), st.floats(0.1, 0.9), st.booleans())
+def test_lines_one_cell_wide_are_followed(depth: int, slope: float, upright: bool) -> None:
+    columns = np.arange(65)
+    at = np.round(slope * columns).astype(int)
+    full = np.zeros((65, 65), np.int32)
+    full[at, columns] = full[at[1:], columns[:-1]] = 1  # from a coarse node on, without diagonal gaps
+    full = full.T if upright else full
+    np.testing.assert_array_equal(refine(full, depth)[0], full)
+
+
+@pytest.mark.parametrize(("slope", "most"), [(0, 870), (0.37, 1135), (1, 1442)])
+def test_lines_cost_little(slope: float, most: int) -> None:
+    """Along a line of the map, and nothing ahead of an answer that makes it needless: then it would be twice that."""
+    x, y = lattice((257, 257))
+    inferred, simulated = refine((x - 101 + slope * (y - 128) > 0.05).astype(np.int32), 4)
+    assert simulated.sum() <= most
+    assert 0 < inferred.mean() < 1
+
+
+MAP = """\
+name: map
+body: {a: 10.0, b: {start: 1.5, stop: 5, num: 11}, delta: 0.03}
+friction: {mu: {start: 20, stop: 80, num: 14}}
+start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
+integrator: {t_end: 1500}
+refine: 2
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("map") / "map.yaml"
+    path.write_text(MAP, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def refined(file: Path) -> xr.Dataset:
+    return sweep.run(file)
+
+
+@pytest.fixture(scope="module")
+def full(file: Path) -> xr.Dataset:
+    return sweep.run(file, refine=0)
+
+
+def test_simulated_cells_are_those_of_the_full_run(refined: xr.Dataset, full: xr.Dataset) -> None:
+    simulated = refined.inferred == 0
+    assert 0.1 < float(simulated.mean()) == refined.attrs["simulated_share"] < 0.9
+    assert set(full.data_vars) - set(refined.data_vars) == {"noise_limited", "step_rule"}
+    assert set(refined.data_vars) - set(full.data_vars) == {"inferred"}
+    assert refined.inferred.attrs["flag_meanings"] == "simulated inferred"
+    assert "inferred" not in full
+    for name in set(refined.data_vars) - {"inferred"}:
+        here = simulated if "n0" in refined[name].dims else simulated.any("n0")
+        everywhere = name in ("reversals", "status") or ("linear" not in name and "n0" not in refined[name].dims)
+        if everywhere or name == "reversals_predicted":
+            xr.testing.assert_equal(refined[name], full[name])
+        else:
+            xr.testing.assert_equal(refined[name], full[name].where(here))
+        assert refined[name].dtype == full[name].dtype
+        assert {"long_name", "units"} <= set(refined[name].attrs)
+
+
+def test_failures_are_outcomes_too(write: Write) -> None:
+    text = MAP.replace("[0.02, 0.05]", "{start: 0.05, stop: 3, num: 40}").replace("x0: 0.01", "x0: 1")
+    settings = {"mu": 20.0, "b": 3.0, "t_end": 5.0}
+    refined = sweep.run(write(text), **settings)
+    full = sweep.run(write(text), **settings, refine=0)
+    assert refined.attrs["simulated_share"] < 0.9
+    assert {STATUSES[int(i)] for i in full.status} == {"time_limit", "lift_off"}
+    xr.testing.assert_equal(refined.status, full.status)
+
+
+def test_lists_and_short_ranges_are_simulated_as_they_are(write: Write) -> None:
+    listed = sweep.run(write(MAP), mu=[20.0, 30.0, 40.0, 50.0, 60.0, 70.0], t_end=50.0)
+    assert (listed.inferred == 0).any("b").all()
+    short = sweep.run(write(MAP), refine=4, t_end=50.0)
+    assert (short.inferred == 0).all()
+    assert "inferred" not in sweep.run(write(MAP), mu=20.0, b=3.0, n0=0.02, t_end=50.0)
+
+
+def test_resumes_and_recomputes_nothing(
+    file: Path, refined: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran = Counter[int]()
+    run_group = local.run_group
+
+    def counted(*arguments: Any, **options: Any) -> Iterator[Done]:
+        for done in run_group(*arguments, **options):
+            ran[done.tile] += 1
+            yield done
+
+    monkeypatch.setattr(local, "run_group", counted)
+    monkeypatch.setattr(local, "GROUP", 20)
+    monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: 20)  # noqa: ARG005
+    interruptions = 0
+    while True:
+        try:
+            result = sweep.run(file, tmp_path / "out", reporter=(last := Stop(3)))
+            break
+        except KeyboardInterrupt:
+            interruptions += 1
+    assert interruptions > 3
+    assert len(ran) > 5
+    assert set(ran.values()) == {1}
+    same_numbers(result, refined)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"map.nc", "map.png"}
+    assert last.seen[-1].done == last.seen[-1].cells == int((refined.inferred == 0).sum())
+    assert last.seen[-1].done_before > 0
+
+
+def test_command_tells_the_share(file: Path, refined: xr.Dataset, tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, ["run", str(file), "--output", str(tmp_path / "out")], catch_exceptions=False)
+    assert result.exit_code == 0
+    assert f"simulated: {refined.attrs['simulated_share']:.1%} of the cells" in result.stdout
+    same_numbers(xr.load_dataset(tmp_path / "out" / "map.nc"), refined)
+    status = ["plot", str(tmp_path / "out" / "map.nc"), "--var", "inferred"]
+    assert CliRunner().invoke(main, status, catch_exceptions=False).exit_code == 0
+
+
+def test_in_other_processes(file: Path, refined: xr.Dataset) -> None:
+    with connected(1, None) as cluster:
+        same_numbers(sweep.run(file, cluster=cluster), refined)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "said"),
+    [
+        (MAP.replace("refine: 2", "refine: -1"), "6:9: refine", "greater than or equal to 0"),
+        (MAP.replace("refine: 2", "refine: 1.5"), "6:9: refine", "1.5: "),
+        (MAP.replace("refine: 2", "refine: 25"), "6:9: refine", "less than or equal to 24"),
+        (MAP + "verify: 0.1\n", "7:9: verify", "allowed: 0"),
+        (MAP + "measure: [energy_error]\n", "7:10: measure", "allowed: reversals among them"),
+        (MAP + "model: analytic\n", "6:9: refine", "allowed: 0"),
+        (MAP.replace("num: 11", "num: 5000").replace("num: 14", "num: 5000"), "6:9: refine", "at most 16777216"),
+        ("cases: c.csv\nrefine: 1\n", "2:9: refine", "with cases, which have no neighbours; allowed: 0"),
+    ],
+)
+def test_what_cannot_be_refined(text: str, place: str, said: str, write: Write, tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text("mu\n60\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        sweep.load_config(write(text))
+    assert f"small.yaml:{place}: " in str(error.value)
+    assert said in str(error.value)
+
+
+def test_the_refinement_is_part_of_the_fingerprint(file: Path) -> None:
+    configs = [sweep.load_config(file, {"refine": depth}) for depth in (0, 1, 2)]
+    assert len({config.fingerprint() for config in configs}) == 3
+    assert sweep.load_config(file).refine == 2
+    assert "inferred" in VARIABLES

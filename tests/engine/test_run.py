@@ -1,0 +1,112 @@
+"""Whole runs: from a configuration to numbers, however they are cut into tiles, chunks and sittings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import SMALL
+from support.kernels import images, kernel
+from support.runs import Stop, same_numbers
+
+import sweep
+from sweep.engine import executor
+from sweep.engine.plan import plan
+from sweep.kernels.kernel import Kernel
+
+Write = Callable[..., Path]
+
+
+def test_cases(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
+    rows = [(40, 2, 0.05), (60, 5, 0.02)]
+    text = "mu,b,n0\n" + "\n".join(",".join(map(str, row)) for row in rows)
+    (tmp_path / "cells.csv").write_text(text, encoding="utf-8")
+    dataset = sweep.run(write("cases: cells.csv\nintegrator: {t_end: 1500}\n", "table.yaml"), tmp_path / "out")
+    assert dict(dataset.sizes) == {"case": 2}
+    for i, (mu, b, n0) in enumerate(rows):
+        one, other = dataset.isel(case=i), small.sel(mu=mu, b=b, n0=n0)
+        for name in small.data_vars:
+            np.testing.assert_array_equal(one[name], other[name])
+    same_numbers(xr.load_dataset(tmp_path / "out" / "table.nc"), dataset)
+
+
+def test_predict_gives_only_predictions(write: Write, small: xr.Dataset) -> None:
+    predicted = sweep.predict(write())
+    xr.testing.assert_identical(predicted["n_c2_minus"], small["n_c2_minus"])
+    assert "reversals" not in predicted
+
+
+def test_python_writes_nothing_by_itself(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = write()
+    sweep.run(file, mu=40.0, b=2.0)
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
+    out, interruptions, steps = tmp_path / "out", 0, [0.0]
+    while True:
+        try:
+            dataset = sweep.run(write(), out, reporter=Stop(5))
+            break
+        except KeyboardInterrupt:
+            interruptions += 1
+            assert [path.name for path in out.iterdir()] == ["small.checkpoint"]
+            with np.load(out / "small.checkpoint" / "running.npz") as archive:
+                (part,) = plan(sweep.load_config(write())).parts
+                steps.append(archive["dopri5"][:, part.kernel.row("done")].sum())
+    assert interruptions > 2
+    assert steps == sorted(set(steps))
+    same_numbers(dataset, small)
+    assert {path.name for path in out.iterdir()} == {"small.nc", "small.png"}
+
+
+@pytest.mark.parametrize("size", [1, 5, 7])
+def test_tiles_do_not_touch_the_numbers(
+    write: Write, tmp_path: Path, small: xr.Dataset, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: size)  # noqa: ARG005
+    monkeypatch.setattr("sweep.engine.local.GROUP", 2)
+    same_numbers(sweep.run(write()), small)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(write(), tmp_path / "out", reporter=Stop(3))
+    same_numbers(sweep.run(write(), tmp_path / "out"), small)
+    checked = sweep.run(write(SMALL + "verify: 0.5\n"))
+    monkeypatch.undo()
+    xr.testing.assert_equal(checked, sweep.run(write(SMALL + "verify: 0.5\n")))
+
+
+def test_chunks_are_kept_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C waits for a chunk: it takes `CHUNK_SECONDS` wherever a block takes less, by a clock of the test's own."""
+    clock = 0.0
+    chunks: list[float] = []
+    ours = kernel()
+    table = images(ours, 0.02, 5_000.0, mu=np.linspace(40, 60, 8))
+
+    def advance(*arguments: Any) -> None:
+        nonlocal clock
+        Kernel.advance(ours, *arguments)
+        chunks.append(0.01 * arguments[2])
+        clock += chunks[-1]
+
+    monkeypatch.setattr(ours, "advance", advance)
+    monkeypatch.setattr(executor.time, "perf_counter", lambda: clock)
+    executor.execute(ours, table, stop_when_settled=False)
+    assert len(chunks) > 20
+    assert max(chunks) <= 1.01 * executor.CHUNK_SECONDS
+    assert np.median(chunks) > 0.9 * executor.CHUNK_SECONDS
+
+
+def test_a_kernel_that_no_cache_holds_is_built_in_a_process_of_its_own(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(Kernel, "is_compiled", lambda _: False)
+    monkeypatch.setattr("sweep.engine.plan.build", lambda *which: told.append(str(which)))
+    plan(sweep.load_config(write()), compiling=lambda: told.append("compiling"))
+    assert told == ["compiling", "('dopri5', 'slip', ('reversals', 'energy_error', 'noise_limited'))"]

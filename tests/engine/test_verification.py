@@ -1,0 +1,117 @@
+"""The method of each cell by its cost, and a run that checks itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from support import SMALL, columns
+from support.runs import Stop, same_numbers
+
+import sweep
+from sweep import ConfigError
+from sweep.cli import main
+from sweep.engine.executor import execute
+from sweep.engine.plan import plan
+from sweep.engine.verification import verify
+from sweep.kernels import methods
+from sweep.models import MODELS
+
+Write = Callable[..., Path]
+
+MIXED = """\
+friction: {mu: [1.0, 60, 1000]}
+start: {n0: [0.02, 0.3]}
+integrator: {method: auto, t_end: 60}
+"""
+
+
+def test_the_cheapest_method_depends_on_friction_and_time() -> None:
+    slip = MODELS["slip"]
+    by_mu = methods.cheapest(slip, columns(mu=[1.0, 60.0, 1e3, 1e5]), 1e-6, 400.0)
+    assert [list(methods.METHODS)[i] for i in by_mu[1:]] == ["adams"] * 3
+    assert list(methods.METHODS)[methods.cheapest(slip, columns(), 1e-6, 1.0)[0]] == "dopri5"
+    assert (methods.cheapest(MODELS["averaged"], columns(), 1e-6, 400.0) == list(methods.METHODS).index("dopri5")).all()
+
+
+def test_auto_runs_each_cell_with_its_cheapest_method(write: Write) -> None:
+    mixed = sweep.run(write(MIXED))
+    names = np.array(list(methods.METHODS))[mixed["method"].values]
+    assert set(names.ravel()) == set(methods.METHODS)
+    assert mixed["method"].attrs["flag_meanings"] == " ".join(methods.METHODS)
+    for method in methods.METHODS:
+        alone = sweep.run(write(MIXED), method=method)
+        assert "method" not in alone
+        for name in ("spin_final", "reversals", "status", "step", "energy_error", "t_stop"):
+            np.testing.assert_array_equal(mixed[name].values[names == method], alone[name].values[names == method])
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_auto_resumes_from_a_checkpoint(write: Write, tmp_path: Path) -> None:
+    file, interrupted = write(MIXED.replace("60}\n", "600}\n") + "name: mixed\n"), 0
+    whole = sweep.run(file)
+    while True:
+        try:
+            same_numbers(sweep.run(file, tmp_path / "out", reporter=Stop(1)), whole)
+            break
+        except KeyboardInterrupt:
+            interrupted += 1
+    assert interrupted >= 2
+
+
+def test_a_fixed_step_needs_a_method(write: Write) -> None:
+    with pytest.raises(ConfigError, match=r"2:34: integrator\.step: a number with method: auto; allowed: auto"):
+        sweep.load_config(write("friction: {mu: 60}\nintegrator: {method: auto, step: 0.01}\n"))
+    averaged = sweep.load_config(write("model: averaged\nfriction: {mu: 60}\nintegrator: {method: auto}\n"))
+    assert [part.method for part in plan(averaged).parts] == ["dopri5"]
+
+
+def test_verified_cells_are_run_again(write: Write) -> None:
+    result = sweep.run(write(SMALL + "verify: 0.4\n"))
+    assert result.sizes["verified"] == 5  # of twelve
+    cells = result["verified_cell"].values
+    assert (np.diff(cells) > 0).all()
+    assert (result["verified_step"].values <= result["step"].values.ravel()[cells] / 2 * (1 + 1e-12)).all()
+    same = result["verified_reversals"].values == result["reversals"].values.ravel()[cells]
+    assert result.attrs["verified_counts_changed"] == (~same).sum() == 0
+    worst = np.abs(result["verified_spin_final"].values - result["spin_final"].values.ravel()[cells]).max()
+    assert result.attrs["verified_largest_spin_difference"] == worst
+    assert 0 < worst < 1e-6
+    plain = sweep.run(write())
+    xr.testing.assert_equal(result[list(plain.data_vars)], plain)
+
+
+def test_verification_sees_a_step_too_long(write: Write) -> None:
+    file = write(SMALL + "verify: 1\n")
+    rough = sweep.run(file, method="adams", tolerance=0.01)
+    fine = sweep.run(file, method="adams")
+    assert rough.attrs["verified_largest_spin_difference"] > 1e-5 > fine.attrs["verified_largest_spin_difference"]
+    coarse = sweep.run(file, step=0.02)
+    assert coarse.attrs["verified_largest_spin_difference"] > 1e-11
+    np.testing.assert_allclose(coarse["verified_step"], coarse["step"].values.ravel() / 2, rtol=1e-3)
+
+
+def test_a_changed_count_is_counted(write: Write) -> None:
+    job = plan(sweep.load_config(write(SMALL + "verify: 1\n")))
+    (part,) = job.parts
+    execute(part.kernel, part.images, stop_when_settled=True)
+    part.images[3, part.kernel.row("reversals")] += 1
+    found = verify(job, np.arange(12))
+    np.testing.assert_array_equal(found["verified_cell"], np.arange(12))
+    assert list(np.flatnonzero(found["verified_count_changed"])) == [3]
+
+
+def test_the_command_prints_the_verification(write: Write, tmp_path: Path) -> None:
+    arguments = ["run", str(write()), "--set", "verify=0.1", "--output", str(tmp_path / "out")]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0
+    assert (
+        "verified: 2 cells run again with finer steps: 0 counts changed, the largest difference in spin"
+        in result.stdout
+    )
+    with pytest.raises(ConfigError, match=r"verify: the analytic model takes no steps; allowed: 0"):
+        sweep.load_config(write("model: analytic\nfriction: {mu: 60}\nverify: 0.1\n"))

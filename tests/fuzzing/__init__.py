@@ -1,0 +1,380 @@
+"""Inputs that are nearly right, and what must hold for each of them.
+
+A kind takes a source of randomness and a folder, makes one input, hands it in, and returns whether it was accepted.
+It raises `Violation` where the input was neither accepted nor properly refused.  tests/test_fuzz.py tries some inputs
+of each kind with hypothesis; a campaign tries many:
+
+    python -m tests.fuzzing --inputs 10000
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from click.testing import CliRunner
+
+import sweep
+from sweep import cli
+from sweep.config import ConfigError, load_config
+from sweep.config.document import parse_value
+from sweep.parameters import PARAMETERS
+from sweep.results.checkpoint import Checkpoint
+from sweep.results.identity import Identity
+from sweep.results.store import StoreError
+from sweep.studies.trajectory import _choose
+
+from .text import KEYS, ODD, block, damage, near_valid, tree
+
+
+class Violation(AssertionError):
+    """An input that was neither accepted nor properly refused."""
+
+
+def check_refusal(error: Exception, *files: str) -> None:
+    """Every line of a refusal names a file, is short and printable, and says more than the name."""
+    text = str(error)
+    for line in text.split("\n"):
+        named = [file for file in files if line.startswith(file)] or ([] if not line.startswith("  ") else [""])
+        if not named or not line.isprintable() or not 0 < len(line) - len(named[0]) < 1500 or ": " not in line + ": ":
+            raise Violation(f"a useless refusal: {line!r:.500} of {text!r:.500}")
+    for fault in getattr(error, "faults", ()):
+        if fault.line is not None and (fault.line < 1 or not fault.message):
+            raise Violation(f"a fault without place or message: {fault!r:.500}")
+
+
+def _refused(call: Callable[[], Any], *files: str) -> Any:
+    """What `call` returns, or None if it refuses the input."""
+    try:
+        return call()
+    except (ConfigError, StoreError) as error:
+        check_refusal(error, *files)
+        return None
+
+
+def _round_trip(config: Any, folder: Path) -> None:
+    again = folder / "again.yaml"
+    again.write_text(config.to_yaml(), encoding="utf-8")
+    other = load_config(again)
+    if (other.fingerprint(), list(other.axes)) != (config.fingerprint(), list(config.axes)):
+        raise Violation(f"read again, another configuration:\n{config.to_yaml()}\n{other.to_yaml()}")
+    if Path(os.path.normpath(folder / config.name)).parent != folder or not config.name.isprintable():
+        raise Violation(f"a name that leaves the folder: {config.name!r}")
+
+
+def prepare(folder: Path) -> Path:
+    """Put the files that fuzzed configurations may name into `folder`."""
+    if not (folder / "fifo").exists():
+        folder.mkdir(exist_ok=True)
+        os.mkfifo(folder / "fifo")
+        (folder / "loop").symlink_to("loop")
+        (folder / "cells.csv").write_text("n0,y0\n0.1,0\n0.2,0\n", encoding="utf-8")
+        (folder / "base.yaml").write_text("friction: {mu: 60}\n", encoding="utf-8")
+    return folder
+
+
+def _configuration(data: bytes, folder: Path) -> bool:
+    file = folder / "fuzzed.yaml"
+    file.write_bytes(data)
+    tables = [str(folder / "cells.csv"), "/etc/passwd", "."]
+    config = _refused(lambda: load_config(file), str(file), *tables)
+    if config is not None:
+        _round_trip(config, folder)
+    return config is not None
+
+
+def yaml_tree(random: Random, folder: Path) -> bool:
+    return _configuration(near_valid(random), folder)
+
+
+def yaml_bytes(random: Random, folder: Path) -> bool:
+    return _configuration(damage(random, block(tree(random), random).encode()), folder)
+
+
+def setting(random: Random, folder: Path) -> bool:
+    """`--set PATH=VALUE`, alone or several."""
+    paths = (*PARAMETERS, "friction.mu", "body.a", "integrator.step", "step", "t_end", "verify", "measure", "cases",
+             "name", "model", "integrator", "friction", "mu.start", "name.x", ".", "a..b", *KEYS)  # fmt: skip
+    given = []
+    for _ in range(random.choice((1, 1, 2))):
+        text = f"{random.choice(paths)}={random.choice(ODD)}"
+        if random.random() < 0.3:
+            text = damage(random, text.encode()).decode("utf-8", "surrogateescape")
+        given.append(text)
+    file = folder / "base.yaml"
+    names = (str(file), "--set", str(folder / "cells.csv"), "/etc/passwd")
+    config = _refused(lambda: cli._load(file, tuple(given)), *names)
+    if config is not None:
+        _round_trip(config, folder)
+    return config is not None
+
+
+def value(random: Random, folder: Path) -> bool:  # noqa: ARG001
+    """The text of a single value."""
+    text = random.choice(ODD)
+    for _ in range(random.randrange(3)):
+        text = random.choice((f"[{text}, {random.choice(ODD)}]", f"{{a: {text}}}", text + random.choice(ODD)))
+    data = damage(random, text.encode()) if random.random() < 0.5 else text.encode()
+    found: list[Any] = []
+    _refused(lambda: found.append(parse_value(data.decode("utf-8", "surrogateescape"), "--set x")), "--set x")
+    if found:
+        json.dumps(found)  # plain data, whatever was written
+    return bool(found)
+
+
+@cache
+def _config_at(path: Path) -> Any:
+    return load_config(path)
+
+
+def at(random: Random, folder: Path) -> bool:
+    """`--at NAME=VALUE`."""
+    texts = [
+        f"{random.choice((*PARAMETERS, *PARAMETERS, *KEYS))}={random.choice((*ODD, '0.01', '0.02'))}"
+        for _ in range(random.choice((1, 2, 3, 40)))
+    ]
+    if random.random() < 0.3:
+        texts.append(damage(random, texts.pop().encode()).decode("utf-8", "surrogateescape"))
+
+    def choose() -> Any:
+        pairs: dict[str, list[float]] = {}
+        for name, number in (cli._parse_pair(text, "--at") for text in texts):
+            pairs.setdefault(name, []).append(number)
+        known = {name: numbers for name, numbers in pairs.items() if name in PARAMETERS}
+        return _choose(_config_at(folder / "base.yaml"), known)
+
+    return _refused(choose, "--at") is not None
+
+
+CELLS = (
+    "1", "2.5", "0.01", "", " ", "nan", "inf", "-inf", "1_000", "1,000", "1.000,5", '"1,5"', "٣", "²", "1e400", "0x1",
+    "-1", "'1'", '"', '""', '"1\n2"', "1;2", "1\t2", "é", "\0", "\x1b[2J", "x" * 500, "1e-3", "=1+1", "\ufeff1",
+)  # fmt: skip
+
+
+def table(random: Random, folder: Path) -> bool:
+    """A table of cases with cells, bytes or both changed."""
+    names = random.sample(sorted(PARAMETERS), random.randrange(1, 6))
+    if random.random() < 0.15:
+        names.insert(random.randrange(len(names) + 1), random.choice((*KEYS, *CELLS, *names)))
+    values = {parameter.name: parameter.default or 60.0 for parameter in PARAMETERS.values()}
+    rows = [[f"{values.get(name, 1)}" for name in names] for _ in range(random.randrange(5))]
+    for _ in range(random.choice((0, 1, 2))):
+        if rows:
+            row = random.choice(rows)
+            if row and random.random() < 0.8:
+                row[random.randrange(len(row))] = random.choice(CELLS)
+            else:
+                row[:] = random.choice((row[1:], [*row, "1"], row * 3000))
+    comma, end = random.choice((*",,,,,,,,,,;\t|",)), random.choice(("\n", "\n", "\r\n", "\r"))
+    data = "".join(comma.join(row) + end for row in [names, *rows]).encode()
+    if random.random() < 0.3:
+        data = damage(random, data)
+    (folder / "fuzzed.csv").write_bytes(data)
+    given = "" if "mu" in names else "friction: {mu: 60}\n"
+    file = folder / "table.yaml"
+    file.write_text(f"cases: fuzzed.csv\n{given}", encoding="utf-8")
+    config = _refused(lambda: load_config(file), str(file), str(folder / "fuzzed.csv"))
+    if config is not None:
+        cells = [(name, number) for name, column in config.cases.items() for number in column]
+        if wrong := [cell for cell in cells if not (np.isfinite(cell[1]) and PARAMETERS[cell[0]].allows(cell[1]))]:
+            raise Violation(f"a case out of bounds: {wrong[0]} of {data!r}")
+        _round_trip(config, folder)
+    return config is not None
+
+
+def _invoke(folder: Path, *arguments: str) -> bool:
+    """Run the command line: it exits with 0 or 2 whatever it is given, and writes nothing but the picture of `plot`."""
+    before = set(folder.rglob("*"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        result = CliRunner().invoke(cli.main, list(arguments))
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise Violation(f"{arguments}: {result.exception!r:.500}") from result.exception
+    if result.exit_code not in (0, 2):
+        raise Violation(f"{arguments}: exit code {result.exit_code}")
+    if result.exit_code == 2 and (result.stdout or not result.stderr.strip()):
+        raise Violation(f"{arguments}: {result.stdout!r:.200} {result.stderr!r:.200}")
+    if written := sorted(set(folder.rglob("*")) - before, reverse=True):
+        for path in written:  # otherwise the same input would not fail again
+            path.rmdir() if path.is_dir() else path.unlink()
+        if result.exit_code or written != [folder / "picture.png"]:
+            raise Violation(f"{arguments}: written: {written}")
+    return result.exit_code == 0
+
+
+def dry_run(random: Random, folder: Path) -> bool:
+    """A configuration through the command line."""
+    file = folder / "fuzzed.yaml"
+    file.write_bytes(near_valid(random))
+    return _invoke(folder, "run", str(file), "--dry-run", "--output", str(folder / "out"))
+
+
+IDENTITY = Identity("name: x\n", "0" * 16, "1" * 16, "sweep 0")
+
+
+def identity(random: Random, folder: Path) -> bool:
+    """The identity of a checkpoint."""
+    checkpoint = folder / "x.checkpoint"
+    checkpoint.mkdir(exist_ok=True)
+    odd = (None, 1, [], {}, "", "x", "\x1b[2J")
+    content: Any = asdict(IDENTITY)
+    if random.random() < 0.7:
+        content[random.choice(("config", "config_hash", "source_hash", "more"))] = random.choice(odd)
+    if random.random() < 0.2:
+        content.pop(random.choice(list(content)))
+    data = json.dumps(random.choice((content, content, content, content, *odd))).encode()
+    if random.random() < 0.4:
+        data = random.choice((damage(random, data), b"[" * 100_000, b"9" * 5000))
+    (checkpoint / "identity.json").write_bytes(data)
+    return _refused(lambda: Checkpoint(checkpoint, IDENTITY, lambda _: None), str(checkpoint)) is not None
+
+
+def archive(random: Random, folder: Path) -> bool:
+    """A tile or the unfinished images of a checkpoint; damaged ones are dropped."""
+    checkpoint = folder / "y.checkpoint"
+    checkpoint.mkdir(exist_ok=True)
+    (checkpoint / "identity.json").write_text(json.dumps(asdict(IDENTITY)), encoding="utf-8")
+    name = random.choice(("000000.npz", "running.npz", "1abc.npz", "7.npz", "1_0.npz"))
+    arrays: dict[str, Any] = {"status": np.ones(4, np.int64), "tiles": np.arange(2), "seconds": np.array(1.5)}
+    if random.random() < 0.5:
+        odd = (np.array("x"), np.zeros((2, 2)), np.array(1), np.array([], np.int64), np.array([0, 0]), np.array([1.5]))
+        arrays[random.choice(sorted(arrays))] = random.choice(odd)
+    path = checkpoint / name
+    with path.open("wb") as stream:
+        np.savez(stream, **arrays)
+    if random.random() < 0.7:
+        path.write_bytes(damage(random, path.read_bytes()))
+    kept = Checkpoint(checkpoint, IDENTITY, lambda _: None)
+    running = kept.load_running()
+    if running is not None:
+        tiles, tables, seconds = running
+        if not (
+            tiles and all(type(i) is int for i in tiles) and isinstance(seconds, float) and isinstance(tables, dict)
+        ):
+            raise Violation(f"invalid images accepted: {running!r:.300}")
+    accepted = bool(kept.done) or running is not None
+    path.unlink(missing_ok=True)
+    return accepted
+
+
+@cache
+def _datasets(folder: Path) -> tuple[bytes, ...]:
+    """Datasets of ours as bytes: curves and maps of the analytic model, which takes no time."""
+    file = folder / "base.yaml"
+    parts = ({"n0": [0.02, 0.05]}, {"mu": list(range(1, 8)), "b": [2, 3, 4, 5, 6]})
+    found = []
+    for number, overrides in enumerate(parts):
+        dataset = sweep.run(file, folder / f"run{number}", model="analytic", **overrides)
+        dataset.close()
+        found.append((folder / f"run{number}" / "base.nc").read_bytes())
+    return tuple(found)
+
+
+def _in_child(work: Callable[[], bool], seconds: int = 60) -> bool:
+    """Run `work` in a child process: the HDF5 library may crash on damaged files, which we cannot mend."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        code = 2
+        try:
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends even a wait inside a C library
+            signal.alarm(seconds)
+            code = 0 if work() else 1
+        except BaseException as error:
+            os.write(writing, repr(error).encode()[:4000])
+        finally:
+            os._exit(code)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as stream:
+        said = stream.read().decode()
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code < 0 and -code in (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE):
+        CRASHES.append(-code)
+        return False
+    if code not in (0, 1):
+        raise Violation(said or f"ended by signal {-code}")
+    return code == 0
+
+
+CRASHES: list[int] = []
+"""Signals that ended a child: crashes inside the HDF5 library."""
+
+
+def _read(random: Random, file: Path, folder: Path) -> bool:
+    """`info` on a file, and now and then `plot`."""
+    target = folder / "picture.png"
+    variable = random.choice((None, None, "status", "mu", "spin_final", "form_factor", "nothing", "../x", ""))
+    plot = ["plot", str(file), "--output", str(target), *(("--var", variable) if variable is not None else ())]
+    verbs = [["info", str(file)], *([plot] if random.random() < 0.15 else [])]
+
+    def work() -> bool:
+        results = [_invoke(folder, *arguments) for arguments in verbs]
+        return all(results)
+
+    return _in_child(work)
+
+
+def damaged(random: Random, folder: Path) -> bool:
+    """A dataset of ours with some bytes changed."""
+    file = folder / "damaged.nc"
+    data = bytearray(random.choice(_datasets(folder)))
+    for _ in range(random.choice((1, 2, 8, 32))):
+        place = random.randrange(random.choice((512, len(data))))
+        data[place : place + 1] = random.choice((bytes([random.randrange(256)]), b"\xff", b"\0"))
+    if random.random() < 0.1:
+        del data[random.randrange(len(data)) :]
+    file.write_bytes(data)
+    return _read(random, file, folder)
+
+
+def foreign(random: Random, folder: Path) -> bool:
+    """A dataset of another program, whose variables may have the same names as ours."""
+    names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step", "verified_cell",
+             "wall_time", "spin_final", "form_factor", "b", "mu", "temperature")  # fmt: skip
+    dims = {"b": 6, "mu": random.choice((0, 1, 7)), "time": random.choice((0, 3, 20)), "lat": 2}
+    odd: dict[str, Any] = {
+        "title": random.choice(("a", "$\\frac", "\x1b[2J", "é\nb", 3, [1, 2])), "flag_values": [1, 2],
+        "flag_meanings": "a b",
+        "units": random.choice(("days since 2000", "s", 3)), "wall_time": random.choice((1.0, "x")),
+        "scale_factor": random.choice((2.0, "x")),
+    }  # fmt: skip
+
+    def attributes() -> dict[str, Any]:
+        return {key: odd[key] for key in odd if random.random() < 0.15}
+
+    variables = {}
+    chosen = {*random.sample(names, random.randrange(len(names))), *random.choice((("status",), ()))}
+    for name in sorted(chosen):
+        over = tuple(random.sample(sorted(dims), random.randrange(4))) if name not in dims else (name,)
+        shape = tuple(dims[d] for d in over)
+        kind = random.choice(("int16", "float64", "float32", "int8", "U", "M8[ns]", "uint64"))
+        numbers = np.array([random.choice((0, 1, 2, 3, 7)) for _ in range(int(np.prod(shape)))]).reshape(shape)
+        filled = numbers.astype(kind)
+        if kind.startswith("float") and random.random() < 0.3:
+            filled = np.full(shape, random.choice((np.nan, np.inf)), kind)
+        variables[name] = (over, filled, {} if kind.startswith("M") else attributes())
+    file = folder / "foreign.nc"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            xr.Dataset(variables, attrs=attributes()).to_netcdf(file, engine="netcdf4")
+        except (ValueError, TypeError):  # xarray itself does not write this one
+            return False
+    return _read(random, file, folder)
+
+
+KINDS: dict[str, Callable[[Random, Path], bool]] = {
+    kind.__name__: kind
+    for kind in (yaml_tree, yaml_bytes, setting, value, at, table, dry_run, identity, archive, foreign, damaged)
+}

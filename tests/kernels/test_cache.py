@@ -1,0 +1,103 @@
+"""Compiled kernels are found again by later processes, and never after an edit of what they are made of."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support import ROOT
+
+from sweep import jit
+
+# The averaged model: its kernel compiles fastest.
+SCRIPT = """
+import sys
+import numpy as np
+from sweep.engine.executor import execute
+from sweep.kernels.methods import make_kernel
+from sweep.models import MODELS
+from sweep.parameters import PARAMETERS
+
+body = {name: np.array([60.0 if name == "mu" else p.default]) for name, p in PARAMETERS.items()}
+for measure in sys.argv[1:]:
+    kernel = make_kernel("dopri5", MODELS["averaged"], measure.split("+"))
+    found = kernel.is_compiled()
+    images = kernel.images(body, np.array([0.1]), 50.0)
+    execute(kernel, images, stop_when_settled=False)
+    print("found" if found else "compiled", repr(float(kernel.model.energy(*kernel.unpack(images))[0][0])))
+"""
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the package without compiled kernels."""
+    folder = tmp_path_factory.mktemp("copy")
+    shutil.copytree(ROOT / "sweep", folder / "sweep", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+def process(copy: Path, *measures: str) -> list[tuple[str, float]]:
+    """Whether a new process finds the kernel of each set of measurements, and the spin that it comes to."""
+    command = [sys.executable, "-c", SCRIPT, *measures]
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, check=True)
+    return [(line.split()[0], pytest.approx(float(line.split()[1]), rel=1e-13)) for line in done.stdout.splitlines()]
+
+
+def test_kernels_are_found_again_kept_apart_and_compiled_anew_after_an_edit(copy: Path) -> None:
+    ((how, nothing),) = process(copy, "")
+    assert how == "compiled"
+    ((how, reversals),) = process(copy, "reversals")
+    assert how == "compiled"
+
+    # Kernels compiled by two processes once called each other's loops in a third.
+    assert process(copy, "", "reversals") == [("found", nothing), ("found", reversals)]
+    assert process(copy, "reversals", "") == [("found", reversals), ("found", nothing)]
+
+    # An edit of another file than the kernel's, of the same length, its times kept.
+    edit(copy / "sweep" / "models" / "averaged.py", "p.half_m4 + n", "p.half_m4 - n")
+    ((how, changed),) = process(copy, "")
+    assert how == "compiled"
+    assert changed != nothing
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    times, text = file.stat(), file.read_text(encoding="utf-8")
+    assert old in text
+    assert len(old) == len(new)
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+NUMERIC = [
+    path.relative_to(ROOT / "sweep")
+    for room in ("models", "kernels")
+    for path in sorted((ROOT / "sweep" / room).rglob("*.py"))
+]
+
+
+@pytest.mark.parametrize("name", [Path("jit.py"), *NUMERIC], ids=str)
+def test_every_numeric_source_is_in_the_fingerprint(
+    name: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nested ones too."""
+    shutil.copytree(ROOT / "sweep", tmp_path / "sweep", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(jit, "__file__", str(tmp_path / "sweep" / "jit.py"))
+    before = jit.fingerprint()
+    with (tmp_path / "sweep" / name).open("a", encoding="utf-8") as source:
+        source.write("# edited\n")
+    assert jit.fingerprint() != before
+
+
+@pytest.mark.parametrize("name", ["config/schema.py", "plots/maps.py", "cli.py"])
+def test_other_sources_leave_compiled_kernels_alone(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(ROOT / "sweep", tmp_path / "sweep", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(jit, "__file__", str(tmp_path / "sweep" / "jit.py"))
+    before = jit.fingerprint()
+    with (tmp_path / "sweep" / name).open("a", encoding="utf-8") as source:
+        source.write("# edited\n")
+    assert jit.fingerprint() == before

@@ -1,0 +1,276 @@
+"""The Runge-Kutta kernel against adaptive integration, and itself at other steps, threads, chunks and orders."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import adaptive, columns
+from support.kernels import finish, images, kernel, run, spin, threads
+
+from sweep.kernels import methods
+from sweep.kernels.layout import BLOCK, LANES
+from sweep.kernels.method import ACCURACY, STABILITY
+from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
+from sweep.kernels.tableau import DOPRI5
+from sweep.models import MODELS, analytic, linear, slip
+
+DOPRI = kernel("dopri5")
+STATES = len(slip.MODEL.states)
+
+
+def of(table: np.ndarray, name: str) -> np.ndarray:
+    return table[:, DOPRI.row(name)]
+
+
+def test_spin_at_400() -> None:
+    # design/model.md and the issue: n(400) = -0.04527003408 at μ = 60.
+    assert spin(DOPRI, run(DOPRI, 0.01, 400.0))[0] == pytest.approx(-0.04527003408, abs=1e-11)
+
+
+def test_order_five() -> None:
+    steps = np.array([0.03, 0.025, 0.02, 0.016])
+    reference = spin(DOPRI, run(DOPRI, 0.004, 400.0))[0]
+    errors = [abs(spin(DOPRI, run(DOPRI, h, 400.0))[0] - reference) for h in steps]
+    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert order == pytest.approx(5, abs=0.25)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "t_end"),
+    [({}, 150.0), ({"n0": -0.08, "mu": 30.0}, 200.0), ({"a": 5.0, "b": 2.0, "delta": 0.2, "x0": 1.0, "y0": 0.3}, 100.0),
+     ({"c": 0.7, "b": 1.5, "mu": 15.0}, 200.0)],
+)  # fmt: skip
+def test_equals_scipys_dop853(parameters: dict[str, float], t_end: float) -> None:
+    expected = adaptive.motion(columns(**parameters), [t_end], rtol=1e-12, atol=1e-16)[:STATES, -1]
+    final = run(DOPRI, 0.005, t_end, **parameters)[0, :STATES]
+    np.testing.assert_allclose(final, expected, rtol=2e-7, atol=2e-10)
+
+
+def test_time_limit_is_met_exactly() -> None:
+    table = run(DOPRI, 0.03, 100.0)
+    steps = of(table, "goal")[0]
+    assert steps == np.ceil(100 / 0.03)
+    assert of(table, "done")[0] == steps
+    assert steps * of(table, "step")[0] == pytest.approx(100.0, rel=1e-15)
+    assert of(table, "status")[0] == TIME_LIMIT
+
+
+FLYING = np.arange(45) % 5 == 3
+MIXED = {
+    "mu": np.where(FLYING, 20.0, np.linspace(20, 90, 45)),
+    "b": np.where(FLYING, 3.0, np.tile([1.5, 3.0, 5.0], 15)),
+    "n0": np.where(FLYING, 3.0, np.tile([0.05, -0.03, 0.01, 0.03, 0.02], 9)),
+    "x0": np.where(FLYING, 1.0, 0.01),
+}
+
+
+def mixed() -> np.ndarray:
+    """Cells that settle, reach the limit, lift off and diverge, at different steps."""
+    step = np.where(FLYING, 1e-4, np.linspace(0.01, 0.045, 45))
+    return images(DOPRI, step, 900.0, settle=True, **MIXED)
+
+
+@pytest.fixture(scope="module")
+def expected() -> np.ndarray:
+    table = finish(DOPRI, mixed())
+    assert {SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED} <= set(of(table, "status"))
+    return table
+
+
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("chunk", [1, 7, 1000])
+def test_bit_identical_for_threads_and_chunks(number: int, chunk: int, expected: np.ndarray) -> None:
+    with threads(number):
+        np.testing.assert_array_equal(finish(DOPRI, mixed(), chunk_blocks=chunk), expected)
+
+
+def test_bit_identical_in_any_order_and_alone(expected: np.ndarray) -> None:
+    order = np.random.default_rng(1).permutation(len(expected))
+    np.testing.assert_array_equal(finish(DOPRI, mixed()[order]), expected[order])
+    for i in (0, 3, 17, 44):
+        np.testing.assert_array_equal(finish(DOPRI, mixed()[i : i + 1])[0], expected[i])
+
+
+def test_bit_identical_when_interrupted_and_resumed(expected: np.ndarray) -> None:
+    table, looks = mixed(), 0
+
+    def stop() -> None:
+        nonlocal looks
+        looks += 1
+        if looks % 2:
+            raise KeyboardInterrupt
+
+    while (of(table, "status") == 0).any():
+        try:
+            finish(DOPRI, table, chunk_blocks=5, after_chunk=stop)
+        except KeyboardInterrupt:
+            table = np.array(table.tolist())  # nothing but the numbers survives
+    np.testing.assert_array_equal(table, expected)
+    assert looks > 10
+
+
+def test_measuring_does_not_alter_the_motion() -> None:
+    bare = kernel("dopri5", measure=())
+    plain = run(bare, 0.02, 200.0)
+    np.testing.assert_array_equal(plain[0, :STATES], run(DOPRI, 0.02, 200.0)[0, :STATES])
+    assert not {"work", "window"} & set(bare.layout.names)
+
+
+@pytest.mark.parametrize(("mu", "count", "last"), [(60, 3, 2379.9), (75, 3, 1590.4), (100, 5, 7348.7)])
+def test_reversals_and_their_last_time(mu: float, count: int, last: float) -> None:
+    # Takano (2011), Fig. mu601000 (a); times from design/model.md.
+    table = run(DOPRI, 0.75 / mu * 2, 9000.0, settle=True, mu=mu)
+    assert of(table, "reversals")[0] == count
+    assert of(table, "last_reversal")[0] == pytest.approx(last, abs=2)
+
+
+def test_reversals_of_the_papers_figure() -> None:
+    step = np.array([0.026, 0.012, 0.0079])
+    table = run(DOPRI, step, 14_000.0, settle=True, mu=[60.0, 130.0, 200.0])
+    assert list(of(table, "reversals")) == [3, 6, 9]
+
+
+def test_windows_are_period_averages() -> None:
+    """Count, time and mean against the same definition applied to a finely sampled spin."""
+    t_end, start = 300.0, {"mu": 75.0, "x0": 0.5, "y0": 0.5}
+    table = images(DOPRI, 0.01, t_end, **start)
+    tau = of(table, "period")[0]
+    ends = np.arange(0, t_end, tau)
+    integral = adaptive.motion(columns(**start), ends, rtol=1e-11, atol=1e-15)[STATES]
+    means = np.diff(integral) / tau
+    changes = np.flatnonzero(means[1:] * means[:-1] < 0)
+    finish(DOPRI, table)
+    assert of(table, "reversals")[0] == len(changes) == 2
+    i = changes[-1]
+    crossing = ends[i] + tau / 2 + tau * means[i] / (means[i] - means[i + 1])
+    assert of(table, "last_reversal")[0] == pytest.approx(crossing, abs=1e-5)
+    assert of(table, "closed_window")[0] / tau == pytest.approx(means[-1], abs=1e-9)
+
+
+def test_energy_error_is_the_largest_violation() -> None:
+    """Against the balance in the same steps with the work integrated by SciPy's quadrature weights."""
+    table = images(DOPRI, 0.02, BLOCK * 0.02 * 20)
+    worst, before = 0.0, of(table, "energy_start")[0]
+    blocks = 0
+    while of(table, "status")[0] == 0:
+        DOPRI.advance(table, np.array([0]), 1, True)
+        n, rattle, inertia = slip.energy(*DOPRI.unpack(table))
+        worst = max(worst, abs(rattle + 0.5 * inertia * n**2 + of(table, "work") - before)[0])
+        blocks += 1
+    assert blocks == 20
+    assert of(table, "violation")[0] == pytest.approx(worst, rel=1e-6)
+    assert 0 < worst < 1e-7 * before
+
+
+def test_energy_error_falls_with_the_order_of_the_method() -> None:
+    violation = [of(run(DOPRI, h, 300.0), "violation")[0] for h in (0.016, 0.008)]
+    assert 25 < violation[0] / violation[1] < 80
+
+
+def test_a_failing_lane_harms_no_neighbour() -> None:
+    n0 = np.full(16, 0.05)
+    alone = run(DOPRI, 0.02, 300.0)[0]
+    n0[[2, 7]] = [3.0, 50.0]
+    table = run(DOPRI, 0.02, 300.0, n0=n0)
+    assert set(of(table, "status")[[2, 7]]) <= {LIFT_OFF, PARADOX, DIVERGED}
+    for i in set(range(16)) - {2, 7}:
+        np.testing.assert_array_equal(table[i], alone)
+
+
+def test_lift_off_is_seen_in_the_step_in_which_it_happens() -> None:
+    tables = [run(DOPRI, h, 5.0, n0=3.0, x0=1.0, mu=20.0) for h in (1e-4, 2e-5)]
+    times = [of(t, "done")[0] * of(t, "step")[0] for t in tables]
+    assert [of(t, "status")[0] for t in tables] == [LIFT_OFF, LIFT_OFF]
+    assert times[0] == pytest.approx(times[1], abs=2e-4)
+    R = [float(slip.rhs(*DOPRI.unpack(t))[1][2][0]) for t in tables]
+    assert 0 < R[1] < R[0] < 0.5  # of the last state that still touches
+
+
+def test_the_paradox_is_an_outcome() -> None:
+    tables = [run(DOPRI, h, 5.0, n0=3.0) for h in (2e-5, 1e-5)]
+    times = [of(t, "done")[0] * of(t, "step")[0] for t in tables]
+    assert [of(t, "status")[0] for t in tables] == [PARADOX, PARADOX]
+    assert times[0] == pytest.approx(times[1], abs=1e-4)
+
+
+@pytest.mark.parametrize("excess", [1.15, 1.5, 3.0])
+@pytest.mark.parametrize("parameters", [{"mu": 200.0}, {"mu": 1000.0}, {"b": 1.5}, {"a": 3.0, "b": 2.0, "delta": 0.1}])
+def test_a_step_beyond_stability_is_diverged(parameters: dict[str, float], excess: float) -> None:
+    limit = DOPRI5.real_stability / slip.fastest_decay(columns(**parameters))
+    assert of(run(DOPRI, excess * limit, 400.0, **parameters), "status")[0] == DIVERGED
+
+
+def test_not_a_number_is_diverged() -> None:
+    table = images(DOPRI, 0.02, 10.0)
+    table[0, 2] = np.nan
+    assert of(finish(DOPRI, table), "status")[0] == DIVERGED
+
+
+def test_equilibrium_stays_exactly() -> None:
+    table = images(DOPRI, 0.02, 500.0, x0=0.0, y0=0.0, n0=[0.0, 0.05, -0.3])
+    before = table[:, :STATES].copy()
+    finish(DOPRI, table)
+    np.testing.assert_array_equal(table[:, :STATES], before)
+    np.testing.assert_array_equal(of(table, "reversals"), 0)
+
+
+def test_a_rattle_of_1e_30_grows_at_the_linear_rate() -> None:
+    body = columns(x0=1e-30, y0=1e-30)
+    growth = linear.growth_rate(MODELS["slip"], slip.Constants.of(body), body["n0"])[0]
+    sizes = [np.linalg.norm(run(DOPRI, 0.02, t, x0=1e-30, y0=1e-30)[0, :4]) for t in (0.02, 400.0)]
+    assert sizes[0] < 1e-28
+    # One mode outgrows the others, up to its phase.
+    assert np.log(sizes[1] / sizes[0]) / 400 == pytest.approx(growth, rel=0.1)
+    small, large = (run(DOPRI, 0.02, 400.0, x0=x, y0=x)[0, [0, 1, 2, 3, 5, 6]] for x in (1e-30, 1e-20))
+    np.testing.assert_allclose(large, small * 1e10, rtol=1e-9)
+
+
+def test_settled_means_that_nothing_changes_any_more() -> None:
+    parameters = {"mu": np.array([40.0, 60.0, 75.0]), "n0": np.array([0.05, 0.05, -0.004])}
+    step, _ = methods.automatic_step("dopri5", MODELS["slip"], columns(**parameters))
+    settled = run(DOPRI, step, 9000.0, settle=True, **parameters)
+    assert set(of(settled, "status")) == {SETTLED}
+    full = images(DOPRI, step, 9000.0, settle=True, **parameters)
+    finish(DOPRI, full, settle=False)
+    assert set(of(full, "status")) == {TIME_LIMIT}
+    assert (of(settled, "done") < 0.7 * of(full, "done")).all()
+    np.testing.assert_array_equal(of(settled, "reversals"), of(full, "reversals"))
+    np.testing.assert_array_equal(of(settled, "last_reversal"), of(full, "last_reversal"))
+    stable = linear.critical_spins(
+        MODELS["slip"], columns(**parameters), analytic.critical_spins(columns(**parameters))
+    )
+    assert ((stable[1] < spin(DOPRI, full)) & (spin(DOPRI, full) < stable[0])).all()
+
+
+def test_a_settled_rattle_ends_as_exact_zeros() -> None:
+    """Without it, the rattle would decay through denormal numbers and slow the kernel down."""
+    table = images(DOPRI, 0.02, 30_000.0, settle=True, n0=0.001, x0=1e-58, y0=1e-58)
+    assert table[0, [0, 1]].all()
+    finish(DOPRI, table, settle=False)
+    assert of(table, "status")[0] == TIME_LIMIT
+    np.testing.assert_array_equal(table[0, [0, 1, 2, 3, 5, 6]], 0)
+    assert spin(DOPRI, table)[0] == pytest.approx(0.001, rel=1e-12)
+
+
+def test_automatic_step_says_which_limit_decided() -> None:
+    body = columns(mu=[1.0, 20.0, 200.0])
+    step, rule = methods.automatic_step("dopri5", MODELS["slip"], body)
+    assert list(rule) == [ACCURACY, ACCURACY, STABILITY]
+    assert step[2] * slip.fastest_decay(body)[2] == pytest.approx(0.9 * DOPRI5.real_stability)
+
+
+@pytest.mark.parametrize("parameters", [{"mu": 20.0}, {"mu": 60.0}, {"mu": 20.0, "n0": 0.1}, {"mu": 200.0, "b": 6.0}])
+def test_automatic_step_keeps_the_spin_to_2e_8(parameters: dict[str, float]) -> None:
+    step, _ = methods.automatic_step("dopri5", MODELS["slip"], columns(**parameters))
+    coarse, fine = (spin(DOPRI, run(DOPRI, h, 400.0, **parameters))[0] for h in (step, step / 4))
+    assert abs(coarse - fine) < 2e-8
+
+
+def test_the_loop_over_lanes_is_vector_instructions() -> None:
+    """Twelve square roots and divisions a step, all packed."""
+    block = DOPRI._make_run_block(BLOCK)
+    block(np.zeros(len(DOPRI.layout.names) * LANES))
+    assembly = next(iter(block.inspect_asm().values()))
+    assert assembly.count("divpd") >= 12
+    assert assembly.count("sqrtpd") >= 12
+    assert assembly.count("divsd") + assembly.count("sqrtsd") == 0

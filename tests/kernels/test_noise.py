@@ -1,0 +1,116 @@
+"""Late reversals, which round-off makes come too early: lifted by adams, and said of a cell where it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import columns
+from support.kernels import images, kernel, run
+
+import sweep
+from sweep import ConfigError
+from sweep.kernels.adams import stretches
+from sweep.kernels.adams.method import accurate_step
+from sweep.kernels.measures import noise
+from sweep.kernels.methods import automatic_step
+from sweep.kernels.status import QUIET, RUNNING
+from sweep.models import MODELS, slip_split
+from sweep.models.modes import _rocking
+
+ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
+Write = Callable[..., Path]
+
+# Time and number of the last reversal at b = 3, n0 = 0.05, in double-double arithmetic.
+LAST = {200.0: (9, 12914.14), 188.0: (9, 18719.15), 180.0: (9, 29032.53), 176.0: (9, 41315.4), 140.0: (7, 15880.39)}
+FIRM = {60.0: (3, 2379.9), 130.0: (6, 7412.95)}
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-6])
+def test_late_reversals_come_at_the_reference_times(tolerance: float) -> None:
+    cases = LAST | FIRM
+    step = accurate_step(columns(mu=list(cases)), tolerance)
+    table = run(kernel("adams", tolerance=tolerance), step, 45_000.0, settle=True, mu=list(cases))
+    assert [(n, pytest.approx(t, rel=1e-3)) for n, t in cases.values()] == list(
+        zip(table[:, ADAMS.row("reversals")], table[:, ADAMS.row("last_reversal")], strict=True)
+    )
+    assert not table[:, ADAMS.row("noise_limited")].any()
+
+
+def test_the_ninth_reversal_does_not_depend_on_the_last_bits() -> None:
+    x0 = 0.01 * np.array([1, 1, 1 + 1e-12])
+    table = run(ADAMS, [0.05, 0.1, 0.05], 14_000.0, settle=True, mu=200.0, x0=x0)
+    assert (table[:, ADAMS.row("reversals")] == 9).all()
+    np.testing.assert_allclose(table[:, ADAMS.row("last_reversal")], 12914, atol=15)
+
+
+def test_dopri5_flags_reversals_that_round_off_moved() -> None:
+    mu = [200.0, 188.0, 180.0, 176.0, 60.0, 130.0]
+    step, _ = automatic_step("dopri5", MODELS["slip"], columns(mu=mu))
+    table = run(DOPRI, step, 30_000.0, settle=True, mu=mu)
+    assert list(table[:, DOPRI.row("noise_limited")]) == [1, 1, 1, 1, 0, 0]
+    assert list(table[:, DOPRI.row("reversals")]) == [9, 9, 9, 9, 3, 6]
+    # They are off: else there would be nothing to say.
+    late = [LAST[m][1] for m in mu[:4]]
+    assert (table[:4, DOPRI.row("last_reversal")] < 0.97 * np.array(late)).all()
+
+
+def test_a_mode_that_sank_is_flagged_only_once_it_has_grown_back() -> None:
+    """Nothing has come of the round-off yet at t = 9000; at 12 000 a rattle has, though no reversal."""
+    step, _ = automatic_step("dopri5", MODELS["slip"], columns(mu=200.0))
+    for t_end, flag in ((9_000.0, 0), (12_000.0, 1)):
+        table = run(DOPRI, step, t_end, settle=True, mu=200.0)
+        assert table[0, DOPRI.row("reversals")] == 8
+        assert table[0, [DOPRI.row("depth0"), DOPRI.row("depth1")]].min() < np.log(noise.DEPTH)
+        assert table[0, DOPRI.row("noise_limited")] == flag
+
+
+def test_a_mode_let_down_too_late_is_flagged() -> None:
+    table = images(ADAMS, 0.05, 9000.0, n0=[0.05, 0.01])
+    table[:, [ADAMS.row(name) for name in stretches.LIFTS]] = 12.0
+    table[:, ADAMS.row("status")] = QUIET
+    ADAMS.carry(table)
+    assert (table[:, ADAMS.row("status")] == RUNNING).all()
+    assert list(table[:, ADAMS.row("noise_limited")]) == [0, 1]
+    assert list(table[:, ADAMS.row("lift0")]) == [12, 0]
+
+
+def test_growth_is_that_of_the_model() -> None:
+    body = columns(b=[1.5, 3.0, 6.0], mu=[60.0, 200.0, 400.0], n0=[0.05, -0.1, 0.08])
+    c = noise.growth_coefficients(body)
+    constants = slip_split.Constants.of(body)
+    for share in (-1.0, -0.4, 0.1, 0.7):
+        spin = share * body["n0"]
+        rates, _, _ = _rocking(constants, spin)
+        largest = np.abs(c[:, 1] * body["n0"]).max()
+        fitted = (c * spin ** np.arange(c.shape[1])[:, None]).sum(axis=1)
+        np.testing.assert_allclose(fitted, rates.real.T, atol=0.03 * largest)
+
+
+def test_only_what_is_asked_for_is_measured(write: Write) -> None:
+    for method in ("adams", "dopri5"):
+        assert not set(noise.NoiseLimited().rows) & set(kernel(method, measure=["reversals"]).layout.names)
+    assert "noise_limited" not in sweep.run(write(), measure=["reversals"])
+    with pytest.raises(ConfigError, match="measured with the reversals; allowed: reversals beside it"):
+        sweep.load_config(write(), {"measure": ["noise_limited"]})
+
+
+def test_the_dataset_flags_cells_limited_by_round_off(write: Write) -> None:
+    for method, flags in (("dopri5", [1, 0]), ("adams", [0, 0])):
+        text = f"friction: {{mu: [200, 60]}}\nintegrator: {{method: {method}, t_end: 13000}}\n"
+        found = sweep.run(write(text))["noise_limited"]
+        assert found.dtype == np.int8
+        assert found.attrs["flag_meanings"] == "firm noise_limited"
+        assert list(found.attrs["flag_values"]) == [0, 1]
+        assert found.values.tolist() == flags
+
+
+def test_growth_coefficients_do_not_depend_on_other_cells() -> None:
+    """What a cell's rates are fitted with does not depend on its company."""
+    body = columns(n0=[0.01, 0.05, 0.1], mu=[60.0, 60.0, 200.0])
+    together = noise.growth_coefficients(body)
+    for i in range(3):
+        alone = noise.growth_coefficients({name: values[i : i + 1] for name, values in body.items()})
+        np.testing.assert_array_equal(alone[..., 0], together[..., i])

@@ -1,0 +1,92 @@
+"""The times of the first K reversals: the measurement that proves the layout, from the kernel to the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import sweep
+from sweep import ConfigError
+
+Write = Callable[..., Path]
+
+TEXT = """\
+name: times
+body: {b: 3.0}
+friction: {mu: [60, 75, 100]}
+start: {n0: 0.05}
+integrator: {t_end: 3000}
+measure: [reversals, {reversal_times: 3}]
+"""
+
+# Checked against an independent integrator (design notes); a reversal lies within a window of 3.65.
+EXPECTED = {60: [168.7, 720.1, 2379.9], 75: [167.3, 639.1, 1590.4], 100: [165.8, 577.7, 1217.5]}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    path = tmp_path_factory.mktemp("times") / "times.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return sweep.run(path, path.parent / "out")
+
+
+@pytest.mark.parametrize("mu", EXPECTED)
+def test_times_are_those_of_an_independent_integrator(found: xr.Dataset, mu: int) -> None:
+    np.testing.assert_allclose(found.reversal_times.sel(mu=mu), EXPECTED[mu], atol=1.0)
+
+
+def test_later_reversals_are_counted_but_not_kept(found: xr.Dataset) -> None:
+    assert found.reversals.sel(mu=100) == 4
+    assert found.t_last_reversal.sel(mu=100) > found.reversal_times.sel(mu=100).max()
+    last = found.reversal_times.sel(mu=[60, 75]).isel(reversal=-1)
+    np.testing.assert_array_equal(last, found.t_last_reversal.sel(mu=[60, 75]))
+
+
+def test_reversals_that_have_not_happened_have_no_time(write: Write) -> None:
+    early = sweep.run(write(TEXT), t_end=700)
+    np.testing.assert_array_equal(np.isfinite(early.reversal_times).sum("reversal"), early.reversals)
+    assert int(early.reversals.min()) == 1
+
+
+def test_the_dataset_has_a_dimension_for_them(found: xr.Dataset) -> None:
+    times = found.reversal_times
+    assert times.dims == ("mu", "reversal")
+    assert list(times.reversal) == [1, 2, 3]
+    assert times.attrs == {"long_name": "time of each spin reversal, in sqrt(c/g)", "units": "1"}
+
+
+def test_on_disk_and_in_memory_are_the_same(found: xr.Dataset, write: Write) -> None:
+    xr.testing.assert_identical(found.reversal_times, sweep.run(write(TEXT)).reversal_times)
+
+
+@pytest.mark.parametrize(
+    ("measure", "words"),
+    [
+        ([{"reversal_times": 3}], "measured with the reversals; allowed: reversals beside it"),
+        (["reversals", {"reversal_times": 0}], "0; allowed: a whole number from 1 to 1000"),
+        (["reversals", {"reversal_times": 2.5}], "2.5; allowed: a whole number from 1 to 1000"),
+        (["reversals", {"energy_error": 3}], "energy_error has no setting; allowed: energy_error"),
+        (["reversals", "reversal_times", {"reversal_times": 3}], "a name twice; allowed: each once"),
+    ],
+)
+def test_a_wrong_setting_is_refused(measure: list[object], words: str, write: Write) -> None:
+    with pytest.raises(ConfigError, match=words):
+        sweep.load_config(write(TEXT), {"measure": measure})
+
+
+def test_the_setting_survives_in_the_configuration_of_the_dataset(found: xr.Dataset, write: Write) -> None:
+    again = sweep.load_config(write(found.attrs["config"]))
+    assert again.measure == ("reversals", "reversal_times=3")
+    assert (
+        sweep.load_config(write(TEXT), {"measure": ["reversals", "reversal_times"]}).measure[1] == "reversal_times=10"
+    )
+
+
+@pytest.mark.campaign
+def test_both_methods_find_the_same_times(found: xr.Dataset, write: Write) -> None:
+    stiff = sweep.run(write(TEXT), method="adams")
+    np.testing.assert_allclose(stiff.reversal_times, found.reversal_times, atol=0.05)

@@ -1,0 +1,136 @@
+"""Start-up of the stiff method, against dopri5 that resolves the layer throughout."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import columns
+from support.kernels import finish, images_of, kernel, spin, threads
+
+from sweep.kernels.adams import start_up
+from sweep.kernels.adams.method import accurate_step
+from sweep.kernels.adams.step import HISTORY, NAMES
+from sweep.kernels.codegen import compile_lanes
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.layout import LANES
+from sweep.kernels.status import LIFT_OFF, RUNNING
+from sweep.kernels.tableau import DOPRI5
+from sweep.models import slip, slip_split
+from sweep.models.model import Columns, take
+
+ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
+
+MIXED = columns(mu=np.geomspace(0.5, 1e5, 83), b=np.resize([1.5, 3.0, 5.0, 8.0], 83), n0=np.resize([0.05, -0.1], 83))
+STEPS = np.resize([0.1, 0.05, 0.02, 0.12, 0.07], 83)
+
+
+def begun(body: Columns, step: np.ndarray, kernel: Kernel = ADAMS, t_end: float = 400.0) -> np.ndarray:
+    return images_of(kernel, body, step, t_end)
+
+
+def cell(body: Columns, i: int) -> Columns:
+    return {name: values[i : i + 1] for name, values in body.items()}
+
+
+def resolved(body: Columns, t_end: float, step: float) -> np.ndarray:
+    """Image of one cell at `t_end`, by dopri5."""
+    return finish(DOPRI, begun(body, np.array([step]), DOPRI, t_end), settle=False)[0]
+
+
+@pytest.mark.parametrize("mu", [0.0, 1.0, 20.0, 60.0, 1000.0, 3e4])
+@pytest.mark.parametrize(("step", "bound"), [(0.1, 1e-7), (0.02, 2e-10)])
+def test_states_history_and_work_against_dopri5(mu: float, step: float, bound: float) -> None:
+    body = columns(mu=mu)
+    image = begun(body, np.array([step]))[0]
+    p = take(ADAMS.unpack(image[None])[1], 0)
+    fine, h = min(0.004, 0.3 / max(mu, 1.0)), image[ADAMS.row("step")]
+    for j in range(HISTORY):
+        time = image[ADAMS.row("begin")] - j * h
+        twin = resolved(body, time, fine)
+        state = np.array(slip_split.momentum(twin[:7], p))
+        slot = HISTORY - 1 - j
+        slopes = image[ADAMS.row(f"f{slot}_0") :][:5]
+        # By the exact slow slopes, at the exact slip.
+        np.testing.assert_allclose(slopes, slip_split.slow(*state, p)[0], atol=100 * bound)
+        np.testing.assert_allclose(image[ADAMS.row(f"v{slot}_0") :][:2], state[5:], atol=10 * bound)
+        if j == 0:
+            np.testing.assert_allclose(image[:7], state, atol=10 * bound)
+            assert image[ADAMS.row("spin")] == pytest.approx(spin(DOPRI, twin[None])[0], abs=bound)
+            work = twin[DOPRI.row("work")]
+            assert image[ADAMS.row("work")] == pytest.approx(work, rel=2e-3 * (step / 0.1) ** 3, abs=1e-13)
+        if j < 3:
+            power = slip.rhs(twin[:7], p)[1][1]
+            assert image[ADAMS.row(f"power{j}")] == pytest.approx(power, rel=1e-3, abs=1e-12)
+
+
+def test_start_up_leaves_no_trace_in_the_spin() -> None:
+    """A floor of 1e-10 at t = 400: the last spin is the same to that with a start-up of twice the care."""
+    mu = np.array([1.0, 20.0, 60.0, 100.0, 200.0, 500.0, 1e3, 1e4, 1e5])
+    body, step = columns(mu=mu), np.full(9, 0.02)
+
+    def spins() -> np.ndarray:
+        return spin(ADAMS, finish(ADAMS, begun(body, step), settle=False))
+
+    usual = spins()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(start_up, "_SHARE", start_up._SHARE / 8)
+        patch.setattr(start_up, "_EXTRA_STEPS", 16)
+        patch.setattr(start_up, "_LAYER_LEVELS", 30)
+        careful = spins()
+    assert np.abs(usual - careful).max() < 1e-10
+
+
+def test_bit_identical_for_each_grouping_and_thread() -> None:
+    with threads(2):
+        expected = begun(MIXED, STEPS)
+    assert len(np.unique(start_up.count_levels(MIXED["mu"], STEPS))) > 10
+    order = np.random.default_rng(2).permutation(len(STEPS))
+    shuffled = begun({name: values[order] for name, values in MIXED.items()}, STEPS[order])
+    np.testing.assert_array_equal(shuffled, expected[order])
+    with threads(1):
+        for i in range(0, len(STEPS), 9):
+            np.testing.assert_array_equal(begun(cell(MIXED, i), STEPS[i : i + 1])[0], expected[i])
+    assert len(start_up._start_up.signatures) == 1  # not compiled once for a cell and again for many
+
+
+def test_a_level_may_have_more_cells_than_lanes() -> None:
+    body = columns(mu=60.0, n0=np.linspace(0.01, 0.1, 3 * LANES + 5))
+    step = np.full(len(body["n0"]), 0.1)
+    together = begun(body, step)
+    for i in (0, 4, 5, LANES, 3 * LANES + 4):
+        np.testing.assert_array_equal(begun(cell(body, i), step[:1])[0], together[i])
+
+
+def test_bodies_that_lift_off_in_start_up_end_there() -> None:
+    """Violent starts, steps as the tolerance asks: who ends in start-up, how and when is as in dopri5."""
+    rng = np.random.default_rng(0)
+    n = 120
+    body = columns(
+        mu=10 ** rng.uniform(0, 3, n), n0=rng.uniform(-3, 3, n), x0=rng.uniform(-5, 5, n), y0=rng.uniform(-1, 1, n)
+    )
+    step = accurate_step(body, 1e-8)
+    begin = begun(body, step, t_end=3.0)
+    status, times = begin[:, ADAMS.row("status")], ADAMS.times(begin, 3.0)
+    ended = status != RUNNING
+    assert 10 <= ended.sum() < n
+    # No longer than start-up, in steps that dopri5 is stable at: else it would call any end diverged.
+    stable = 0.9 * DOPRI5.real_stability / slip.fastest_decay(body)
+    twins = finish(DOPRI, begun(body, np.minimum(stable, step / 4), DOPRI, 20 * step.max()), settle=False)
+    reached = DOPRI.times(twins, 20 * step.max())
+    np.testing.assert_array_equal(twins[ended, DOPRI.row("status")], status[ended])
+    np.testing.assert_array_equal(reached[ended], times[ended])
+    assert (reached[~ended] > begin[~ended, ADAMS.row("begin")]).all()
+    assert set(status) == {RUNNING, LIFT_OFF}
+    # They keep sound states, those of the start.
+    states = np.stack(slip_split.start(body), axis=-1)
+    np.testing.assert_allclose(begin[ended, :7], states[ended], rtol=1e-14, atol=1e-14)
+
+
+def test_the_loop_over_lanes_is_vector_instructions() -> None:
+    advance = compile_lanes("advance", "group, points, ticks", start_up._ADVANCE, NAMES)
+    group, points = np.zeros(len(start_up._GROUP.names) * LANES), np.zeros((HISTORY + 1) * start_up._POINT_SIZE)
+    advance(group, points, 1.0)
+    assembly = next(iter(advance.inspect_asm().values()))
+    # The scalar loop beside it is for arrays that overlap.
+    assert assembly.count("divpd") >= 3
+    assert assembly.count("sqrtpd") >= 2

@@ -1,0 +1,243 @@
+"""Stretches without events: what the modes of a tiny rattle carry on is what steps would give."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import adaptive, columns
+from support.kernels import finish, images, kernel
+
+from sweep.kernels.adams import stretches
+from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
+from sweep.models import analytic, linear, slip, slip_split
+from sweep.models.model import stack, take
+from sweep.models.modes import RATTLE, Rattle, bending
+
+ADAMS = kernel("adams")
+row = ADAMS.row
+
+
+def stepped(table: np.ndarray, **how: Any) -> np.ndarray:
+    """The same without stretches."""
+    table = table.copy()
+    table[:, row("quiet_energy")] = -1
+    return finish(ADAMS, table, **how)
+
+
+@pytest.fixture
+def carried(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Steps that each stretch stood for."""
+    seen: list[float] = []
+    move = stretches.move
+
+    def watched(kernel: Any, part: np.ndarray, rattle: Rattle, steps: np.ndarray, lifts: Any) -> None:
+        seen.extend(steps)
+        move(kernel, part, rattle, steps, lifts)
+
+    monkeypatch.setattr(stretches, "move", watched)
+    return seen
+
+
+def resolved(size: float, **parameters: Any) -> tuple[Rattle, np.ndarray, slip_split.Constants, dict[str, np.ndarray]]:
+    body = columns(x0=size, y0=size, **parameters)
+    states, constants = stack(slip_split.start(body)), slip_split.Constants.of(body)
+    return Rattle.of(states, constants), states, constants, body
+
+
+def later(body: dict[str, np.ndarray], times: np.ndarray) -> np.ndarray:
+    """States of the split form at `times`, by another integrator."""
+    states = adaptive.motion(body, times, rtol=1e-11, atol=1e-20)[:7]
+    return stack(slip_split.momentum(states, take(slip_split.Constants.of(body), np.zeros(len(times), int))))
+
+
+def test_modes_move_as_the_full_model() -> None:
+    _, _, constants, body = resolved(1e-6, mu=60.0)
+    times = np.array([20.0, 30.0, 100.0])  # the slip is there by then
+    exact = later(body, times)
+    rattle = Rattle.of(exact, take(constants, np.zeros(3, int)))
+    first = rattle.select(np.zeros(3, dtype=int))
+    factors = np.exp(first.rates * (times - times[0])[:, None])
+    ours = exact[list(RATTLE), :1].T + first.changes(factors, first.amplitudes)
+    np.testing.assert_allclose(ours, exact[list(RATTLE)].T, rtol=1e-5, atol=1e-13)
+    np.testing.assert_allclose(rattle.amplitudes, factors * first.amplitudes, rtol=1e-5)
+    # And what they turn the spin by.
+    turned = rattle.turned(rattle.amplitudes)
+    assert abs(turned[2] - turned[0]) > 1e-12
+    np.testing.assert_allclose(exact[4] - exact[4, 0], turned - turned[0], rtol=1e-4, atol=3e-15)
+
+
+def test_energies_of_the_modes_add_up() -> None:
+    rattle, states, constants, _ = resolved(1e-6, mu=60.0, n0=[0.05, -0.02, 0.001])
+    _, whole, inertia = slip_split.energy(states, constants)
+    energies = rattle.unit_energies * np.abs(rattle.amplitudes) ** 2
+    np.testing.assert_allclose(energies.sum(axis=1), 2 * whole / inertia, rtol=0.1)
+    np.testing.assert_allclose(
+        rattle.rates.real.max(axis=1),
+        linear.growth_rate(slip.MODEL, slip_split.slip_constants(constants), np.array([0.05, -0.02, 0.001])),
+        rtol=1e-9,
+    )
+
+
+def test_distances_are_those_from_the_critical_spins() -> None:
+    rattle, _, _, body = resolved(1e-6, mu=200.0, n0=[0.05, -0.04])
+    upper, lower = linear.critical_spins(slip.MODEL, body, analytic.critical_spins(body))
+    np.testing.assert_allclose(rattle.distances(), np.abs(body["n0"] - np.array([lower, upper])).T, rtol=0.07)
+
+
+def decide(sizes: Any, lifts: Any = (0.0, 0.0), left: float = 1e9, spin: float = 0.015) -> stretches.Stretch:
+    """What happens to a rattle of these sizes at a spin where the fast mode grows."""
+    rattle, *_ = resolved(1e-6, mu=200.0, n0=spin)
+    one = np.ones(1)
+    return stretches.plan(rattle, np.array([sizes]), np.array([lifts]), spin * one, 0.05 * one, left * one, 1e-8)
+
+
+def test_a_decayed_mode_is_lifted_and_let_down() -> None:
+    up = decide([1e-5, 1e-9])
+    assert up.now[0]
+    assert up.lifts[0, 1] == 0
+    rattle, *_ = resolved(1e-6, mu=200.0, n0=0.015)
+    true = np.log(1e-5) + rattle.rates.real[0, 0] * up.steps[0] * 0.05
+    assert 1e-5 < np.exp(true + up.lifts[0, 0]) < 1e-2
+    # The turn of the spin by the lifted one stays below the tolerance.
+    assert rattle.distances().min() * np.exp(2 * (true + up.lifts[0, 0])) / 2 < 1.001e-8
+    down = decide([1e-5, 1e-9], lifts=(0.0, 20.0))
+    assert down.now[0]
+    assert down.lifts[0, 1] == 0
+    assert down.steps[0] > 1.9 * up.steps[0]
+    assert down.lifts[0, 0] > up.lifts[0, 0]
+
+
+def test_what_a_fast_reversal_stirs_up_is_not_let_down() -> None:
+    """At n = 0.05 the reversal itself leaves more of the decayed mode than there was."""
+    fast = decide([1e-5, 1e-9], spin=0.05)
+    assert not fast.now[0]
+    assert not fast.lifts.any()
+
+
+def test_a_hidden_mode_is_waited_for() -> None:
+    """A mode that round-off or products of the other hide must not be read off the state."""
+    for sizes in ([1e-6, 1e-18], [1e-3, 1e-8]):
+        hidden = decide(sizes)
+        assert not hidden.now[0]
+        assert 0 < hidden.wait[0] < 2000
+
+
+def test_a_large_rattle_is_left_to_the_steps() -> None:
+    for sizes in ([0.1, 1e-5], [1e-5, 0.1]):
+        large = decide(sizes)
+        assert not large.now[0]
+        assert large.wait[0] > 50
+
+
+def test_where_both_decay_nothing_is_lifted() -> None:
+    still = decide([1e-4, 1e-4], spin=-0.002, left=1e6)
+    assert still.now[0]
+    assert still.steps[0] == 1e6
+    assert not still.lifts.any()
+
+
+def test_bending_is_the_size_of_what_steps_show() -> None:
+    """The normal force of a rocking with e = 1e-8 differs from the weight by no more than c e."""
+    for axis in ({"x0": 1e-3, "y0": 0.0}, {"x0": 0.0, "y0": 1e-3}):
+        body = columns(n0=0.0, **axis)
+        constants = slip.Constants.of(body)
+        _, rattle, inertia = slip.energy(stack(slip.start(body)), constants)
+        states = adaptive.motion(body, np.linspace(0, 6, 400), rtol=1e-9, atol=1e-15)[:7]
+        force = [slip.rhs(y, take(constants, 0))[1][2] for y in states.T]
+        share = (np.abs(np.array(force) - 1) / (2 * rattle / inertia)).max()
+        assert share <= 1.05 * bending(body)
+    assert share > 0.1 * bending(body)
+
+
+@pytest.mark.parametrize("size", [1e-30, 1e-12])
+def test_tiny_starts_end_as_stepped_ones(size: float, carried: list[float]) -> None:
+    table = images(
+        ADAMS, 0.05, 12_000.0, settle=True, mu=[60.0, 200.0, 60.0], n0=[0.02, 0.05, -0.015], x0=size, y0=size
+    )
+    ours, theirs = finish(ADAMS, table.copy()), stepped(table)
+    assert sum(carried) > 0.1 * theirs[:, row("done")].sum()
+    for name in ("reversals", "status", "done"):
+        np.testing.assert_array_equal(ours[:, row(name)], theirs[:, row(name)])
+    # To t = 4000 to 1e-2, though the weaker mode is hidden for a while.
+    np.testing.assert_allclose(ours[:, row("last_reversal")], theirs[:, row("last_reversal")], atol=0.05)
+    np.testing.assert_allclose(ours[:, row("spin")], theirs[:, row("spin")], atol=1e-6)
+    assert ours[:, row("violation")].max() < 2 * theirs[:, row("violation")].max() + 1e-15
+
+
+def test_spin_is_kept_to_the_tolerance(carried: list[float]) -> None:
+    for tolerance in (1e-8, 1e-5):
+        tolerant = kernel("adams", tolerance=tolerance)
+        table = images(tolerant, 0.05, 3000.0, mu=60.0, n0=[0.01, 0.02, 0.05], x0=1e-9, y0=1e-9)
+        ours, theirs = finish(tolerant, table.copy(), settle=False), stepped(table, settle=False)
+        assert carried
+        np.testing.assert_allclose(ours[:, row("spin")], theirs[:, row("spin")], atol=tolerance)
+
+
+def test_long_rest_and_upright_spin_take_few_steps(carried: list[float]) -> None:
+    """Decayed, at rest, or upright for ever: to t = 1e6 in one stretch each."""
+    table = images(ADAMS, 0.1, 1e6, settle=True, n0=[0.001, 0.0, 0.05, 0.0], x0=[0.01, 0.0, 0.0, 0.01])
+    table[2, 0:7] = images(ADAMS, 0.1, 1e6, x0=0.0, y0=0.0)[0, 0:7]
+    finish(ADAMS, table, settle=False)
+    assert len(carried) >= 3
+    assert (table[:, row("status")] == TIME_LIMIT).all()
+    np.testing.assert_array_equal(table[:, row("done")], table[:, row("goal")])
+    assert np.isfinite(table[:, :7]).all()
+
+
+def test_windows_continue_after_a_stretch() -> None:
+    table = images(ADAMS, 0.1, 1e5, n0=0.001)
+    finish(ADAMS, table, settle=False)
+    one = table[0]
+    assert one[row("closed_window")] == pytest.approx(one[row("spin")] * one[row("period")], rel=1e-12)
+    assert 0 <= one[row("phase")] < one[row("period")]
+    assert one[row("window")] == pytest.approx(one[row("spin")] * one[row("phase")], rel=1e-9)
+
+
+def test_bit_identical_for_chunks() -> None:
+    table = images(ADAMS, 0.05, 9000.0, settle=True, mu=np.linspace(50, 200, 40), x0=1e-9, y0=1e-9)
+    whole = finish(ADAMS, table.copy())
+    assert (whole[:, row("status")] != RUNNING).all()
+    assert (whole[:, row("status")] == SETTLED).any()
+    for chunk in (50, 333):
+        np.testing.assert_array_equal(finish(ADAMS, table.copy(), chunk_blocks=chunk), whole)
+    order = np.random.default_rng(3).permutation(40)
+    np.testing.assert_array_equal(finish(ADAMS, table[order]), whole[order])
+
+
+@pytest.fixture
+def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Cells of each look."""
+    cells: list[int] = []
+    of = Rattle.of
+
+    def counted(states: np.ndarray, constants: slip_split.Constants) -> Rattle:
+        cells.append(states.shape[1])
+        return of(states, constants)
+
+    monkeypatch.setattr(stretches.Rattle, "of", counted)
+    return cells
+
+
+def test_the_wait_is_bounded(looks: list[int]) -> None:
+    """A stretch that is not worthwhile is not tried again at every look."""
+    finish(ADAMS, images(ADAMS, 0.05, 9000.0, settle=True, mu=200.0))
+    assert 0 < len(looks) <= 20
+
+
+def test_no_looks_where_no_stretch_can_help(looks: list[int]) -> None:
+    """A look takes as long as two thousand steps: to t = 400 they were two thirds of the time."""
+    finish(ADAMS, images(ADAMS, 0.1, 400.0, mu=[60.0, 200.0, 1000.0]), settle=False)
+    assert not looks
+    # Nor when there is no more time for that.
+    finish(ADAMS, images(ADAMS, 0.1, 1200.0, mu=60.0), settle=False)
+    assert 0 < len(looks) <= 5
+    for sizes in ([1e-5, 1e-9], [1e-1, 1e-9]):
+        assert decide(sizes, left=7000).wait[0] == np.inf
+        assert decide(sizes, left=70_000).wait[0] < np.inf
+    # One that is on its way down already needs less time.
+    assert decide([1e-1, 1e-1], left=8000, spin=0.05).wait[0] == np.inf
+    assert decide([1e-1, 1e-9], left=8000, spin=0.05).wait[0] < np.inf
+    # What has been lifted is let down.
+    assert decide([1e-1, 1e-9], lifts=(0.0, 20.0), left=7000).wait[0] < np.inf

@@ -1,0 +1,122 @@
+"""The full model against a second derivation, its energy balance and its symmetries."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import columns
+from support.independent import contact, derivative
+
+from sweep.models import slip
+from sweep.models.model import stack, take
+
+bodies = st.fixed_dictionaries(
+    {
+        "a": st.floats(2, 15),
+        "b": st.floats(1.1, 10),
+        "c": st.floats(0.5, 1.5),
+        "delta": st.floats(-0.5, 0.5),
+        "mu": st.floats(0, 300),
+    }
+)
+tilt, rate, slide = st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.01, 0.01)
+states = st.tuples(tilt, tilt, rate, rate, rate, slide, slide).map(np.array)
+
+
+def evaluate(y: np.ndarray, body: dict[str, float]) -> tuple[np.ndarray, tuple[float, ...]]:
+    constants = take(slip.Constants.of(columns(**body)), 0)
+    slopes, extras = slip.rhs(tuple(y), constants)
+    return np.array(slopes), extras
+
+
+@given(states, bodies)
+def test_right_hand_side_equals_newton_euler_with_unknown_force(y: np.ndarray, body: dict[str, float]) -> None:
+    ours, (spin, dissipation, R, _) = evaluate(y, body)
+    theirs, R_theirs = derivative(y, **body)
+    scale = 1 + np.abs(theirs).max()
+    np.testing.assert_allclose(ours, theirs, atol=2e-8 * scale)
+    assert pytest.approx(R_theirs, abs=1e-7 * scale) == R
+    u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
+    v = np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
+    assert spin == pytest.approx(u @ y[2:5], abs=1e-14)
+    assert dissipation == pytest.approx(body["mu"] * R * (v @ v), rel=1e-12)
+
+
+@given(states, bodies)
+def test_energy_changes_by_friction_alone(y: np.ndarray, body: dict[str, float]) -> None:
+    slopes, (_, dissipation, _, _) = evaluate(y, body)
+    constants = take(slip.Constants.of(columns(**body)), 0)
+    # The derivative of the energy along the motion, by a complex step.
+    spin, rattle, inertia = slip.energy(y + 1e-30j * slopes, constants)
+    change = (rattle + 0.5 * inertia * spin**2).imag / 1e-30
+    assert change == pytest.approx(-dissipation, abs=1e-10 * (1 + abs(dissipation)))
+
+
+@given(states, bodies)
+def test_energy_above_rest_equals_the_textbook_formula(y: np.ndarray, body: dict[str, float]) -> None:
+    u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
+    v = np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
+    a, b, c = body["a"], body["b"], body["c"]
+    x_p = contact(u, a, b, c, body["delta"])
+    inertia = np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) / 5
+    v_g = v + np.cross(x_p, y[2:5])
+    expected = 0.5 * inertia @ y[2:5] ** 2 + 0.5 * v_g @ v_g - x_p @ u - c
+    spin, rattle, J = slip.energy(tuple(y), take(slip.Constants.of(columns(**body)), 0))
+    assert rattle + 0.5 * J * spin**2 == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+@given(states, bodies)
+def test_mirror_image_moves_as_the_mirror_image(y: np.ndarray, body: dict[str, float]) -> None:
+    # Reflection y -> -y: polar components (u, v) flip their second, axial (ω) the two others.
+    mirror = np.array([1, -1, -1, 1, -1, 1, -1])
+    ours, _ = evaluate(y, body)
+    image, _ = evaluate(mirror * y, body | {"delta": -body["delta"]})
+    np.testing.assert_allclose(image, mirror * ours, rtol=1e-9, atol=1e-12 * (1 + np.abs(ours).max()))
+
+
+@given(
+    st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-1, 1), st.floats(-0.5, 0.5)
+)  # fmt: skip
+def test_start_puts_the_contact_where_asked(x0: float, y0: float, n0: float, delta: float) -> None:
+    u1, u2, w1, w2, w3, v1, v2 = (float(s[0]) for s in slip.start(columns(x0=x0, y0=y0, n0=n0, delta=delta)))
+    u = np.array([u1, u2, -np.sqrt(1 - u1**2 - u2**2)])
+    np.testing.assert_allclose(contact(u, 10, 3, 1, delta)[:2], [x0, y0], atol=1e-14)
+    np.testing.assert_allclose([w1, w2, w3], n0 * u, atol=1e-15)
+    assert (v1, v2) == (0, 0)
+
+
+def test_upright_spin_is_an_equilibrium() -> None:
+    y = np.array(slip.upright(0.3))
+    slopes, (spin, dissipation, R, _) = evaluate(y, {})
+    assert not slopes.any()
+    assert (spin, dissipation, R) == (0.3, 0, 1)
+
+
+def test_a_tiny_rattle_keeps_its_relative_precision() -> None:
+    body = take(slip.Constants.of(columns()), 0)
+    small = np.array([2e-3, 1e-3, 3e-3, -1e-3, -0.05, 1e-4, 2e-4])
+    factor = np.array([1e-150, 1e-150, 1e-150, 1e-150, 1, 1e-150, 1e-150])
+    linear = np.array(slip.rhs(tuple(small * np.where(factor < 1, 1e-8, 1)), body)[0])
+    tiny = np.array(slip.rhs(tuple(small * factor), body)[0])
+    rattle = [0, 1, 2, 3, 5, 6]
+    np.testing.assert_allclose(tiny[rattle] * 1e150, linear[rattle] * 1e8, rtol=1e-12)
+
+
+@pytest.mark.parametrize("start", [{}, {"n0": 0.2}, {"x0": 5.0, "y0": 1.5}, {"b": 9.9}, {"b": 1.01}])
+def test_fastest_decay_bounds_the_slip_at_the_start(start: dict[str, float]) -> None:
+    body = columns(**start)
+    y, p = stack(slip.start(body)).astype(complex), slip.Constants.of(body)
+    block = np.empty((2, 2))
+    for j in range(2):
+        shifted = y.copy()
+        shifted[5 + j] += 1e-30j
+        slopes, _ = slip.rhs(shifted, p)
+        block[:, j] = [slopes[5].imag[0] / 1e-30, slopes[6].imag[0] / 1e-30]
+    rate = -np.linalg.eigvals(block).real.min()
+    assert rate * 0.98 <= slip.fastest_decay(body)[0] <= 12 * rate
+
+
+def test_without_friction_nothing_is_stiff() -> None:
+    assert slip.fastest_decay(columns(mu=0.0)) == 0

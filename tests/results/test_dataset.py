@@ -1,0 +1,92 @@
+"""What a dataset holds: labels, units, where its numbers come from; and that it is written whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import ROOT
+from support.runs import same_numbers
+
+import sweep
+from sweep.results.dataset import STATUSES, VARIABLES
+from sweep.results.netcdf import open_dataset
+from sweep.results.store import StoreError
+from sweep.results.writing import replacing
+
+Write = Callable[..., Path]
+
+
+def test_dataset_is_labelled(small: xr.Dataset) -> None:
+    assert dict(small.sizes) == {"mu": 2, "b": 3, "n0": 2}
+    assert small["reversals"].dims == ("mu", "b", "n0")
+    assert small["n_c1_plus"].dims == small["form_factor"].dims == ("mu", "b")
+    assert set(small.coords) == {"mu", "b", "n0", "a", "c", "delta", "x0", "y0"}
+    for name, variable in small.variables.items():
+        assert {"long_name", "units"} <= set(variable.attrs), name
+    assert small["delta"].attrs["units"] == "radian"
+    assert set(small.data_vars) == {n for n in VARIABLES if "simulated" not in n} - {
+        "critical_reason",
+        "method",
+        "t_first_reversal",
+        "inferred",
+        "reversal_times",
+    }
+    assert {name: str(small[name].dtype) for name in ("reversals", "status", "spin_final", "reversals_predicted")} == {
+        "reversals": "int16", "status": "int8", "spin_final": "float64", "reversals_predicted": "int16",
+    }  # fmt: skip
+    flags = dict(zip(small["status"].attrs["flag_values"], small["status"].attrs["flag_meanings"].split(), strict=True))
+    assert flags == STATUSES
+    assert flags == {0: "not_run", 1: "settled", 2: "time_limit", 3: "lift_off", 4: "diverged", 5: "paradox"}
+
+
+def test_dataset_values_belong_to_their_labels(small: xr.Dataset, write: Write) -> None:
+    for mu, b, n0 in ((40.0, 2.0, 0.05), (60.0, 5.0, 0.02), (60.0, 3.0, 0.05)):
+        alone = sweep.run(write(), mu=mu, b=b, n0=n0)
+        same_numbers(small.sel(mu=mu, b=b, n0=n0), alone)
+
+
+def test_provenance(small: xr.Dataset) -> None:
+    attributes = small.attrs
+    assert attributes["Conventions"] == "CF-1.11"
+    assert "t_end: 1500" in attributes["config"]
+    assert len(attributes["config_hash"]) == len(attributes["source_hash"]) == 16
+    assert attributes["git_commit"] != "unknown" or not (ROOT / ".git").exists()
+    assert attributes["trajectories_per_second"] == pytest.approx(12 / attributes["wall_time"])
+    assert {"numba_version", "numpy_version", "xarray_version", "sweep_version", "integrator", "cpu"} <= set(attributes)
+
+
+def test_only_what_is_named_is_measured(write: Write, small: xr.Dataset) -> None:
+    nothing = sweep.run(write(), measure=[])
+    assert not {"reversals", "t_last_reversal", "spin_mean", "energy_error"} & set(nothing.data_vars)
+    reversals = sweep.run(write(), measure=["reversals"])
+    assert "energy_error" not in reversals
+    xr.testing.assert_equal(reversals["reversals"], small["reversals"])
+
+
+def test_cells_without_a_reversal_have_no_time_of_one(small: xr.Dataset) -> None:
+    without = small["reversals"] == 0
+    assert (np.isnan(small["t_last_reversal"]) == without).all()
+    assert (small["t_last_reversal"] < small["t_stop"]).where(~without, True).all()
+    assert float(small["t_stop"].max()) <= 1500
+
+
+def test_open_dataset_is_in_memory(write: Write, tmp_path: Path) -> None:
+    sweep.run(write(), tmp_path / "out", mu=40.0, b=2.0)
+    dataset = open_dataset(tmp_path / "out" / "small.nc")
+    (tmp_path / "out" / "small.nc").unlink()
+    assert int(dataset["reversals"].sum()) >= 0
+
+
+def test_no_temporary_file_survives_a_failure(tmp_path: Path) -> None:
+    def fill_the_disk() -> None:
+        with replacing(tmp_path / "x.nc") as temporary:
+            temporary.write_text("half")
+            raise OSError("full")
+
+    with pytest.raises(StoreError, match="cannot be written: full"):
+        fill_the_disk()
+    assert list(tmp_path.iterdir()) == []

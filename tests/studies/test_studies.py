@@ -1,0 +1,167 @@
+"""Single trajectories and critical spins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+import sweep
+from sweep import ConfigError
+from sweep.cli import main
+from sweep.plots.trajectories import reversal_times
+from sweep.studies.critical import critical
+
+Write = Callable[..., Path]
+STANDARD = "name: standard\nfriction: {mu: [60, 75]}\nintegrator: {t_end: 1500}\n"
+
+
+def test_sampling_does_not_touch_the_steps(write: Write) -> None:
+    swept = sweep.run(write(STANDARD))
+    followed = sweep.trajectory(write(STANDARD), mu=[60, 75], every=3.0)
+    np.testing.assert_array_equal(followed.spin_final, swept.spin_final)
+    np.testing.assert_array_equal(followed.energy_error, swept.energy_error)
+    for i in range(2):
+        last = followed.isel(trajectory=i).dropna("sample")
+        assert float(last.spin[-1]) == float(swept.spin_final[i])
+        assert float(last.time[-1]) == pytest.approx(float(swept.t_stop[i]), rel=1e-15)
+        assert float(last.time[0]) == 0
+
+
+def test_trajectory_shows_the_motion(write: Write) -> None:
+    one = sweep.trajectory(write(STANDARD), mu=60).isel(trajectory=0)
+    assert float(one.contact_x[0]) == pytest.approx(0.01)
+    assert float(one.contact_y[0]) == pytest.approx(0.01)
+    # The slip's derivative, and the balance of energy and work, from the series themselves.
+    # (once the slip has left its start at rest, in a hundredth of a period)
+    settled = slice(50, None)
+    slopes, rates = np.gradient(one.slip_2, one.time)[settled], one.slip_rate_2[settled]
+    assert np.abs(slopes - rates).max() < 0.05 * np.abs(rates).max()
+    balance = one.energy + one.dissipated
+    assert float((balance - balance[0]).__abs__().max() / balance[0]) == pytest.approx(float(one.energy_error), rel=0.2)
+    assert 0.7 < float(one.normal_force.min()) < 1 < float(one.normal_force.max()) < 1.4
+    times = reversal_times(one)
+    assert len(times) == int(one.reversals) == 2
+    assert times[-1] == pytest.approx(float(one.t_last_reversal), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "model", ["averaged", *(pytest.param(name, marks=pytest.mark.campaign) for name in ("noslip", "effective"))]
+)
+def test_trajectories_of_every_model(model: str, write: Write) -> None:
+    config = sweep.load_config(write(STANDARD), {"model": model, "mu": 60.0, "t_end": 50.0})
+    series = sweep.trajectory(config)
+    assert float(series.spin[0, 0]) == pytest.approx(0.05)
+    assert np.isfinite(series.spin).all()
+
+
+@pytest.mark.parametrize(
+    ("at", "said"),
+    [
+        ({"mu": -1}, "mu: -1; allowed"),
+        ({"nu": 1}, "no parameter"),
+        ({"x0": 20}, "off the ellipsoid"),
+        ({"n0": np.nan}, "nan"),
+    ],
+)
+def test_impossible_cells_are_refused(at: dict[str, float], said: str, write: Write) -> None:
+    with pytest.raises(ConfigError, match=said):
+        sweep.trajectory(write(STANDARD), **at)
+
+
+def test_trajectory_command(write: Write, tmp_path: Path) -> None:
+    command = [
+        "trajectory",
+        write(STANDARD),
+        "--at",
+        "mu=60",
+        "--at",
+        "mu=75",
+        "--at",
+        "n0=0.02",
+        "--output",
+        tmp_path / "o",
+    ]
+    result = CliRunner().invoke(main, [*map(str, command), "--set", "t_end=30"], catch_exceptions=False)
+    assert result.exit_code == 0
+    stored = xr.load_dataset(tmp_path / "o" / "standard_trajectory.nc")
+    assert stored.sizes["trajectory"] == 2
+    np.testing.assert_array_equal(stored.mu, [60, 75])
+    np.testing.assert_array_equal(stored.n0, [0.02, 0.02])
+    assert all({"long_name", "units"} <= set(v.attrs) for v in stored.variables.values())
+    assert (tmp_path / "o" / "standard_trajectory.png").read_bytes().startswith(b"\x89PNG")
+    wrong = CliRunner().invoke(main, ["trajectory", str(write(STANDARD)), "--at", "mu"])
+    assert (wrong.exit_code, "NAME=NUMBER" in wrong.stderr) == (2, True)
+
+
+@pytest.mark.campaign
+def test_critical_spins_by_simulation(write: Write) -> None:
+    # The growth of a tiny rattle changes sign at the eigenvalues' critical spin, to 1e-4.
+    spins = critical(sweep.load_config(write(STANDARD), {"mu": [75.0, 150.0], "t_end": 12_000.0}), width=1e-5)
+    assert spins.n_c1_plus_simulated.dims == ("mu",)
+    assert "n0" not in spins.coords
+    for side in ("plus", "minus"):
+        inner, outer = spins[f"n_c1_{side}_simulated_inner"], spins[f"n_c1_{side}_simulated_outer"]
+        assert (np.abs(outer / inner - 1) < 1.01e-5).all()
+        np.testing.assert_allclose(spins[f"n_c1_{side}_simulated"], spins[f"n_c1_{side}_linear"], rtol=1e-4)
+    # The first reversal needs about twice that.
+    for side in ("plus", "minus"):
+        ratio = spins[f"n_c2_{side}_simulated"] / spins[f"n_c1_{side}_linear"]
+        assert ((ratio > 1.9) & (ratio < 2.1)).all()
+    assert (spins.critical_reason == 0).all()
+
+
+def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
+    flags = {"exists": 0, "no_friction": 1, "no_coupling": 2, "not_found": 3}
+    config = sweep.load_config(write(STANDARD), {"mu": [0.0, 60.0], "delta": 0.0})
+    spins = critical(config)
+    assert list(spins.critical_reason) == [flags["no_friction"], flags["no_coupling"]]
+    assert np.isnan(spins.n_c1_plus_simulated).all()
+    assert np.isnan(spins.n_c2_minus_simulated).all()
+    assert (
+        dict(
+            zip(
+                spins.critical_reason.attrs["flag_meanings"].split(),
+                spins.critical_reason.attrs["flag_values"],
+                strict=True,
+            )
+        )
+        == flags
+    )
+    rolling = critical(sweep.load_config(write(STANDARD), {"model": "noslip", "mu": 60.0}))
+    assert int(rolling.critical_reason) == flags["no_friction"]
+
+
+def test_critical_command(write: Write, tmp_path: Path) -> None:
+    command = [
+        "critical",
+        write(STANDARD),
+        "--set",
+        "mu=[60,75]",
+        "--set",
+        "model=averaged",
+        "--set",
+        "t_end=12000",
+        "--width",
+        "0.01",
+        "--output",
+        tmp_path / "o",
+    ]
+    result = CliRunner().invoke(main, list(map(str, command)), catch_exceptions=False)
+    assert result.exit_code == 0
+    stored = xr.load_dataset(tmp_path / "o" / "standard_critical.nc")
+    np.testing.assert_allclose(stored.n_c1_plus_simulated, stored.n_c1_plus, rtol=0.02)
+    np.testing.assert_allclose(stored.n_c2_plus_simulated, 2 * stored.n_c1_plus, rtol=0.1)
+    assert (tmp_path / "o" / "standard_critical.png").exists()
+
+
+def test_first_reversal_is_measured_on_request(write: Write) -> None:
+    dataset = sweep.run(write(STANDARD), measure=["reversals", "first_reversal"])
+    one = sweep.trajectory(write(STANDARD), mu=60).isel(trajectory=0)
+    assert float(dataset.t_first_reversal[0]) == pytest.approx(reversal_times(one)[0], abs=0.05)
+    with pytest.raises(ConfigError, match="allowed: reversals beside it"):
+        sweep.load_config(write(STANDARD), {"measure": ["first_reversal"]})

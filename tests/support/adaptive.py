@@ -1,0 +1,36 @@
+"""The slip model by SciPy's adaptive DOP853: another integrator, with steps and errors of its own."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numba
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from sweep.models import slip
+from sweep.models.model import stack, take
+
+
+def motion(body: dict[str, np.ndarray], times: Any, *, rtol: float, atol: float) -> np.ndarray:
+    """The seven states and the integral of the spin of one cell from t = 0, shape (8, times)."""
+    constants = take(slip.Constants.of(body), 0)
+    start = np.array([*stack(slip.start(body))[:, 0], 0.0])
+    solution = solve_ivp(
+        _extended(), (0, times[-1]), start, "DOP853", times, args=(constants,), rtol=rtol, atol=atol
+    )  # fmt: skip
+    assert solution.success
+    return np.asarray(solution.y)
+
+
+@cache
+def _extended() -> Any:
+    rhs = slip.rhs
+
+    @numba.njit(error_model="numpy")
+    def extended(_: float, y: np.ndarray, p: Any) -> np.ndarray:
+        slopes, extras = rhs((y[0], y[1], y[2], y[3], y[4], y[5], y[6]), p)
+        return np.array([slopes[0], slopes[1], slopes[2], slopes[3], slopes[4], slopes[5], slopes[6], extras[0]])
+
+    return extended

@@ -1,0 +1,82 @@
+"""Kernels that tests share, and cells to run with them.
+
+A kernel takes from five seconds (dopri5) to forty (adams) to compile.  So tests measure what a run measures by
+default unless they are about another set, and take their kernels from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numba
+import numpy as np
+
+from support import columns
+from sweep.engine.executor import execute
+from sweep.kernels import measures
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.method import TOLERANCE
+from sweep.kernels.methods import make_kernel
+from sweep.models import MODELS, analytic, linear
+
+
+def kernel(
+    method: str = "dopri5", model: str = "slip", measure: Iterable[str] | None = None, tolerance: float = TOLERANCE
+) -> Kernel:
+    """The kernel of a run with these settings; by default, with the measurements that a run takes by default."""
+    return make_kernel(method, MODELS[model], default_measures(model) if measure is None else measure, tolerance)
+
+
+def default_measures(model: str) -> tuple[str, ...]:
+    return measures.default(MODELS[model])
+
+
+def images(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **parameters: Any) -> np.ndarray:
+    """Images of the standard case with some parameters replaced.
+
+    Parameters
+    ----------
+    settle : give the kernel the critical spins, without which no cell settles
+    """
+    body = columns(**parameters)
+    stable = None
+    if settle:
+        upper, lower = linear.critical_spins(MODELS[kernel.model.name], body, analytic.critical_spins(body))
+        stable = np.stack([lower, upper, *np.full((4, len(upper)), np.nan)])
+    return images_of(kernel, body, step, t_end, stable)
+
+
+def images_of(
+    kernel: Kernel, body: dict[str, np.ndarray], step: Any, t_end: Any, stable: np.ndarray | None = None
+) -> np.ndarray:
+    """Images of the cells `body`; without `stable` none of them settles."""
+    return kernel.images(body, np.broadcast_to(step, len(body["a"])).astype(float), t_end, stable)
+
+
+def finish(kernel: Kernel, table: np.ndarray, *, settle: bool = True, **options: Any) -> np.ndarray:
+    """Run all images to their ends, in place."""
+    execute(kernel, table, stop_when_settled=settle, **options)
+    return table
+
+
+def run(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **parameters: Any) -> np.ndarray:
+    """Images at their ends; parameters as of `images`."""
+    return finish(kernel, images(kernel, step, t_end, settle=settle, **parameters))
+
+
+def spin(kernel: Kernel, table: np.ndarray) -> np.ndarray:
+    """Spin of each image."""
+    return kernel.model.energy(*kernel.unpack(table))[0]
+
+
+@contextmanager
+def threads(number: int) -> Iterator[None]:
+    """Run kernels on so many threads, or on all there are."""
+    before = numba.get_num_threads()
+    numba.set_num_threads(min(number, numba.config.NUMBA_NUM_THREADS))
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)

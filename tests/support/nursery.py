@@ -1,0 +1,79 @@
+"""Whole commands in processes forked from one that has everything imported and the kernel loaded.
+
+A fork server imports `warm` once; a command then starts within milliseconds, so that hundreds can be
+killed in a minute.  They are processes of their own, with all the files, locks and signals of one.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import resource
+import sys
+from collections.abc import Mapping
+from importlib import metadata
+from multiprocessing import forkserver
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numba
+
+from sweep.cli import main
+from sweep.engine import executor, local
+from sweep.engine import run as engine_run
+
+TILE = 3
+"""Cells a tile; of twelve cells there are then six tiles in two groups."""
+
+
+def context() -> Any:
+    """Where to start processes with `command`."""
+    started = multiprocessing.get_context("forkserver")
+    started.set_forkserver_preload(["support.warm"])
+    # Of numba's ways to share out work this one starts new threads after a fork.
+    with patch.dict(os.environ, NUMBA_THREADING_LAYER="workqueue", PYTHONPATH=os.pathsep.join(sys.path)):
+        forkserver.ensure_running()
+    return started
+
+
+def command(
+    arguments: list[str],
+    log: Path,
+    *,
+    room: int | None = None,
+    versions: Mapping[str, str] | None = None,
+    unprivileged: bool = False,
+) -> None:
+    """Run `sweep ARGUMENTS`, its output in `log`, with many tiles, groups and checkpoints.
+
+    Parameters
+    ----------
+    room : bytes that a file may have
+    versions : of packages, in the place of the true ones
+    unprivileged : bound by the permissions of files even as root
+    """
+    # A lock that numba makes would outlive a killed process, were it not of this method.
+    multiprocessing.set_start_method("fork", force=True)
+    with log.open("wb") as stream:
+        os.dup2(stream.fileno(), 1)
+        os.dup2(stream.fileno(), 2)
+    executor.CHUNK_SECONDS = 0.004
+    engine_run.tile_size = lambda cells: TILE  # noqa: ARG005
+    local.GROUP = 2 * TILE
+    if versions:
+        true_version = metadata.version
+        metadata.version = lambda name: versions.get(name) or true_version(name)
+        numba.__version__ = versions.get("numba", numba.__version__)
+    if unprivileged:
+        _drop_capabilities()
+    if room is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+    main(arguments)
+
+
+def _drop_capabilities() -> None:
+    header = (ctypes.c_uint32 * 2)(0x20080522, 0)
+    if ctypes.CDLL(None, use_errno=True).capset(header, (ctypes.c_uint32 * 6)()):
+        raise OSError(ctypes.get_errno(), "capset")

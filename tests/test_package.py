@@ -1,0 +1,125 @@
+"""The package as a user installs it: a wheel in a fresh environment, every verb run from another folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+pytestmark = pytest.mark.campaign
+
+CONFIG = """\
+name: small
+body: {b: [2.0, 3.0]}
+friction: {mu: [40, 60]}
+integrator: {t_end: 100}
+"""
+
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA"))}
+"""Without what could lead to this checkout or to its compiled kernels."""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built from a copy: setuptools leaves a `build` folder, whose old files would get into the next wheel."""
+    source, target = (tmp_path_factory.mktemp(name) for name in ("source", "wheel"))
+    for name in ("pyproject.toml", "README.md"):
+        shutil.copy(ROOT / name, source)
+    shutil.copytree(ROOT / "sweep", source / "sweep", ignore=shutil.ignore_patterns("__pycache__"))
+    command = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", target, source]
+    subprocess.run(command, check=True, env=ENVIRONMENT)
+    (path,) = target.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The interpreter of a fresh environment that has the wheel and what it depends on, and nothing else."""
+    environment = tmp_path_factory.mktemp("environment")
+    subprocess.run([sys.executable, "-m", "venv", environment], check=True)
+    interpreter = environment / "bin" / "python"
+    subprocess.run([interpreter, "-m", "pip", "install", "-q", wheel], check=True, env=ENVIRONMENT)
+    return interpreter
+
+
+@pytest.fixture(scope="module")
+def folder(python: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a configuration and the results of one run."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    (folder / "small.yaml").write_text(CONFIG, encoding="utf-8")
+    sweep(python, folder, "run", "small.yaml")
+    return folder
+
+
+def call(folder: Path, *command: str | Path) -> str:
+    """The standard output of a command run in `folder`, which has to succeed."""
+    done = subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def sweep(python: Path, folder: Path, *arguments: str) -> str:
+    return call(folder, python, "-m", "sweep", *arguments)
+
+
+def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
+    listed = call(ROOT, "git", "ls-files", "--cached", "--others", "--exclude-standard", "sweep").split()
+    with zipfile.ZipFile(wheel) as archive:
+        assert {name for name in archive.namelist() if name.startswith("sweep/")} == set(listed)
+
+
+VERBS = {
+    "run small.yaml --output again": ["again/small.nc", "again/small.png"],
+    "run small.yaml --dry-run": [],
+    "trajectory small.yaml --at mu=60 --at b=3": [
+        "runs/small/small_trajectory.nc", "runs/small/small_trajectory.png",
+    ],
+    "critical small.yaml --width 0.1": ["runs/small/small_critical.nc", "runs/small/small_critical.png"],
+    "plot runs/small/small.nc --var energy_error": ["runs/small/small_energy_error.png"],
+    "info runs/small/small.nc": [],
+    "reproduce --help": [],
+    "bench --help": [],
+}  # fmt: skip
+"""Commands, and the files they must write."""
+
+
+@pytest.mark.parametrize("command", VERBS)
+def test_every_verb_runs_from_another_folder(command: str, python: Path, folder: Path) -> None:
+    sweep(python, folder, *command.split())
+    assert [name for name in VERBS[command] if not (folder / name).is_file()] == []
+
+
+def test_workers_run_and_find_the_same_numbers(python: Path, folder: Path) -> None:
+    sweep(python, folder, "run", "small.yaml", "--workers", "2", "--output", "workers", "--quiet")
+    program = (
+        "import xarray as xr\n"
+        "here, there = (xr.load_dataset(f'{name}/small.nc') for name in ('runs/small', 'workers'))\n"
+        "xr.testing.assert_identical(here.drop_attrs(deep=False), there.drop_attrs(deep=False))\n"
+    )
+    call(folder, python, "-c", program)
+
+
+def test_data_of_the_reports_is_found(python: Path, folder: Path) -> None:
+    """`bench` and `reproduce` take minutes; this is all that they read."""
+    program = (
+        "import json, sweep\n"
+        "from sweep.bench.reference import read_counts, read_spins\n"
+        "from sweep.reproduce.rows import published\n"
+        "spins = {model: len(found.spins) for model, found in read_spins().items()}\n"
+        "counts, printed = len(read_counts().reversals), published()['reversals_60']['value']\n"
+        "print(json.dumps([sweep.__file__, spins, counts, printed]))\n"
+    )
+    file, spins, counts, printed = json.loads(call(folder, python, "-c", program))
+    assert Path(file).is_relative_to(python.parent.parent)
+    assert (spins, counts, printed) == ({"slip": 13, "noslip": 4, "effective": 8, "averaged": 8}, 500, 3)
+
+
+def test_console_script(python: Path, folder: Path) -> None:
+    assert call(folder, python.parent / "sweep", "--version").startswith("sweep, version ")
