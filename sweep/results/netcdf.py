@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,10 @@ def write(
 def _write_frame(frame: xr.Dataset, path: Path) -> None:
     filled = {name for name, variable in frame.data_vars.items() if variable.dtype.kind == "f"}
     encoding = {name: {"_FillValue": None} for name in set(frame.variables) - filled}
-    frame.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
+    # In a thread of its own, where Ctrl-C is not raised: one that came while xarray took its lock of HDF5 left that
+    # locked, and closing the file waited for it for ever (1 in 60 runs interrupted while they wrote their dataset).
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(frame.to_netcdf, path, format="NETCDF4", engine="netcdf4", encoding=encoding).result()
 
 
 def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
