@@ -199,6 +199,9 @@ def strike(runs: Runs, undisturbed: dict[str, bytes], moment: str, delay: float,
     time.sleep(delay)
     os.kill(process.pid, with_signal)
     process.join(60)
+    if process.is_alive():
+        os.kill(process.pid, signal.SIGABRT)  # to have its stacks in the log
+        process.join(60)
     watch.look()
     return process
 

@@ -7,6 +7,7 @@ killed in a minute.  They are processes of their own, with all the files, locks 
 from __future__ import annotations
 
 import ctypes
+import faulthandler
 import multiprocessing
 import os
 import resource
@@ -59,6 +60,7 @@ def command(
     with log.open("wb") as stream:
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
+    faulthandler.enable()
     executor.CHUNK_SECONDS = 0.004
     engine_run.tile_size = lambda cells: TILE  # noqa: ARG005
     local.GROUP = 2 * TILE
