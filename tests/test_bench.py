@@ -21,8 +21,6 @@ from sweep.models import MODELS
 from sweep.report.cells import Ends, make_kernel, simulate, standard
 from sweep.report.rows import Row, Section, states
 
-pytestmark = pytest.mark.campaign
-
 TIMES = (25.0, 50.0)
 TINY = Effort(
     trajectories=4, repeats=1, tolerances=(1e-5, 1e-6, 1e-7, 1e-8), rungs=2, sizes=(16,), ends=(50,), frictions=(10,)
@@ -57,6 +55,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("data")
 @pytest.mark.parametrize("method", ["dopri5", "adams"])
 def test_error_is_the_largest_difference_from_the_reference(method: str) -> None:
@@ -72,6 +71,7 @@ def test_error_is_the_largest_difference_from_the_reference(method: str) -> None
     assert spin_errors(kernel, spins, step)[0] == pytest.approx([1e-5, 1e-3], rel=1e-3)
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("data")
 def test_error_of_a_failed_trajectory_is_infinite() -> None:
     spins = read_spins()["slip"]
@@ -110,6 +110,7 @@ def test_works_take_turns_and_slow_ones_run_less_often() -> None:
     assert f"{Spread((3.0, 1.0, 2.0)):.1f}" == "2.0 (1.0 … 3.0)"
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("data")
 def test_a_tiny_run_writes_all_files_and_sections(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hard, "CASES", (hard.equilibrium,))
@@ -141,6 +142,7 @@ def test_a_tiny_run_writes_all_files_and_sections(tmp_path: Path, monkeypatch: p
     assert all(title in text for title in ("Work and precision", "Wrong counts", "FMA peak", "Cost", "Hard cases"))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("method", methods.METHODS)
 def test_timed_runs_reach_the_end(method: str) -> None:
     work = Work(make_kernel(method, MODELS["slip"], ()), standard(mu=[60.0, 75.0]), np.full(2, 0.01), 50.0)
@@ -148,6 +150,7 @@ def test_timed_runs_reach_the_end(method: str) -> None:
     np.testing.assert_array_equal(states, simulate(standard(mu=[60.0, 75.0]), 50.0, method=method, step=0.01).states)
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("data")
 def test_methods_are_compared_at_equal_error() -> None:
     work = precision.Work(make_kernel("adams", MODELS["slip"], ()), standard(), np.array([0.1]))
@@ -273,6 +276,7 @@ PLANTED: list[tuple[Callable[[], list[Row]], str, Bug]] = [
 ]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("case", "bug"), [(c, b) for c, _, b in PLANTED], ids=[f"{c.__name__}-{w}" for c, w, _ in PLANTED]
 )
@@ -301,6 +305,7 @@ def test_verdict_on_late_reversals(
     assert [r.holds for r in rows_with(hard.late_reversal, plant, monkeypatch)] == [holds, holds]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "case",
     [c for c in hard.CASES if c not in (hard.late_reversal, hard.strong_friction)],

@@ -8,9 +8,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from conftest import ROOT
+import pytest
+from support import ROOT
+from support.kernels import default_measures
 
 import sweep
+from sweep.bench.counts import T_END
+from sweep.bench.reference import read_counts
+from sweep.report.cells import simulate
 
 
 def test_reversal_counts_agree_with_the_reference(tmp_path: Path) -> None:
@@ -29,3 +34,18 @@ def test_reversal_counts_agree_with_the_reference(tmp_path: Path) -> None:
     # Late reversals grow from round-off and come a few per cent earlier or later; the first two do not.
     few = (rows["reversals"] > 0) & (rows["reversals"] <= 2)
     np.testing.assert_allclose(ours.t_last_reversal.values[few], rows["t_last_reversal"][few], rtol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("method", "every"),
+    [("adams", 25), pytest.param("adams", 1, marks=pytest.mark.campaign),
+     pytest.param("dopri5", 5, marks=pytest.mark.campaign)],
+)  # fmt: skip
+def test_firm_counts_of_500_random_cells_agree(method: str, every: int) -> None:
+    """The table of `scripts/reference_counts_500.py`; firm are counts that no round-off decides."""
+    reference = read_counts()
+    sample = np.flatnonzero(reference.firm)[::every]
+    assert len(sample) > 400 / every
+    columns = {name: column[sample] for name, column in reference.columns.items()}
+    ends = simulate(columns, T_END, method=method, measure=default_measures("slip"), settle=True)
+    np.testing.assert_array_equal(ends["reversals"], reference.reversals[sample])

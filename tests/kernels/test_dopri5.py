@@ -132,7 +132,7 @@ def test_reversals_of_the_papers_figure() -> None:
 
 def test_windows_are_period_averages() -> None:
     """Count, time and mean against the same definition applied to a finely sampled spin."""
-    t_end, start = 300.0, {"mu": 75.0, "x0": 0.5, "y0": 0.5}
+    t_end, start = 800.0, {"mu": 75.0}
     table = images(DOPRI, 0.01, t_end, **start)
     tau = of(table, "period")[0]
     ends = np.arange(0, t_end, tau)
@@ -144,7 +144,7 @@ def test_windows_are_period_averages() -> None:
     i = changes[-1]
     crossing = ends[i] + tau / 2 + tau * means[i] / (means[i] - means[i + 1])
     assert of(table, "last_reversal")[0] == pytest.approx(crossing, abs=1e-5)
-    assert of(table, "closed_window")[0] / tau == pytest.approx(means[-1], abs=1e-9)
+    assert of(table, "closed_window")[0] / tau == pytest.approx(means[-1], abs=1e-10)
 
 
 def test_energy_error_is_the_largest_violation() -> None:
