@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support import kernels
 
 from sweep.bench.reference import SPINS
 from sweep.engine.executor import execute
-from sweep.kernels.measures import possible
-from sweep.kernels.methods import make_kernel
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
 
@@ -33,8 +32,7 @@ def test_spins_agree_with_the_reference(model: str, step: float, choice: dict[st
         which &= TABLE[name] == value
     rows = TABLE[which]
     columns = {name: rows[name].astype(float) for name in MODELS["slip"].parameters}
-    # All measurements, as in other tests: their compiled kernel serves here too.
-    kernel = make_kernel("dopri5", MODELS[model], possible(MODELS[model]))
+    kernel = kernels.kernel(model=model)
     table = kernel.images(columns, np.full(len(rows), step), T_END)
     execute(kernel, table, stop_when_settled=False)
     assert set(table[:, kernel.row("status")]) == {TIME_LIMIT}

@@ -37,7 +37,9 @@ SCRAPS = (
     b"]", b"{", b"}", b",", b"#", b"&a ", b"*a ", b"!!", b"|\n", b">\n", b"'", b'"', b"\\", b"<<", b"1e999", b"\x7f",
 )  # fmt: skip
 
-FILE_LIKE = ("name: x", "verify: 0.0", "max_failed_fraction: 0.01", "measure: [reversals, energy_error]")
+# The measurements are those of a run by default, whose kernels are compiled already.
+MEASURE = "measure: [reversals, energy_error, noise_limited]"
+FILE_LIKE = ("name: x", "verify: 0.0", "max_failed_fraction: 0.01", MEASURE)
 
 
 def tree(random: Random) -> list[list[Any]]:
