@@ -290,6 +290,7 @@ def test_every_case_has_a_planted_bug() -> None:
     assert {case for case, _, _ in PLANTED} | {hard.late_reversal} == set(hard.CASES)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("count", "last", "flag", "holds"),
     [(9, 12916, 0, True), (9, 12800, 0, True), (9, 12251, 0, False), (9, 12251, 1, True), (8, 12916, 1, False)],

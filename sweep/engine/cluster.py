@@ -146,6 +146,8 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
             yield Cluster(client)
         return
     try:
+        # A client that is given a wrong address waits 20 s for itself when it is collected, and prints a traceback.
+        distributed.comm.resolve_address(scheduler)
         client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise StoreError(f"{scheduler}: no dask scheduler answers ({error})") from None

@@ -17,7 +17,7 @@ import distributed
 import pytest
 import xarray as xr
 from support import ROOT
-from support.cli import invoke, refused
+from support.cli import invoke
 from support.kernels import threads
 from support.same import contents
 
@@ -223,14 +223,30 @@ def test_ctrl_c_ends_all_processes(
     assert contents(tmp_path) == by_threads
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "foo://here:1"])
-def test_a_scheduler_that_does_not_answer_is_reported(
-    address: str, config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("sweep.engine.cluster.PATIENCE", "1s")
-    refused(
-        invoke("run", config, "--output", tmp_path, "--scheduler", address, "--quiet"), address, "no dask scheduler"
-    )
+UNANSWERED = """\
+import sys
+from sweep.cli import main
+from sweep.engine import cluster
+
+cluster.PATIENCE = "1s"
+for address in sys.argv[3:]:
+    try:
+        main(["run", sys.argv[1], "--output", sys.argv[2], "--scheduler", address, "--quiet"])
+    except SystemExit as end:
+        print(end.code)
+"""
+
+
+def test_a_scheduler_that_does_not_answer_is_reported(config: Path, tmp_path: Path) -> None:
+    """In a process of its own, for what dask still says when that ends: one line for each is all that is printed."""
+    addresses = ["tcp://127.0.0.1:1", "nonsense", "foo://here:1"]
+    command = [sys.executable, "-c", UNANSWERED, str(config), str(tmp_path), *addresses]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.split() == ["2"] * len(addresses)
+    lines = done.stderr.splitlines()
+    assert len(lines) == len(addresses), done.stderr
+    for line, address in zip(lines, addresses, strict=True):
+        assert line.startswith(f"{address}: no dask scheduler answers")
 
 
 @pytest.mark.campaign
