@@ -1,4 +1,8 @@
-"""The times of the first K reversals; the configuration sets K: `measure: [reversals, {reversal_times: 12}]`."""
+"""The times of the first K reversals, K from the configuration: `measure: [reversals, {reversal_times: 12}]`.
+
+After a step only the latest times are shifted along; a look puts them where they belong.  Written in every step, five
+times or more kept LLVM from vectorising the loop over lanes: 115 ns a step and lane in place of 21.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from sweep.kernels.codegen import compile_inline
-from sweep.kernels.layout import Layout, Table
+from sweep.jit import inline
+from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement
 from sweep.models.model import SPIN, Array, Columns
 from sweep.variables import Variable
+
+LATEST = ("newest_reversal", "second_newest_reversal", "third_newest_reversal")
+"""Of more than three reversals between two looks, which are windows apart, the earlier ones have no time."""
 
 
 @dataclass(frozen=True)
@@ -31,23 +38,48 @@ class ReversalTimes(Measurement):
     """K, the number of reversals whose times are kept."""
 
     @property
-    def rows(self) -> tuple[str, ...]:
+    def times(self) -> tuple[str, ...]:
+        """The quantities that hold the K times."""
         return tuple(f"reversal_time{k}" for k in range(self.count))
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        return (*LATEST, "recorded", *self.times)
 
     @property
     def spec(self) -> str:
         return f"{self.name}={self.count}"
 
     def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
-        return dict.fromkeys(self.rows, np.nan)
+        return dict.fromkeys((*LATEST, *self.times), np.nan)
 
     def make_at_reversal(self, layout: Layout) -> Any:
-        arguments = "group, lane, reverses, count, crossing"
-        lines = [f"def at_reversal({arguments}):"]
-        for k, name in enumerate(self.rows):
-            place = f"group[{layout.at(name)} + lane]"
-            lines.append(f"    {place} = crossing if reverses & (count == {k + 1}.0) else {place}")
-        return compile_inline("at_reversal", "\n".join(lines), {})
+        NEWEST, SECOND, THIRD = map(layout.at, LATEST)
+
+        @inline
+        def at_reversal(group: Any, lane: int, reverses: Any, count: Any, crossing: Any) -> None:
+            newest, second = group[NEWEST + lane], group[SECOND + lane]
+            group[THIRD + lane] = second if reverses else group[THIRD + lane]
+            group[SECOND + lane] = newest if reverses else second
+            group[NEWEST + lane] = crossing if reverses else newest
+
+        return at_reversal
+
+    def make_look(self, layout: Layout) -> Any:
+        COUNT, RECORDED, FIRST, NEWEST = map(layout.at, ("reversals", "recorded", self.times[0], LATEST[0]))
+        most, kept = self.count, len(LATEST)
+
+        @inline
+        def look(
+            group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, inertia: Any, total: Any
+        ) -> None:
+            count = int(group[COUNT + lane])
+            for k in range(int(group[RECORDED + lane]), min(count, most)):
+                age = count - 1 - k
+                group[FIRST + k * LANES + lane] = group[NEWEST + age * LANES + lane] if age < kept else np.nan
+            group[RECORDED + lane] = count
+
+        return look
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        return {"reversal_times": table.columns(self.rows)}
+        return {"reversal_times": table.columns(self.times)}
