@@ -43,11 +43,9 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from tracing import traced_rhs
 
 from sweep.engine.executor import execute
-from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.kernel import Kernel
+from sweep.kernels.methods import make_kernel
 from sweep.kernels.status import TIME_LIMIT
-from sweep.kernels.tableau import DOPRI5
-from sweep.models.coefficients import rattle_period
 from sweep.models.model import Array, stack
 from sweep.models.slip import MODEL
 from sweep.report.cells import slip_states
@@ -84,7 +82,7 @@ class Problem:
         fixed = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": mu, "x0": 0.01, "y0": 0.01}
         columns = {name: np.full(trajectories, value) for name, value in fixed.items()}
         columns["n0"] = 0.05 * (1 + 1e-3 * np.arange(trajectories) / trajectories)
-        return cls(columns, stack(MODEL.start(columns)), MODEL.constants.of(columns))
+        return cls(columns, stack(MODEL.start(columns)), stack(MODEL.constants.of(columns)))
 
     @property
     def size(self) -> int:
@@ -99,7 +97,7 @@ class Problem:
 
     def spin(self, states: Array) -> Array:
         """The spins of states of shape (states, trajectories)."""
-        return np.asarray(MODEL.rhs(states, self.constants)[1][0])
+        return np.asarray(MODEL.rhs(states, MODEL.constants(*self.constants))[1][0])
 
 
 @dataclass
@@ -126,7 +124,7 @@ class Entry:
 
 
 def count_constants() -> int:
-    return len(Problem.of(1.0, 1).constants)
+    return len(MODEL.constants._fields)
 
 
 def in_threads(run: Callable[[Any], Array], items: Iterable[Any]) -> list[Array]:
@@ -143,22 +141,21 @@ def thread_pool() -> ThreadPoolExecutor:
 
 def our_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
     for measure in ((), ("reversals", "energy_error")):
-        kernel = Kernel(MODEL, DOPRI5, measure)
+        kernel = make_kernel("dopri5", MODEL, measure)
         tool = "sweep, measuring" if measure else "sweep"
         for step in map(problem.step, STEPS[1::2] if quick else STEPS):
             yield Entry(tool, f"dopri5 h={step:g}", our_run(problem, kernel, step), problem)
-        stiff = AdamsKernel(measure)
+        stiff = make_kernel("adams", MODEL, measure)
         for step in ADAMS_STEPS[1::2] if quick else ADAMS_STEPS:
             yield Entry(f"{tool} (adams)", f"adams h={step:g}", our_run(problem, stiff, step), problem)
 
 
 def our_run(problem: Problem, kernel: Kernel, step: float) -> Callable[[], Array]:
     """Whole runs, including the preparation of the images, where adams has its start-up."""
-    steps, never_settles = np.full(problem.size, step), np.full((6, problem.size), np.nan)
-    period = rattle_period(problem.columns)
+    steps = np.full(problem.size, step)
 
     def run() -> Array:
-        images = kernel.images(problem.columns, steps, T_END, never_settles, period)
+        images = kernel.images(problem.columns, steps, T_END)
         execute(kernel, images, stop_when_settled=False)
         finished = images[:, kernel.row("status")] == TIME_LIMIT
         return np.where(finished, slip_states(kernel, images), np.nan)
@@ -302,11 +299,11 @@ def taylor_reference(problem: Problem) -> Array:
 @cache
 def compiled_rhs() -> Any:
     """Compiled (t, states, constants) -> slopes, on arrays."""
-    rhs, n_states, n_constants = MODEL.rhs, len(MODEL.states), count_constants()
+    rhs, constants_of, n_states, n_constants = MODEL.rhs, MODEL.constants, len(MODEL.states), count_constants()
 
     @numba.njit(error_model="numpy")
     def slopes(_t: float, y: Array, p: Array) -> Array:
-        return np.array(rhs(to_fixed_tuple(y, n_states), to_fixed_tuple(p, n_constants))[0])
+        return np.array(rhs(to_fixed_tuple(y, n_states), constants_of(*to_fixed_tuple(p, n_constants)))[0])
 
     return slopes
 
@@ -346,12 +343,12 @@ def numbalsoda_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
 def numbalsoda_rhs() -> Any:
     import numbalsoda
 
-    rhs, n_states, n_constants = MODEL.rhs, len(MODEL.states), count_constants()
+    rhs, constants_of, n_states, n_constants = MODEL.rhs, MODEL.constants, len(MODEL.states), count_constants()
 
     @numba.cfunc(numbalsoda.lsoda_sig, error_model="numpy")
     def callback(_t: float, y: Any, dy: Any, p: Any) -> None:
         states, constants = numba.carray(y, (n_states,)), numba.carray(p, (n_constants,))
-        slopes, _ = rhs(to_fixed_tuple(states, n_states), to_fixed_tuple(constants, n_constants))
+        slopes, _ = rhs(to_fixed_tuple(states, n_states), constants_of(*to_fixed_tuple(constants, n_constants)))
         for i in range(n_states):
             dy[i] = slopes[i]
 

@@ -89,7 +89,7 @@ def system() -> list[tuple[Any, Any]]:
 
 
 def count_constants() -> int:
-    return len(slip.Constants.of({name: np.ones(1) for name in slip.MODEL.parameters}))
+    return len(slip.Constants._fields)
 
 
 Advance = Callable[[Array, Array, Array], Array]
@@ -161,7 +161,7 @@ def sign_changes(averages: Array) -> Array:
 def follow(columns: dict[str, Array], advance: Advance, lanes: int, real: Any) -> list[Run]:
     """Integrate all cells, `lanes` at a time.  A lane whose cell has ended takes the next, of similar stiffness."""
     columns = {name: column.astype(real) for name, column in columns.items()}
-    period, constants = rattle_period(columns), slip.Constants.of(columns)
+    period, constants = rattle_period(columns), stack(slip.Constants.of(columns))
     start = np.vstack([stack(slip.start(columns)) / SCALE[:, None], np.zeros((1, len(period)))])
     runs = [Run(float(p)) for p in period]
     waiting: Iterator[int] = iter(np.argsort(slip.fastest_decay(columns) * period))
@@ -190,7 +190,7 @@ def follow(columns: dict[str, Array], advance: Advance, lanes: int, real: Any) -
 def look(runs: list[Run], held: Array, path: Array, constants: Array) -> None:
     """Record a stretch of all lanes' paths, shape (samples, 8, lanes), and end the cells that are done."""
     states = np.moveaxis(path[:, :-1] * SCALE[:, None], 1, 0)
-    _, (_, _, force, _) = slip.rhs(tuple(states), tuple(constants))
+    _, (_, _, force, _) = slip.rhs(tuple(states), slip.Constants(*constants))
     settled = have_settled(states[:, -1].astype(float), constants.astype(float))
     for cell in np.unique(held):
         lane, run = first_lane(held, cell), runs[cell]
@@ -217,13 +217,13 @@ def reach(states: Array, constants: Array) -> Array:
     The averaged equations (ndotab, abdot) integrate to Δn = sqrt(d² + 2E/I3) - d for a mode of energy E
     at distance d from its critical spin.
     """
-    _, rattle, inertia = slip.energy(states.astype(float), constants.astype(float))
+    _, rattle, inertia = slip.energy(states.astype(float), slip.Constants(*constants.astype(float)))
     return np.asarray(np.sqrt(2 * rattle / inertia))
 
 
 def have_settled(states: Array, constants: Array) -> Array:
     """Whether the rattle decays at all spins within reach and a margin, and these have one sign.  Shape (lanes,)."""
-    spin, *_ = slip.energy(states, constants)
+    spin, *_ = slip.energy(states, slip.Constants(*constants))
     within = MARGIN * reach(states, constants)
     near = [spin + share * within for share in np.linspace(-1, 1, 5)]
     decays = np.all([linear.growth_rate(slip.MODEL, constants, n) < 0 for n in near], axis=0)
@@ -254,7 +254,9 @@ def jacobian(constants: Array, spin: Any) -> Array:
     for i in RATTLE:
         states = np.array(slip.MODEL.upright(spin)).astype(np.clongdouble)
         states[i] += 1j * step
-        columns.append(np.array(slip.rhs(states, constants.astype(np.longdouble))[0])[RATTLE].imag / step)
+        columns.append(
+            np.array(slip.rhs(states, slip.Constants(*constants.astype(np.longdouble)))[0])[RATTLE].imag / step
+        )
     return np.array(columns).T
 
 

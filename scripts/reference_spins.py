@@ -85,12 +85,12 @@ def problem(model: Model, case: Case, real: Any) -> tuple[list[Any], list[Any]]:
     functions = {"arctan": arctan, "cos": lambda x: np.cos(typed(x)), "sin": lambda x: np.sin(typed(x))}
     numbers = SimpleNamespace(**{**vars(np), **functions})
     with mock.patch.object(coefficients, "np", numbers):
-        return [s[0] for s in model.start(columns)], [real(p[0]) for p in model.constants(columns)]
+        return [s[0] for s in model.start(columns)], [real(p[0]) for p in model.constants.of(columns)]
 
 
 def check_contact(model: Model, states: Any, constants: Any) -> Any:
     """The spin, after checking that the body touches the plane."""
-    _, (spin, _, R, denominator) = model.rhs(tuple(states), tuple(constants))
+    _, (spin, _, R, denominator) = model.rhs(tuple(states), model.constants(*constants))
     assert R > 0
     assert denominator > 0
     return spin
@@ -159,7 +159,7 @@ def full_jacobian(states: Array, constants: Array) -> Array:
     for i in range(len(states)):
         shifted = states.astype(complex)
         shifted[i] += 1e-30j
-        columns.append(np.array(slip.rhs(shifted, constants)[0]).imag / 1e-30)
+        columns.append(np.array(slip.rhs(shifted, slip.Constants(*constants))[0]).imag / 1e-30)
     return np.array(columns).T
 
 
@@ -171,7 +171,7 @@ def radau_step(A: Array, states: Array, constants: Array, step: Any) -> Array:
     increments, size = np.zeros((s, n), Extended), np.inf
     # Each iteration gains four digits or more; round-off is at 1e-22.
     while size > 1e-20:
-        slopes = np.array(slip.rhs((states + increments).T, constants[:, None])[0]).T
+        slopes = np.array(slip.rhs((states + increments).T, slip.Constants(*constants[:, None]))[0]).T
         change = (inverse @ (step * (A @ slopes) - increments).ravel().astype(float)).reshape(s, n)
         increments += change
         size = np.abs(change).max()

@@ -11,13 +11,11 @@ import numba
 import pytest
 import xarray as xr
 from hypothesis import settings
-from support import ROOT, SMALL, STANDARD, columns
+from support import SMALL
 from support.kernels import default_measures, kernel
 
 import sweep
 from sweep.kernels.build import build
-
-__all__ = ["ROOT", "SMALL", "STANDARD", "columns"]
 
 # Compiling takes longer than any deadline; the same examples on every machine.
 settings.register_profile("sweep", deadline=None, derandomize=True, max_examples=200)

@@ -8,7 +8,7 @@ from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.method import Method
 from sweep.models import friction, slip, slip_split
 from sweep.models.ellipsoid import inertia
-from sweep.models.model import Array, Columns, Model
+from sweep.models.model import Array, Columns
 
 # A model of the error in spin at t = 400.  `_ERROR` is twice the error at h ν = 0.274 (h = 0.125) in a case where the
 # rattle raises R by a quarter (a = 10, b = 3, n0 = 0.05).  From there the error varies as the seventh power of h ν, as
@@ -28,16 +28,12 @@ def accurate_step(columns: Columns, tolerance: float) -> Array:
     return np.asarray(np.minimum(_PHASE * (tolerance / error) ** (1 / 7), _LONGEST_PHASE) / nu)
 
 
-def _accurate_step(model: Model, columns: Columns, tolerance: float) -> Array:  # noqa: ARG001
-    return accurate_step(columns, tolerance)
-
-
 METHOD = Method(
     name="adams",
     summary="Adams formulas of orders eight and nine for the slow variables and BDF5 for the slip, for the slip model: "
     "friction does not limit its step",
     kernel=lambda model, measurements, tolerance: AdamsKernel(measurements, tolerance),  # noqa: ARG005
-    accurate_step=_accurate_step,
+    accurate_step=lambda model, columns, tolerance: accurate_step(columns, tolerance),  # noqa: ARG005
     models=frozenset({slip.MODEL.name}),
     # On one thread start-up takes 4.6 to 6.4 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
