@@ -48,7 +48,6 @@ from sweep.kernels.methods import make_kernel
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models.model import Array, stack
 from sweep.models.slip import MODEL
-from sweep.report.cells import slip_states
 
 THREADS = 2
 T_END = 400.0
@@ -158,7 +157,7 @@ def our_run(problem: Problem, kernel: Kernel, step: float) -> Callable[[], Array
         images = kernel.images(problem.columns, steps, T_END)
         execute(kernel, images, stop_when_settled=False)
         finished = images[:, kernel.row("status")] == TIME_LIMIT
-        return np.where(finished, slip_states(kernel, images), np.nan)
+        return np.where(finished, kernel.model_states(images), np.nan)
 
     return run
 

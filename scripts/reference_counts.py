@@ -8,8 +8,9 @@ At each moment ω', v_g' and the normal force R solve one linear system of seven
     v_g' - R (u - μ v_p)       = -u - ω × v_g
     u · v_g' - (u × x_p) · ω'  = (x_p' × ω) · u - v_p · u'     from (v_p · u)' = 0, v_p = v_g - x_p × ω
 
-and SciPy's DOP853 integrates it at tight tolerances, with the integral of the spin n as a tenth state.  A cell whose
-count a tiny change could alter (see `Trajectory.fault` and `reference`) is left out.  One process takes half an hour.
+and SciPy's DOP853 integrates it at tight tolerances, with the integral of the ripple-free spin n* (`reversals.py`) as a
+tenth state.  A cell whose count a tiny change could alter (see `Trajectory.fault` and `reference`) is left out.  One
+process takes half an hour.
 
     python scripts/reference_counts.py data/reference_counts.csv
 """
@@ -25,9 +26,13 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from reversals import last_reversal, sign_changes, window_and_ripple
 from scipy.integrate import DOP853
 
 Array = NDArray[np.float64]
+
+# A matrix, the moments of inertia, μ and K: what `motion` takes beside the state.
+Body = tuple[Array, Array, float, Array]
 
 # Random cells: (seed, how many, fewest reversals by the paper's estimate).
 DRAWS = [(20111221, 95, 0.0), (20111222, 24, 4.0)]
@@ -37,10 +42,10 @@ MAX_STEPS, MAX_STEPS_LONG = 300_000, 3_000_000
 # Random cells expected to take more steps are not tried.
 MAX_EXPECTED_STEPS = 80_000
 
-# u, ω, v_g and the integral of n.  All but u3, ω3 and the integral vanish in upright spin.
+# u, ω, v_g and the integral of n*.  All but u3, ω3 and the integral vanish in upright spin.
 ATOL = np.array([1e-18, 1e-18, 1e-14, 1e-18, 1e-18, 1e-16, 1e-18, 1e-18, 1e-18, 1e-12])
 
-# A count is in doubt if the window averages of the spin turn back, or end, this close to zero.
+# A count is in doubt if the window averages turn back, or end, this close to zero.
 GRAZING = 1e-4
 # Rattle energy, in units of I3 n²/2, below which a trajectory may count as settled.
 SETTLED_RATTLE = 1e-6
@@ -70,15 +75,8 @@ class Cell:
         """Principal moments of inertia."""
         return np.array([self.b**2 + 1, self.a**2 + 1, self.a**2 + self.b**2]) / 5
 
-    def period(self) -> float:
-        """Window of the average: 2π / min(ν1, ν2), from the eigenvalues of J⁻¹ P⁻¹ J⁻¹."""
-        j_inverse = np.diag([((self.a**2 + 6) / 5) ** -0.5, ((self.b**2 + 6) / 5) ** -0.5])
-        p = np.linalg.inv(self.shape())[:2, :2]
-        squares = np.linalg.eigvalsh(j_inverse @ np.linalg.inv(p) @ j_inverse)
-        return float(2 * np.pi / np.sqrt(squares.min()))
-
     def start(self) -> Array:
-        """State at t = 0: contact at (x0, y0), ω = n0 u, no slip velocity; the integral of n is 0."""
+        """State at t = 0: contact at (x0, y0), ω = n0 u, no slip velocity; the integral of n* is 0."""
         inverse = np.linalg.inv(self.shape())
         flat = np.array([self.x0, self.y0])
         x_p = np.array([self.x0, self.y0, np.sqrt(1 - flat @ inverse[:2, :2] @ flat)])
@@ -90,36 +88,34 @@ class Cell:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """The spin averaged over successive windows, and how the integration ended."""
+    """The integral of n* after each half window, and how the integration ended."""
 
-    period: float
-    averages: Array
+    window: float
+    integrals: Array
     end: str
     steps: int
 
-    def reversals(self) -> int:
-        return len(self._before())
+    def averages(self, shift: int = 0) -> Array:
+        """Averages of n* over successive windows that begin `shift` half windows after the start."""
+        return np.asarray(np.diff(self.integrals[shift::2]) / self.window)
+
+    def reversals(self, shift: int = 0) -> int:
+        return len(sign_changes(self.averages(shift)))
 
     def last_reversal(self) -> float:
-        """Zero of the line between the last averages of opposite sign, each at its window's centre; NaN for none."""
-        if not self.reversals():
-            return float("nan")
-        k = self._before()[-1]
-        here, after = self.averages[k : k + 2]
-        return float(self.period * (k + 0.5 + here / (here - after)))
+        return last_reversal(self.averages(), self.window)
 
     def fault(self) -> str:
         """Why the count cannot be trusted; empty if it can."""
         if self.end != "settled":
             return self.end
-        rise = np.diff(self.averages)
-        turns = self.averages[1:-1][rise[:-1] * rise[1:] <= 0]
-        closest = np.abs(np.append(turns, self.averages[-1])).min()
+        if self.reversals(1) != self.reversals():
+            return "count depends on the window's start"
+        averages = self.averages()
+        rise = np.diff(averages)
+        turns = averages[1:-1][rise[:-1] * rise[1:] <= 0]
+        closest = np.abs(np.append(turns, averages[-1])).min()
         return "grazing" if closest < GRAZING else ""
-
-    def _before(self) -> NDArray[np.int64]:
-        """Windows after which the sign changes."""
-        return np.flatnonzero(self.averages[1:] * self.averages[:-1] < 0)
 
 
 @njit
@@ -129,8 +125,8 @@ def cross(a: Array, b: Array) -> Array:
 
 
 @njit
-def motion(state: Array, shape: Array, inertia: Array, mu: float) -> tuple[Array, float]:
-    """Time derivative of the state, and the normal force R."""
+def motion(state: Array, shape: Array, inertia: Array, mu: float, ripple: Array) -> tuple[Array, float]:
+    """Time derivative of the state, and the normal force R; `ripple` is the matrix K in n*."""
     u, omega, v_g = state[0:3], state[3:6], state[6:9]
     height = np.sqrt(np.sum(u * (shape @ u)))
     x_p = -(shape @ u) / height
@@ -154,11 +150,12 @@ def motion(state: Array, shape: Array, inertia: Array, mu: float) -> tuple[Array
     slope = np.empty(10)
     slope[0:3] = du
     slope[3:9] = accelerations[0:6]
-    slope[9] = np.sum(u * omega)
+    momentum = inertia * omega - cross(x_p, v_g)
+    slope[9] = np.sum(u * omega) - np.sum(u[:2] * (ripple @ momentum[:2]))
     return slope, accelerations[6]
 
 
-def growth_rate(n: float, shape: Array, inertia: Array, mu: float) -> float:
+def growth_rate(n: float, body: Body) -> float:
     """Largest real part of the rattle's eigenvalues about upright spin n."""
     rattle, size = np.array([0, 1, 3, 4, 6, 7]), 1e-6
     jacobian = np.empty((6, 6))
@@ -166,43 +163,43 @@ def growth_rate(n: float, shape: Array, inertia: Array, mu: float) -> float:
         state = np.zeros(10)
         state[2], state[5], state[i] = -1.0, -n, size
         # The rattle's slopes are odd in the rattle: one side is a central difference.
-        jacobian[:, column] = motion(state, shape, inertia, mu)[0][rattle] / size
+        jacobian[:, column] = motion(state, *body)[0][rattle] / size
     return float(np.linalg.eigvals(jacobian).real.max())
 
 
-def has_settled(state: Array, average: float, shape: Array, inertia: Array, mu: float) -> bool:
+def has_settled(state: Array, average: float, body: Body) -> bool:
     """Whether the spin is stable and the rattle too weak to move it, so that every mode goes on decaying."""
+    shape, inertia, *_ = body
     n = float(state[0:3] @ state[3:6])
     u, omega, v_g = state[0:2], state[3:5], state[6:8]
     rattle = 0.5 * (inertia[:2] @ omega**2 + v_g @ v_g + u @ (shape[:2, :2] - np.eye(2)) @ u)
     if n * average <= 0 or rattle > SETTLED_RATTLE * 0.5 * inertia[2] * n**2:
         return False
-    return all(growth_rate(spin, shape, inertia, mu) < 0 for spin in (n, SETTLED_MARGIN * n))
+    return all(growth_rate(spin, body) < 0 for spin in (n, SETTLED_MARGIN * n))
 
 
 def simulate(cell: Cell, rtol: float, max_steps: int) -> Trajectory:
     """Integrate one cell until it settles, lifts off, or reaches the time or step limit."""
-    shape, inertia, period = cell.shape(), cell.inertia(), cell.period()
-    solver = DOP853(
-        lambda _t, state: motion(state, shape, inertia, cell.mu)[0], 0.0, cell.start(), T_END, rtol=rtol, atol=ATOL
-    )
-    averages: list[float] = []
-    integral, end, steps = 0.0, "step limit", 0
+    shape, inertia = cell.shape(), cell.inertia()
+    window, ripple = window_and_ripple(shape, inertia)
+    body = shape, inertia, cell.mu, ripple
+    solver = DOP853(lambda _t, state: motion(state, *body)[0], 0.0, cell.start(), T_END, rtol=rtol, atol=ATOL)
+    integrals = [0.0]
+    end, steps = "step limit", 0
     while end == "step limit" and steps < max_steps:
         solver.step()
         steps += 1
         if solver.status != "running":
             end = "time limit" if solver.status == "finished" else "solver failed"
-        if motion(solver.y, shape, inertia, cell.mu)[1] <= 0:
+        if motion(solver.y, *body)[1] <= 0:
             end = "lift-off"
-        if solver.t >= (len(averages) + 1) * period:
+        if solver.t >= len(integrals) * window / 2:
             dense = solver.dense_output()
-            while solver.t >= (edge := (len(averages) + 1) * period):
-                integral, before = float(dense(edge)[9]), integral
-                averages.append((integral - before) / period)
-            if has_settled(solver.y, averages[-1], shape, inertia, cell.mu):
+            while solver.t >= (edge := len(integrals) * window / 2):
+                integrals.append(float(dense(edge)[9]))
+            if len(integrals) > 2 and has_settled(solver.y, (integrals[-1] - integrals[-3]) / window, body):
                 end = "settled"
-    return Trajectory(period, np.array(averages), end, steps)
+    return Trajectory(window, np.array(integrals), end, steps)
 
 
 def reference(cell: Cell, max_steps: int) -> tuple[Trajectory, str]:

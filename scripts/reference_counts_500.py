@@ -5,10 +5,10 @@ are meaningful.  The equations are the package's own, traced into heyoka.py's Ta
 `scripts/reference_counts.py` looks for errors in their derivation.
 
 All states but ω3 are in multiples of `UNIT`: heyoka's tolerance is relative to the largest state, which in these
-units belongs to the rattle, however small it gets.  The integral of the spin is an eighth state.  Each cell is
-integrated in double precision, then from a start 1e-9 away at another tolerance.  If the two disagree on the time of
-the last reversal, it grew out of round-off, and 80-bit arithmetic takes over.  That delays the reversal, and may not
-be enough: `noise_limited`.
+units belongs to the rattle, however small it gets.  The integral of the ripple-free spin n* (`reversals.py`) is an
+eighth state.  Each cell is integrated in double precision, then from a start 1e-9 away at another tolerance.  If the
+two disagree on the time of the last reversal, it grew out of round-off, and 80-bit arithmetic takes over.  That delays
+the reversal, and may not be enough: `noise_limited`.
 
     python scripts/reference_counts_500.py sweep/bench/data/reference_counts_500.csv
 """
@@ -25,10 +25,10 @@ from typing import Any
 
 import heyoka
 import numpy as np
+from reversals import last_reversal, sign_changes, window_and_ripple
 from tracing import traced_rhs
 
-from sweep.models import linear, slip
-from sweep.models.coefficients import rattle_period
+from sweep.models import ellipsoid, linear, slip
 from sweep.models.model import Array, stack
 
 SEED, CELLS = 20250500, 500
@@ -55,6 +55,7 @@ LEAST_FORCE = 0.1
 """Between two samples the normal force may be somewhat lower: below this, lift-off cannot be excluded."""
 
 SPIN = slip.MODEL.spin_state
+CONSTANTS = len(slip.Constants._fields)
 RATTLE = [i for i in range(len(slip.MODEL.states)) if i != SPIN]
 SCALE = np.array([1.0 if i == SPIN else UNIT for i in range(len(slip.MODEL.states))])
 
@@ -79,32 +80,43 @@ def draw() -> dict[str, Array]:
 
 
 def system() -> list[tuple[Any, Any]]:
-    """Equations of the slip model in multiples of `SCALE`, and of the spin's integral."""
+    """Equations of the slip model in multiples of `SCALE`, and of the integral of n*."""
     *states, integral = heyoka.make_vars(*slip.MODEL.states, "integral")
-    parameters = tuple(heyoka.par[i] for i in range(count_constants()))
+    constants = tuple(heyoka.par[i] for i in range(CONSTANTS))
     unscaled = tuple(state * k for state, k in zip(states, SCALE, strict=True))
-    slopes, (spin, *_) = traced_rhs(slip.MODEL, heyoka.sqrt)(unscaled, parameters)
+    slopes, (spin, *_) = traced_rhs(slip.MODEL, heyoka.sqrt)(unscaled, constants)
     scaled = [slope * (1 / k) for slope, k in zip(slopes, SCALE, strict=True)]
-    return list(zip([*states, integral], [*scaled, spin], strict=True))
+    K11, K12, K21, K22 = (heyoka.par[CONSTANTS + i] for i in range(4))
+    M1, M2 = momentum(unscaled, slip.Constants(*constants))
+    ripple = unscaled[0] * (K11 * M1 + K12 * M2) + unscaled[1] * (K21 * M1 + K22 * M2)
+    return list(zip([*states, integral], [*scaled, spin - ripple], strict=True))
 
 
-def count_constants() -> int:
-    return len(slip.Constants._fields)
+def momentum(states: tuple[Any, ...], p: slip.Constants) -> tuple[Any, Any]:
+    """M1 and M2 of M = I ω - x_p × v_g with v_g = v_p + x_p × ω, as symbols."""
+    u1, u2, w1, w2, w3, v1, v2 = states
+    u3 = -heyoka.sqrt(1.0 - (u1 * u1 + u2 * u2))
+    of_u = p.A11 * u1 + p.A12 * u2, p.A12 * u1 + p.A22 * u2, p.A33 * u3
+    height = heyoka.sqrt(u1 * of_u[0] + u2 * of_u[1] + u3 * of_u[2])
+    x, y, z = (-component / height for component in of_u)
+    v3 = -(u1 * v1 + u2 * v2) / u3
+    g1, g2, g3 = v1 + y * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y * w1
+    return w1 / p.inv_I1 - (y * g3 - z * g2), w2 / p.inv_I2 - (z * g1 - x * g3)
 
 
 Advance = Callable[[Array, Array, Array], Array]
-"""(states at grid[0], constants, times) of shapes (8, lanes), (k, lanes), (samples, lanes) -> states at these
-times, shape (samples, 8, lanes)."""
+"""(states at grid[0], constants and K, times) of shapes (8, lanes), (k + 4, lanes), (samples, lanes) -> states at
+these times, shape (samples, 8, lanes)."""
 
 
 def double_precision(tolerance: float) -> Advance:
     integrator = heyoka.taylor_adaptive_batch(
-        system(), state=np.zeros((8, LANES)), pars=np.ones((count_constants(), LANES)), tol=tolerance
+        system(), state=np.zeros((8, LANES)), pars=np.ones((CONSTANTS + 4, LANES)), tol=tolerance
     )
 
-    def advance(states: Array, constants: Array, times: Array) -> Array:
+    def advance(states: Array, parameters: Array, times: Array) -> Array:
         integrator.set_time(0.0)
-        integrator.state[:], integrator.pars[:] = states, constants
+        integrator.state[:], integrator.pars[:] = states, parameters
         return np.asarray(integrator.propagate_grid(times)[1])
 
     return advance
@@ -113,12 +125,12 @@ def double_precision(tolerance: float) -> Advance:
 def extended_precision() -> Advance:
     real = np.longdouble
     integrator = heyoka.taylor_adaptive(
-        system(), state=[real(0)] * 8, pars=[real(1)] * count_constants(), fp_type=real, tol=real(EXTENDED_TOLERANCE)
+        system(), state=[real(0)] * 8, pars=[real(1)] * (CONSTANTS + 4), fp_type=real, tol=real(EXTENDED_TOLERANCE)
     )
 
-    def advance(states: Array, constants: Array, times: Array) -> Array:
+    def advance(states: Array, parameters: Array, times: Array) -> Array:
         integrator.time = real(0)
-        integrator.state[:], integrator.pars[:] = states[:, 0], constants[:, 0]
+        integrator.state[:], integrator.pars[:] = states[:, 0], parameters[:, 0]
         return np.asarray(integrator.propagate_grid(times[:, 0])[-1])[:, :, None]
 
     return advance
@@ -128,49 +140,51 @@ def extended_precision() -> Advance:
 class Run:
     """One cell integrated to its end."""
 
-    period: float
+    window: float
     integrals: list[Any] = field(default_factory=lambda: [0.0])
-    """Integral of the spin, after each half window."""
+    """Integral of n*, after each half window."""
     least_force: float = np.inf
     status: str = "running"
 
     def time(self) -> float:
-        return min(self.period / 2 * (len(self.integrals) - 1), T_END)
+        return min(self.window / 2 * (len(self.integrals) - 1), T_END)
 
     def averages(self, shift: int) -> Array:
-        """Averages of the spin over windows that begin `shift` half windows after the start."""
-        last = int(2 * T_END / self.period)
-        return np.diff(np.array(self.integrals[: last + 1])[shift::2]) / self.period
+        """Averages of n* over windows that begin `shift` half windows after the start."""
+        last = int(2 * T_END / self.window)
+        return np.asarray(np.diff(np.array(self.integrals[: last + 1])[shift::2]) / self.window)
 
     def reversals(self, shift: int = 0) -> int:
         return len(sign_changes(self.averages(shift)))
 
     def last_reversal(self) -> float:
-        averages = self.averages(0)
-        if not self.reversals():
-            return float("nan")
-        k = sign_changes(averages)[-1]
-        return float(self.period * (k + 0.5 + averages[k] / (averages[k] - averages[k + 1])))
+        return last_reversal(self.averages(0), self.window)
 
 
-def sign_changes(averages: Array) -> Array:
-    """Windows after which the sign changes."""
-    return np.flatnonzero(averages[1:] * averages[:-1] < 0)
+def windows_and_ripples(columns: dict[str, Array]) -> tuple[Array, Array]:
+    """Windows, shape (cells,), and K11, K12, K21, K22, shape (4, cells), of all bodies."""
+    A11, A12, A22, A33 = (column.astype(float) for column in ellipsoid.shape(columns))
+    zero = np.zeros_like(A11)
+    shapes = np.moveaxis(np.array([[A11, A12, zero], [A12, A22, zero], [zero, zero, A33]]), -1, 0)
+    inertias = np.array(ellipsoid.inertia(columns)).astype(float).T
+    pairs = [window_and_ripple(shape, inertia) for shape, inertia in zip(shapes, inertias, strict=True)]
+    return np.array([window for window, _ in pairs]), np.array([K.ravel() for _, K in pairs]).T
 
 
 def follow(columns: dict[str, Array], advance: Advance, lanes: int, real: Any) -> list[Run]:
     """Integrate all cells, `lanes` at a time.  A lane whose cell has ended takes the next, of similar stiffness."""
     columns = {name: column.astype(real) for name, column in columns.items()}
-    period, constants = rattle_period(columns), stack(slip.Constants.of(columns))
-    start = np.vstack([stack(slip.start(columns)) / SCALE[:, None], np.zeros((1, len(period)))])
-    runs = [Run(float(p)) for p in period]
-    waiting: Iterator[int] = iter(np.argsort(slip.fastest_decay(columns) * period))
+    (window, ripple), constants = windows_and_ripples(columns), stack(slip.Constants.of(columns))
+    parameters = np.vstack([constants, ripple.astype(real)])
+    start = np.vstack([stack(slip.start(columns)) / SCALE[:, None], np.zeros((1, len(window)))])
+    runs = [Run(float(w)) for w in window]
+    waiting: Iterator[int] = iter(np.argsort(slip.fastest_decay(columns) * window))
     steps = np.arange(WINDOWS * SAMPLES + 1)[:, None] / real(SAMPLES)
 
     held = np.array([next(waiting) for _ in range(lanes)])
     states = start[:, held]
     while any(runs[cell].status == "running" for cell in held):
-        path = advance(states, constants[:, held], steps * period[held])
+        path = advance(states, parameters[:, held], steps * window[held])
         states = path[-1].copy()
         look(runs, held, path, constants[:, held])
         states[-1] = 0
@@ -223,10 +237,11 @@ def reach(states: Array, constants: Array) -> Array:
 
 def have_settled(states: Array, constants: Array) -> Array:
     """Whether the rattle decays at all spins within reach and a margin, and these have one sign.  Shape (lanes,)."""
-    spin, *_ = slip.energy(states, slip.Constants(*constants))
+    p = slip.Constants(*constants)
+    spin, *_ = slip.energy(states, p)
     within = MARGIN * reach(states, constants)
     near = [spin + share * within for share in np.linspace(-1, 1, 5)]
-    decays = np.all([linear.growth_rate(slip.MODEL, constants, n) < 0 for n in near], axis=0)
+    decays = np.all([linear.growth_rate(slip.MODEL, p, n) < 0 for n in near], axis=0)
     return np.asarray(decays & (within < np.abs(spin)))
 
 
@@ -234,16 +249,19 @@ def have_settled(states: Array, constants: Array) -> Array:
 
 
 def leap(run: Run, states: Array, constants: Array) -> None:
-    """Advance each mode by its own exponential, at constant spin, until the rattle matters; in place."""
+    """Advance each mode by its own exponential, at constant spin, until the rattle matters; in place.
+
+    So small a rattle moves n* no more than n: both are taken as constant.
+    """
     values, modes = eigenpairs(jacobian(constants, -states[SPIN]))
     amplitudes = solve(modes, states[RATTLE][:, None].astype(np.clongdouble))[:, 0]
     halves = np.arange(1, 2 * WINDOWS + 1) / 2
-    factors = np.exp(values * np.longdouble(WINDOWS * run.period))
+    factors = np.exp(values * np.longdouble(WINDOWS * run.window))
     while run.time() < T_END and reach(states[:-1] * SCALE, constants) < LINEAR:
         amplitudes *= factors
         states[RATTLE] = (modes @ amplitudes).real
         base = run.integrals[-1]
-        run.integrals += [base - states[SPIN] * run.period * half for half in halves]
+        run.integrals += [base - states[SPIN] * run.window * half for half in halves]
     if run.time() >= T_END:
         run.status = "time_limit"
 

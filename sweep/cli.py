@@ -156,13 +156,14 @@ def critical(config: Path, width: float, output: Path | None, settings: tuple[st
         from sweep.plots import critical as critical_plot
         from sweep.results.folder import RunFiles
         from sweep.studies.critical import critical as search
+        from sweep.studies.critical import remarks
 
         checked = _load(config, settings)
         result = search(checked, width, lambda message: None if quiet else click.echo(message, err=True))
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_critical")
         files.save_result(result, critical_plot.draw(result))
         if not quiet:
-            _say(f"wrote {files.dataset} and .png")
+            _say("\n".join([*remarks(result), f"wrote {files.dataset} and .png"]))
 
 
 @main.command()

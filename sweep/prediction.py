@@ -9,10 +9,10 @@ import numba
 import numpy as np
 
 from sweep.grid import Array, Grid
-from sweep.models import analytic, linear
-from sweep.models.model import FORMULAS, Columns, Model, Tier, stack
+from sweep.models import analytic, stability
+from sweep.models.model import FORMULAS, Columns, Model, Tier
 
-# Bodies that a thread handles at a time.  NumPy computes eigenvalues on one thread, in 0.5 ms a body, which counts
+# Bodies that a thread handles at a time.  NumPy computes eigenvalues on one thread, in 0.2 ms a body, which counts
 # beside the 1 ms of a trajectory; so the bodies are shared among threads.  With fewer bodies at a time the calls
 # take longer than the arithmetic; with more, Ctrl-C has to wait longer.
 _PART = 1000
@@ -33,10 +33,10 @@ class Stability:
     """The spins at which a model's rattle decays, over the bodies."""
 
     n_c1: tuple[Array, Array]
-    """n_c1+ and n_c1- by the eigenvalues, as `sweep.models.linear.critical_spins` gives them: infinite where the
-    rattle decays at every spin, NaN where it does not decay at rest.  NaN too for a model without formulas."""
+    """n_c1+ and n_c1- by the eigenvalues: infinite where the rattle decays at every spin, NaN where it does not decay
+    at rest.  NaN too for a model without formulas."""
     ranges: Array
-    """Bounds of the ranges of spin in which the rattle decays, shape (6, bodies), as `Kernel.images` takes them."""
+    """Ranges of spin in which the rattle decays, shape (6, bodies), as `stability.stable_ranges` gives them."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,11 @@ def predict(tier: Tier, grid: Grid) -> Prediction:
     prediction = formulas(tier, grid)
     if not isinstance(tier, Model):
         return prediction
-    bodies, body = grid.bodies()
-    stability = _stability(tier, grid.columns(), bodies.columns(), body, prediction.formulas)
-    return replace(prediction, stability=stability)
+    if prediction.formulas is None:
+        ranges = np.full((6, len(prediction.form_factor)), np.nan)
+    else:
+        ranges = _stable_ranges(tier, grid.bodies()[0].columns())
+    return replace(prediction, stability=Stability((ranges[1], ranges[0]), ranges))
 
 
 def formulas(tier: Tier, grid: Grid) -> Prediction:
@@ -70,21 +72,8 @@ def formulas(tier: Tier, grid: Grid) -> Prediction:
     return Prediction(analytic.form_factor(bodies), found, None)
 
 
-def _stability(model: Model, columns: Columns, bodies: Columns, body: Array, formulas: Formulas | None) -> Stability:
-    cells = len(bodies["a"])
-    if formulas is None:
-        never = np.full(cells, np.nan)
-        return Stability((never, never), stack((never,) * 6))
-    reach = np.zeros(cells)
-    np.maximum.at(reach, body, linear.fastest_spin(model, columns))
-
-    def ranges(part: Array) -> Array:
-        some = {name: values[part] for name, values in bodies.items()}
-        upper, lower = linear.critical_spins(model, some, (formulas.n_c1[0][part], formulas.n_c1[1][part]))
-        below, above = (linear.outer_range(model, some, n, reach[part]) for n in (lower, upper))
-        return stack((lower, upper, *below[::-1], *above))
-
-    parts = np.array_split(np.arange(cells), max(1, round(cells / _PART)))
+def _stable_ranges(model: Model, bodies: Columns) -> Array:
+    parts = np.array_split(np.arange(len(bodies["a"])), max(1, round(len(bodies["a"]) / _PART)))
+    some = [{name: values[part] for name, values in bodies.items()} for part in parts]
     with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-        found = np.concatenate(list(pool.map(ranges, parts)), axis=1)
-    return Stability((found[1], found[0]), found)
+        return np.concatenate(list(pool.map(lambda each: stability.stable_ranges(model, each), some)), axis=1)

@@ -115,8 +115,9 @@ _STATUS_MEANINGS = {
     "settled": "upright spin is stable, and the rattle left can change neither that nor the count",
     "time_limit": "`t_end` was reached first",
     "lift_off": "the normal force fell to zero: the body leaves the plane",
-    "diverged": "the step was too long; the numbers are worth nothing",
+    "diverged": "the integration did not hold, even with a shorter step; the numbers are worth nothing",
     "paradox": "Painlevé's paradox: no contact force solves the equations",
+    "toppled": "the body is tilted by a right angle, where the variables end",
 }
 
 

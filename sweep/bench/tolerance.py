@@ -118,4 +118,5 @@ def _draw_predictor(axes: Axes, kept: list[Kept]) -> None:
             axes.loglog(violation, error, MARKERS[one.method], linestyle="", markersize=4, color=PALETTE[i],
                         label=f"{one.model}, {one.method}")  # fmt: skip
     axes.set(title="Does the energy error predict the error?", xlabel="energy_error", ylabel="largest error in spin")
-    axes.legend(fontsize=7)
+    if axes.lines:  # with a small effort every error may be round-off
+        axes.legend(fontsize=7)

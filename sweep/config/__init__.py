@@ -18,7 +18,6 @@ from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.kernels import measures, methods
 from sweep.kernels.measures import MEASURES
 from sweep.models import MODELS, TIERS
-from sweep.models.coefficients import rattle_period
 from sweep.models.model import Model, Tier
 from sweep.parameters import PARAMETERS
 
@@ -132,10 +131,11 @@ def _unusable_step(config: Config) -> str:
         return ""
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
-    # At most one window of the period-averaged spin can close in a step.
     with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
-        longest = min(float(rattle_period(columns).min()) / 2 for columns in distinct(Grid.of(config), BODY))
-    return "" if step <= longest else f"{step:g}; allowed: auto, or at most {longest:.3g}, half a rattle's period"
+        longest = min(float(methods.longest_step(columns).min()) for columns in distinct(Grid.of(config), BODY))
+    if step <= longest:
+        return ""
+    return f"{step:g}; allowed: auto, or at most {longest:.3g}, a quarter of the rattle's period"
 
 
 # What is asked of a whole configuration, each only after the checks before it: the path at fault, and what is

@@ -11,8 +11,10 @@ import numpy as np
 from sweep.config import Config
 from sweep.engine import executor, verification
 from sweep.engine.plan import Plan, plan, pool
+from sweep.engine.repeats import repeat_all
+from sweep.engine.sensitivity import runs_asked_for, sensitivity
 from sweep.grid import Array, Grid, Tile
-from sweep.kernels.status import SETTLED
+from sweep.kernels.status import FAILURES, RUNNING, SETTLED
 from sweep.models import MODELS, TIERS
 from sweep.prediction import predict
 from sweep.results import dataset
@@ -89,18 +91,25 @@ def run_group(
             images[method][:] = table
         began -= left.seconds
 
+    def statuses() -> Array:
+        return np.concatenate([table[:, kernel.row("status")] for kernel, table in tables.values()])
+
     def chunk() -> None:
         # Images are saved only here, between two chunks: anywhere else an interrupt may find half of them advanced.
         if store:
             store.save_running(Running(list(group), images, time.perf_counter() - began))
-        after_chunk(np.concatenate([table[:, kernel.row("status")] for kernel, table in tables.values()]))
+        # What looks like a failure is decided only after all cells have ended.
+        status = statuses()
+        after_chunk(np.where(np.isin(status, FAILURES), RUNNING, status))
 
     for kernel, table in tables.values():
         settle = config.integrator.stop_when_settled
         executor.execute(kernel, table, stop_when_settled=settle, after_chunk=chunk)
+    # Not saved: a run that is killed here goes on from the ends of the first runs.
+    repeat_all(plans, tables, lambda: after_chunk(statuses()))
     seconds = (time.perf_counter() - began) / len(group)
     for i, job in zip(group, plans, strict=True):
-        yield Done(i, _results(job, grid, tiles[i]), seconds, cpu)
+        yield Done(i, _results(job, grid, tiles[i], lambda: after_chunk(statuses())), seconds, cpu)
 
 
 def _groups(
@@ -134,8 +143,10 @@ def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
     return arrays
 
 
-def _results(job: Plan, grid: Grid, tile: Tile) -> dict[str, Array]:
+def _results(job: Plan, grid: Grid, tile: Tile, after_chunk: Callable[[], None]) -> dict[str, Array]:
     arrays = job.results()
+    if runs_asked_for(job):
+        arrays |= sensitivity(job, after_chunk)
     if job.config.verify:
         first = grid.first_cell(tile)
         drawn = verification.draw(grid.size, job.config.verify) - first

@@ -13,9 +13,10 @@ from sweep.grid import Array, Grid
 from sweep.kernels import methods
 from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.method import FIXED
+from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import MODELS
+from sweep.models.model import Columns
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
 
@@ -31,8 +32,12 @@ class Part:
     cells: Array
     """Indices of the cells in the grid, shape (cells,)."""
     kernel: Kernel
+    columns: Columns
+    """Physical parameters by name, each of shape (cells,)."""
+    step: Array
+    """The longest step wanted, in sqrt(c/g), shape (cells,)."""
     step_rule: Array
-    """What determined the step of each cell (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
+    """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
     images: Array
     """Shape (cells, rows)."""
 
@@ -56,7 +61,9 @@ class Plan:
         arrays: dict[str, Array] = {}
         for part in self.parts:
             found = dataset.measured(part.kernel, part.images, self.config.integrator.t_end)
-            found["step_rule"] = part.step_rule
+            table = part.kernel.table(part.images)
+            repeated = np.where(table["missed"] > 0, MISSED, REPEAT)
+            found["step_rule"] = np.where(table["halvings"] > 0, repeated, part.step_rule)
             if self.config.integrator.method == AUTO:
                 found["method"] = np.full(len(part.cells), list(METHODS).index(part.method))
             for name, values in found.items():
@@ -92,7 +99,7 @@ def plan(config: Config, grid: Grid | None = None, compiling: Callable[[], None]
         else:
             step, rule = np.full(len(cells), integrator.step), np.full(len(cells), FIXED)
         images = kernel.images(theirs, step, integrator.t_end, stable[:, cells])
-        parts.append(Part(method, cells, kernel, rule, images))
+        parts.append(Part(method, cells, kernel, theirs, step, rule, images))
     return Plan(config, grid, prediction, tuple(parts))
 
 

@@ -48,7 +48,7 @@ def verify(job: Plan, drawn: Array) -> dict[str, Array]:
 
 def _again(job: Plan, part: Part, where: Array) -> dict[str, Array]:
     model, integrator = part.kernel.model, job.config.integrator
-    columns = {name: values[part.cells[where]] for name, values in job.grid.columns().items()}
+    columns = {name: values[where] for name, values in part.columns.items()}
     first = part.images[where]
     step, t_stop = first[:, part.kernel.row("step")] / 2, part.kernel.times(first, integrator.t_end)
     kernel = methods.make_kernel(part.method, model, part.kernel.measure, integrator.tolerance / FINER)

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from sweep.kernels.failure import compile_approach
 from sweep.kernels.methods import make_kernel
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
@@ -30,6 +31,7 @@ def main(method: str, model: str, *measure: str) -> None:
     # The functions that fill images are compiled when they are first used.  The kernel comes last, because finding
     # it in the cache is taken to mean that they are there too.
     kernel.images(body, np.full(1, 0.1), 10.0)
+    compile_approach(MODELS[model])
     kernel.compile()
 
 

@@ -16,14 +16,18 @@ from typing import Any
 import numba
 import numpy as np
 
-from sweep.jit import is_cached, parallel
-from sweep.kernels.codegen import all_true, call_all
+from sweep.jit import inline, is_cached, parallel
+from sweep.kernels.codegen import all_true, call_all, make_load
 from sweep.kernels.lanes import STABLE, Look, make_advance, make_look
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement
 from sweep.models.model import Array, Columns, Model, stack
 
-_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", *STABLE)
+_DECIDED = ("halvings", "missed", "failed_at")
+"""What the engine finds out (`sweep.engine.repeats`): how often the step was halved because a longer one did not hold;
+whether even this one missed the tolerance; and the time of a failure, 0 if there is none."""
+
+_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", *_DECIDED, *STABLE)
 
 
 class Kernel:
@@ -48,7 +52,8 @@ class Kernel:
         self.model, self.measurements = model, tuple(measurements)
         self.constants = tuple(f"constant.{name}" for name in model.constants._fields)
         measured = (row for each in self.measurements for row in each.rows)
-        self.layout = Layout((*model.states, *self.constants, *_BASE, *measured, *more))
+        self.ripple = tuple(f"ripple.{name}" for name in model.ripple.names if self.follows_ripple)
+        self.layout = Layout((*model.states, *self.constants, *_BASE, *self.ripple, *measured, *more))
 
     @property
     def measure(self) -> tuple[str, ...]:
@@ -60,12 +65,39 @@ class Kernel:
         """Whether a measurement needs the work of friction in each step."""
         return any(each.follows_work for each in self.measurements)
 
+    @property
+    def follows_ripple(self) -> bool:
+        """Whether a measurement needs the ripple-free spin."""
+        return any(each.follows_ripple for each in self.measurements)
+
     def _make_watch(self) -> Any:
-        """Inline function of what all measurements do after a step, with the arguments of `Measurement.make_step`."""
+        """Inline (group, lane, accepted, y, p, spin, work, h, now): what all measurements do after a step.
+
+        y, p, spin : states, constants and spin before the step; the others as in `Measurement.make_step`
+        """
         hooks = [hook for each in self.measurements if (hook := each.make_at_reversal(self.layout))]
         at_reversal = call_all("at_reversal", "group, lane, reverses, count, crossing", hooks)
         steps = [step for each in self.measurements if (step := each.make_step(self.layout, at_reversal))]
-        return call_all("watch", "group, lane, accepted, spin, spin_integral, work, h, now", steps)
+        measure = call_all("measure", "group, lane, accepted, spin, steady, work, h, now", steps)
+        steady = self._make_steady()
+
+        @inline
+        def watch(group: Any, lane: int, accepted: Any, y: Any, p: Any, spin: Any, work: Any, h: Any, now: Any) -> None:
+            measure(group, lane, accepted, spin, steady(group, lane, y, p, spin), work, h, now)
+
+        return watch
+
+    def _make_steady(self) -> Any:
+        """Inline (group, lane, y, p, spin) -> the ripple-free spin, or the spin if no measurement needs that."""
+        if not self.follows_ripple:
+            return _as_it_is
+        load, ripple = make_load(self.ripple, self.layout), self.model.ripple.value
+
+        @inline
+        def steady(group: Any, lane: int, y: Any, p: Any, spin: Any) -> Any:
+            return spin - ripple(y, p, load(group, lane))
+
+        return steady
 
     def _compile_with(self, run_block: Any, method: str) -> None:
         """Set up `advance` around `run_block`, compiled (group) -> None; `method` names the method in the cache."""
@@ -117,6 +149,8 @@ class Kernel:
         table["energy_start"] = table["energy"] = rattle + 0.5 * inertia * spin**2
         for name, row in zip(STABLE, np.full((6, len(step)), np.nan) if stable is None else stable, strict=True):
             table[name] = row
+        if self.ripple:
+            table.set_columns(self.ripple, stack(self.model.ripple.of(columns)).T)
         for each in self.measurements:
             for name, values in each.start(columns, step, rattle).items():
                 table[name] = values
@@ -141,9 +175,25 @@ class Kernel:
         table = self.table(images)
         return self.states(images), self.model.constants(*(table[name] for name in self.constants))
 
+    def steady_spin(self, images: Array) -> Array:
+        """The ripple-free spin of the images, shape (cells,); the spin itself if no measurement needs the former."""
+        table, (states, constants) = self.table(images), self.unpack(images)
+        spin, _, _ = self.model.energy(states, constants)
+        if not self.ripple:
+            return np.asarray(spin)
+        return np.asarray(spin - self.model.ripple.value(states, constants, [table[name] for name in self.ripple]))
+
+    def model_states(self, images: Array) -> Array:
+        """The states as the right-hand side of the model takes them, shape (states, cells)."""
+        return self.states(images)
+
     def times(self, images: Array, t_end: float | Array) -> Array:
-        """Times that the images have reached, in sqrt(c/g), shape (cells,)."""
+        """Times at which the images have ended, in sqrt(c/g), shape (cells,)."""
         table = self.table(images)
+        return np.where(table["failed_at"] > 0, table["failed_at"], self._reached(table, t_end))
+
+    def _reached(self, table: Table, t_end: float | Array) -> Array:
+        """Times of the states, shape (cells,)."""
         return np.asarray(table["done"] / table["goal"] * t_end)
 
     def is_compiled(self) -> bool:
@@ -153,6 +203,11 @@ class Kernel:
     def compile(self) -> None:
         """Compile `advance`, or load it from disk, so that no timing of a run includes that."""
         self._advance.compile(_SIGNATURE)
+
+
+@inline
+def _as_it_is(group: Any, lane: int, y: Any, p: Any, spin: Any) -> Any:  # noqa: ARG001
+    return spin
 
 
 _SIGNATURE = (

@@ -142,7 +142,8 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
             group[STATUS + lane] = DIVERGED if (running | failed) & false else status
             ended = (status != RUNNING) & (status != QUIET)
             measure(group, lane, running, ended, spin, rattle, inertia, total)
-            store_states(group, lane, bounded & (rattle < NEGLIGIBLE), rest(y), y)
+            # The energy of the rattle may be negative: that of the spin is what it would be without rattle.
+            store_states(group, lane, bounded & (abs(rattle) < NEGLIGIBLE), rest(y), y)
 
     return look
 

@@ -16,8 +16,9 @@ an active lane writes the states and adds one to `done`.  A step that fails leav
 status to `PARADOX`, `LIFT_OFF` or `DIVERGED`.  Lanes that are not active compute as well, but have to keep their
 states, `done` and status.
 
-A kernel has to implement `images`, which makes images at t = 0 with the help of `_start`.  It overrides `times` if its
-images do not begin at t = 0, and `carry` if it can cross stretches of small rattle without steps.
+A kernel has to implement `images`, which makes images at t = 0 with the help of `_start`.  It overrides `_reached` if
+its images do not begin at t = 0, `model_states` if its states are not those of the model, and `carry` if it can cross
+stretches of small rattle without steps.
 """
 
 from __future__ import annotations
@@ -32,9 +33,10 @@ from sweep.models.model import Array, Columns, Model
 TOLERANCE = 1e-8
 """Default tolerance: the error in spin at t = 400, in sqrt(g/c)."""
 
-FIXED, ACCURACY, STABILITY = range(3)
-STEP_RULES = {FIXED: "fixed", ACCURACY: "accuracy", STABILITY: "stability"}
-"""What determined a step: the configuration, the tolerance, or the stability limit of the method."""
+FIXED, ACCURACY, STABILITY, REPEAT, MISSED = range(5)
+STEP_RULES = {FIXED: "fixed", ACCURACY: "accuracy", STABILITY: "stability", REPEAT: "repeat", MISSED: "missed"}
+"""What determined a step: the configuration, the tolerance, the stability limit of the method, that a longer one failed
+or missed the tolerance, or that no shorter one was tried although this one missed the tolerance too."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,9 @@ class Method:
     """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""
     start_up_cost: float = 0.0
     """Time of the start-up of one trajectory, in steps of this method."""
+    balance: float = 1.0
+    """How many times as large as the error in spin the error of its energy balance tends to be, both as
+    `sweep.engine.repeats` compares them."""
     stops_anywhere: bool = False
     """Whether a run may stop after any step and go on from there towards another goal."""
 

@@ -10,8 +10,8 @@ from sweep.kernels import measures, runge_kutta
 from sweep.kernels.adams import method as adams
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method
-from sweep.models.coefficients import rattle_period
 from sweep.models.model import Array, Columns, Model
+from sweep.models.rocking import slower_period
 
 METHODS: dict[str, Method] = {method.name: method for method in (runge_kutta.DOPRI5_METHOD, adams.METHOD)}
 """The first is the plain one, which runs every model."""
@@ -46,11 +46,15 @@ def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: fl
 
 def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:
     """Step of each trajectory, in sqrt(c/g), and the rule that determined it; both of shape (cells,)."""
-    # At most half a rattle period, however slow the fastest motion: an averaging window needs two steps.
-    record, longest = METHODS[method], rattle_period(columns) / 2
+    record, longest = METHODS[method], longest_step(columns)
     with np.errstate(divide="ignore"):
         step = np.minimum(record.accurate_step(model, columns, tolerance), longest)
         if record.stable_step is None:
             return step, np.full(len(step), ACCURACY)
         stable = record.stable_step(model, columns)
     return np.minimum(step, stable), np.where(stable < step, STABILITY, ACCURACY)
+
+
+def longest_step(columns: Columns) -> Array:
+    """A quarter of the rattle's period, in sqrt(c/g), shape (cells,): two steps in half a window of the average."""
+    return slower_period(columns) / 4

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 # Running, and the ends of a trajectory; `results.dataset` has their names for the user.
-RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX = range(6)
-
-FAILURES = (LIFT_OFF, DIVERGED, PARADOX)
+RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX, TOPPLED = range(7)
 
 # Not an end: the rattle is so small that the kernel's `carry` may be able to do without steps.
-QUIET = 6
+QUIET = 7
+
+FAILURES = (LIFT_OFF, DIVERGED, PARADOX, TOPPLED)
+"""Ends before the time limit.  A kernel gives the first three as first impressions, from the stages of a step that may
+have been too long; what really happened is found out by `sweep.kernels.failure` and `sweep.engine.repeats`."""

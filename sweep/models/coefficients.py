@@ -79,12 +79,6 @@ def coefficients(columns: Columns) -> Coefficients:
     )  # fmt: skip
 
 
-def rattle_period(columns: Columns) -> Array:
-    """τ = 2π / min(ν1, ν2), in sqrt(c/g), shape (cells,): the window over which the spin is averaged."""
-    k = coefficients({**columns, "mu": np.ones_like(columns["c"])})
-    return 2 * np.pi / np.minimum(k.nu1, k.nu2) * np.sqrt(columns["c"])
-
-
 def normal_coordinates(columns: Columns) -> tuple[Array, Array]:
     """X and Y at the start (x0, y0), by (X, Y) = T J P (x, y) (xX); each of shape (cells,)."""
     k = coefficients({**columns, "mu": np.ones_like(columns["c"])})

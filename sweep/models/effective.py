@@ -16,7 +16,8 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.coefficients import coefficients, normal_coordinates
-from sweep.models.model import COUNT, FORMULAS, SPIN, Array, Columns, Model
+from sweep.models.model import COUNT, FORMULAS, SPIN, Array, Columns, Model, Ripple
+from sweep.models.ripple import FORM, ripple
 
 
 class Constants(NamedTuple):
@@ -88,6 +89,26 @@ def energy(y: Any, p: Any) -> Any:
     return n, 0.5 * rocking / p.gravity, p.I3
 
 
+def ripple_coefficients(columns: Columns) -> tuple[Array, ...]:
+    """κ of Σ κ_jk X_j X_k' with (X_1, X_2) = (X, Y): the ripple of the spin without friction at n = 0.
+
+    There I3 n' = Σ g_jk X_j X_k by (eqn), with X_j'' = -ν_j² X_j (compare `sweep.models.ripple`).
+    """
+    k = coefficients(columns)
+    nu1, nu2 = k.nu1**2, k.nu2**2
+    g11, g22 = -k.k1 * (nu1 + 1), k.k4 * (nu2 + 1)
+    g12 = 0.5 * (k.k3 * (nu2 + 1) - k.k2 * (nu1 + 1))
+    mixed = np.divide(2 * g12, nu1 - nu2, out=np.zeros_like(g12), where=nu1 != nu2)
+    first, second = (-np.divide(g, 2 * nu, out=np.zeros_like(g), where=nu > 0) for g, nu in ((g11, nu1), (g22, nu2)))
+    return tuple(kappa / k.I3 for kappa in (first, mixed, -mixed, second))
+
+
+@inline
+def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
+    X, Y, dX, dY, _ = y
+    return ripple(X, Y, dX, dY, k)
+
+
 def observe(y: Array, p: Constants) -> dict[str, Array]:  # noqa: ARG001
     return {"mode_1": y[0], "mode_2": y[1]}
 
@@ -104,5 +125,6 @@ MODEL = Model(
     upright=upright,
     rhs=rhs,
     energy=energy,
+    ripple=Ripple(FORM, ripple_coefficients, _ripple),
     observe=observe,
 )

@@ -42,6 +42,12 @@ def start(columns: Columns) -> tuple[Array, Array, Array]:
 
 
 @inline
+def tilt(y: Any) -> Any:
+    """sin² of the angle between u and the z axis, from states that begin with u1 and u2."""
+    return y[0] * y[0] + y[1] * y[1]
+
+
+@inline
 def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
     """(u3, 1/u3), the contact point x_p, u', and the velocity x_p' of the contact point in the body.
 

@@ -28,6 +28,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.jit import inline
+
 Array = NDArray[Any]
 Columns = Mapping[str, Array]
 """Physical parameters by name: arrays of a common shape (cells,)."""
@@ -39,9 +41,36 @@ two rocking modes that the linear theory of the slip model describes; Takano's f
 number of reversals."""
 
 
+@inline
+def never_tilts(y: Any) -> float:  # noqa: ARG001
+    """The default `tilt`: the equations know of no right angle."""
+    return 0.0
+
+
 def nothing_decays(columns: Columns) -> Array:
     """The default `fastest_decay`: no mode is stiff."""
     return np.zeros_like(columns["a"])
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """How the spin of a model ripples with its rattle."""
+
+    names: tuple[str, ...]
+    """Names of the coefficients."""
+    of: Callable[[Columns], tuple[Array, ...]]
+    """(columns) -> the coefficients, each of shape (cells,)."""
+    value: Callable[..., Any]
+    """Inline, (states, constants, coefficients) -> n - n*, in sqrt(g/c)."""
+
+
+@inline
+def _nothing(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
+    return 0.0
+
+
+NO_RIPPLE = Ripple((), lambda columns: (), _nothing)  # noqa: ARG005
+"""For a model whose spin does not ripple."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +116,9 @@ class Model(Tier):
     """Inline, (states, constants) -> (spin n, energy of the rattle, moment of inertia J of the spin).  Rattle + J n²/2
     is the energy above rest, which only friction changes.  Every term must keep its relative precision however
     small the rattle is: no difference of numbers of order one may be taken."""
+    tilt: Callable[..., Any] = never_tilts
+    """Inline, (states) -> sin² of the angle by which the body is tilted from upright spin.  The variables of a model
+    that has it end at a right angle, where the body has toppled."""
     fastest_decay: Callable[[Columns], Array] = nothing_decays
     """(columns) -> bound on |λ| of the fastest damped mode anywhere on the trajectory, in sqrt(g/c), shape (cells,).
     It limits the step of an explicit method.  By default nothing is stiff."""
@@ -94,6 +126,8 @@ class Model(Tier):
     """Phase through which the fastest motion advances in one step of a fifth-order method at the default
     tolerance.  On the slip model 0.07 gives errors in spin at t = 400 of 3e-9 and 1e-8 (a = 10, b = 3, n0 = 0.05 and
     0.1, μ = 20, where accuracy determines the step); they fall as its fifth power."""
+    ripple: Ripple = NO_RIPPLE
+    """How the spin ripples with the rattle, for the ripple-free spin whose changes of sign are counted."""
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
     shows beside spin and energy, by names that `sweep.studies.trajectory` explains."""

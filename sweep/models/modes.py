@@ -108,10 +108,21 @@ class Rattle:
         """M3' of a rattle with these amplitudes, shape (cells,)."""
         return _form(self.turning, amplitudes)
 
+    def rippled(self, amplitudes: Array) -> Array:
+        """The part of M3 that ripples with a rattle of these amplitudes, shape (cells,): without the slow change."""
+        rates = np.concatenate([self.rates, self.rates.conj()], axis=1)
+        slow = np.roll(np.eye(4, dtype=bool), 2, axis=1)  # a mode and its own conjugate
+        return _form(np.where(slow, 0, self.turning / (rates[:, :, None] + rates[:, None, :])), amplitudes)
+
     def turned(self, amplitudes: Array) -> Array:
         """The part of M3 that comes and goes with a rattle of these amplitudes, shape (cells,)."""
         rates = np.concatenate([self.rates, self.rates.conj()], axis=1)
         return _form(self.turning / (rates[:, :, None] + rates[:, None, :]), amplitudes)
+
+
+def growth_rates(constants: Constants, spin: Array) -> Array:
+    """Re λ of the two rocking modes at a spin, the one of lower frequency first, in sqrt(g/c), shape (cells, 2)."""
+    return _rocking(constants, spin)[0].real
 
 
 def bending(columns: Columns) -> Array:

@@ -26,7 +26,9 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models import ellipsoid, slip
-from sweep.models.model import Array, Columns, named
+from sweep.models.model import Array, Columns, Ripple, named
+from sweep.models.ripple import FORM, form, ripple
+from sweep.models.rocking import rocking
 
 
 class Constants(named("I1", "I2", "I3", *slip.Constants._fields)):  # type: ignore[misc]
@@ -178,28 +180,6 @@ def energy(y: Any, p: Any) -> Any:
 
 
 @inline
-def rocking(p: Any) -> Any:
-    """(B12, B21, C11, C12, C21, C22) in u' = B M, M' = C u: the rocking about upright rest without slip.
-
-    The diagonal of B vanishes.
-    """
-    A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
-    inv_c = 1.0 / np.sqrt(A33)
-    return 1.0 / (p.I2 + A33), -1.0 / (p.I1 + A33), A12 * inv_c, (A22 - A33) * inv_c, (A33 - A11) * inv_c, -A12 * inv_c
-
-
-def fastest_rocking(p: Any) -> Array:
-    """The higher frequency ν of the rocking about upright rest without slip, shape (cells,).
-
-    -ν² is an eigenvalue of B C (see `rocking`).
-    """
-    B12, B21, C11, C12, C21, C22 = rocking(p)
-    first, second = -B12 * C21, -B21 * C12
-    half_split = np.sqrt((0.5 * (first - second)) ** 2 + B12 * C22 * B21 * C11)
-    return np.asarray(np.sqrt(np.maximum(0.5 * (first + second) + half_split, 0.0)))
-
-
-@inline
 def implicit(weight: Any, p: Any) -> Any:
     """(1 - weight J)⁻¹ row by row, sixteen numbers, where J is the matrix of `rocking` in (u1, u2, M1, M2)."""
     B12, B21, C11, C12, C21, C22 = rocking(p)
@@ -236,6 +216,11 @@ def observe(y: Array, p: Constants) -> dict[str, Array]:
     return slip.observe(velocities(y, p), slip_constants(p))
 
 
+@inline
+def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
+    return ripple(y[0], y[1], y[2], y[3], k)
+
+
 SPLIT = replace(
     slip.MODEL,
     states=("u1", "u2", "M1", "M2", "M3", "v1", "v2"),
@@ -243,5 +228,6 @@ SPLIT = replace(
     start=start,
     energy=energy,
     observe=observe,
+    ripple=Ripple(FORM, form, _ripple),
 )
 """The slip model in these variables, for methods that use `slow` and `newton` in place of a right-hand side."""

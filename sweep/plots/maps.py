@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
@@ -40,16 +41,35 @@ def draw(panels: Panels) -> Figure:
             )  # fmt: skip
             axes.set_title(f"{words(name)}\n{panel_title(dataset, panel)}", fontsize=9)
             _mark_best_shape(axes, dataset, right)
+            handles = _mark_uncertain(axes, chosen, name, (down, right))
             if empty.any():
                 label = f"no result: {empty.sum()} of {empty.size}"
-                axes.legend(handles=[Patch(facecolor="0.25", hatch="xxx", edgecolor="0.6", label=label)],
-                            fontsize=7, loc="upper left")  # fmt: skip
+                handles.append(Patch(facecolor="0.25", hatch="xxx", edgecolor="0.6", label=label))
+            if handles:
+                axes.legend(handles=handles, fontsize=7, loc="upper left")
         row[0].set_ylabel(symbol(down))
         bar = figure.colorbar(mesh, ax=list(row), label=words(names[0]) if len(names) == 1 else "reversals")
         _label_bar(bar, dataset, names[0], norm)
     for axes in grid[-1]:
         axes.set_xlabel(symbol(right))
     return figure
+
+
+def _mark_uncertain(axes: Axes, chosen: xr.Dataset, name: str, across: tuple[str, str]) -> list[Artist]:
+    """Dots on the cells whose number of reversals cannot be known; returns their entry for the legend."""
+    if name != "reversals":
+        return []
+    uncertain = xr.zeros_like(chosen[name], dtype=bool)
+    for flag in ("sensitive", "window_dependent"):
+        if flag in chosen:
+            uncertain |= (chosen[flag] != 0) & ~failed(chosen, name)
+    rows, columns = np.nonzero(uncertain.transpose(*across).values)
+    if not len(rows):
+        return []
+    down, right = across
+    label = f"count not certain: {len(rows)} of {uncertain.size}"
+    return list(axes.plot(chosen[right].values[columns], chosen[down].values[rows], "o", color="white", markersize=2.5,
+                          markeredgecolor="black", markeredgewidth=0.4, label=label))  # fmt: skip
 
 
 def _mark_best_shape(axes: Axes, dataset: xr.Dataset, right: str) -> None:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sweep.grid import Array
-from sweep.models.coefficients import rattle_period
+from sweep.models.rocking import slower_period
 from sweep.plots.panels import symbol
 
 # Title, unit, and the variables drawn together.
@@ -63,11 +63,13 @@ def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
 
 
 def reversal_times(one: xr.Dataset) -> Array:
-    """Times at which the spin of one trajectory, averaged over a period of the rattle, changes sign."""
+    """Times at which the ripple-free spin of one trajectory, averaged over a period of the rattle, changes sign."""
+    if "ripple_free_spin" not in one:
+        return np.array([])
     good = np.isfinite(one["time"].values)
-    time, spin = one["time"].values[good], one["spin"].values[good]
+    time, spin = one["time"].values[good], one["ripple_free_spin"].values[good]
     columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "delta")}
-    tau = float(rattle_period(columns)[0])
+    tau = float(slower_period(columns)[0])
     total = np.concatenate([[0], np.cumsum(np.diff(time) * (spin[1:] + spin[:-1]) / 2)])
     ends = np.arange(0, time[-1], tau)
     means = np.diff(np.interp(ends, time, total)) / tau

@@ -14,7 +14,7 @@ from sweep.grid import Array, Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import TOLERANCE
-from sweep.models import MODELS, slip_split
+from sweep.models import MODELS
 from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
 from sweep.prediction import predict
@@ -39,12 +39,6 @@ class Ends:
     def states(self) -> Array:
         """The model's states, of shape (states, cells)."""
         return self.kernel.states(self.images)
-
-
-def slip_states(kernel: Kernel, images: Array) -> Array:
-    """States (u1, u2, ω1, ω2, ω3, v1, v2) of the slip model, whichever variables the method uses, shape (7, cells)."""
-    states, constants = kernel.unpack(images)
-    return slip_split.velocities(states, constants) if kernel.model is slip_split.SPLIT else states
 
 
 def standard(**parameters: Any) -> dict[str, Array]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.grid import Array
-from sweep.models import MODELS, analytic, linear
-from sweep.models.coefficients import coefficients, rattle_period
+from sweep.models import MODELS, analytic, stability
+from sweep.models.coefficients import coefficients
 from sweep.models.model import Columns, stack
+from sweep.models.rocking import slower_period
 from sweep.report import cells
 from sweep.report.cells import standard
 from sweep.report.rows import Row, Section, against, below
@@ -63,7 +64,7 @@ def consistency() -> Section:
 
 def _slip_rows() -> list[Row]:
     body = standard()
-    plus, minus = linear.critical_spins(MODELS["slip"], body, analytic.critical_spins(body))
+    plus, minus = stability.critical_spins(MODELS["slip"], body)
     _, spin, violation = simulate("slip", standard(mu=[60.0, 200.0]), 400.0, 0.005)
     other = "the digits of an independent implementation"
     return [
@@ -101,14 +102,14 @@ def _reduced_rows() -> list[Row]:
     change = np.abs(invariants(end) / invariants(start) - 1).max()
 
     tiny = standard(x0=1e-3, y0=1e-3, mu=1e4, n0=0.002)
-    t_end = float(20 * rattle_period(tiny)[0])
+    t_end = float(20 * slower_period(tiny)[0])
     lost = [simulate(name, tiny, t_end)[1][0] - 0.002 for name in ("effective", "averaged")]
     body = standard()
     papers = analytic.critical_spins(body)
     offset = {
         name: max(
             abs(float(n[0] / p[0]) - 1)
-            for n, p in zip(linear.critical_spins(MODELS[name], body, papers), papers, strict=True)
+            for n, p in zip(stability.critical_spins(MODELS[name], body), papers, strict=True)
         )
         for name in ("effective", "averaged")
     }

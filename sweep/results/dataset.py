@@ -26,10 +26,22 @@ STATUSES = {
     status.LIFT_OFF: "lift_off",
     status.DIVERGED: "diverged",
     status.PARADOX: "paradox",
+    status.TOPPLED: "toppled",
 }
 
-EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND = range(4)
-REASONS = {EXISTS: "exists", NO_FRICTION: "no_friction", NO_COUPLING: "no_coupling", NOT_FOUND: "not_found"}
+EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, DISAGREES, REVERSES_AT_N_C1, UNDECIDED, FAILED = range(8)
+REASONS = {
+    EXISTS: "exists",
+    NO_FRICTION: "no_friction",
+    NO_COUPLING: "no_coupling",
+    NOT_FOUND: "not_found",
+    DISAGREES: "disagrees",
+    REVERSES_AT_N_C1: "reverses_at_n_c1",
+    UNDECIDED: "undecided",
+    FAILED: "failed",
+}
+"""Whether simulation found a critical spin, and why not.  Where it `disagrees` with the eigenvalues there is a number
+all the same."""
 
 
 def _critical(sign: str, event: str, source: str) -> Variable:
@@ -49,22 +61,27 @@ VARIABLES: dict[str, Variable] = {
     "step": Variable("float64", "1", "integration step, in sqrt(c/g)"),
     "step_rule": Variable("int8", "1", "what set the integration step", STEP_RULES),
     "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),
-    "n_c1_plus": _critical("+", "rattle grows", _FORMULA),
-    "n_c1_minus": _critical("-", "rattle grows", _FORMULA),
-    "n_c2_plus": _critical("+", "spin reverses", _FORMULA),
-    "n_c2_minus": _critical("-", "spin reverses", _FORMULA),
-    "n_c1_plus_linear": _critical("+", "rattle grows", _EIGENVALUES),
-    "n_c1_minus_linear": _critical("-", "rattle grows", _EIGENVALUES),
+    "n_c1_plus": _critical("+", "a tiny rattle grows", _FORMULA),
+    "n_c1_minus": _critical("-", "a tiny rattle grows", _FORMULA),
+    "n_c2_plus": _critical("+", "the spin reverses", _FORMULA),
+    "n_c2_minus": _critical("-", "the spin reverses", _FORMULA),
+    "n_c1_plus_linear": _critical("+", "a tiny rattle grows", _EIGENVALUES),
+    "n_c1_minus_linear": _critical("-", "a tiny rattle grows", _EIGENVALUES),
     "form_factor": Variable("float64", "1", "form factor L(f) of Takano (2011)", per_body=True),
     **{
-        f"n_{n}_{side}_simulated{suffix}": _critical(
-            {"plus": "+", "minus": "-"}[side], event, f"bisection of simulations{words}"
-        )
-        for n, event in (("c1", "rattle grows"), ("c2", "spin reverses"))
+        f"n_{n}_{side}_simulated{suffix}": _critical({"plus": "+", "minus": "-"}[side], event, f"simulation: {words}")
+        for n, event in (("c1", "a tiny rattle grows"), ("c2", "the spin reverses"))
         for side in ("plus", "minus")
-        for suffix, words in (("", ""), ("_inner", ": end of the bracket nearer zero"), ("_outer", ": far end"))
+        for suffix, words in (("", "middle of the bracket"), ("_inner", "end nearer zero"), ("_outer", "far end"))
     },
-    "critical_reason": Variable("int8", "1", "why a critical spin is not a number", REASONS, per_body=True),
+    **{
+        f"n_{n}_{side}_reason": Variable(
+            "int8", "1", f"whether simulation found n_{n}_{side}, and why not", REASONS, per_body=True
+        )
+        for n in ("c1", "c2")
+        for side in ("plus", "minus")
+    },
+    "critical_reason": Variable("int8", "1", "first of the four reasons that is not exists", REASONS, per_body=True),
 }
 
 
@@ -83,7 +100,8 @@ VERIFIED: dict[str, Variable] = {
 def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
     """The simulated variables, each of shape (cells,) or (cells, length), from images whose trajectories have ended."""
     table = kernel.table(images)
-    spin, _, _ = kernel.model.energy(*kernel.unpack(images))
+    with np.errstate(invalid="ignore"):  # the states of a run that failed
+        spin, _, _ = kernel.model.energy(*kernel.unpack(images))
     times = kernel.times(images, t_end)
     result = {"status": table["status"], "spin_final": spin, "t_stop": times, "step": table["step"]}
     for each in kernel.measurements:

@@ -15,6 +15,7 @@ import xarray as xr
 from sweep.config import Config, ConfigError, Fault, as_config
 from sweep.engine import executor
 from sweep.engine.plan import plan
+from sweep.engine.repeats import cells_of, repeat_all
 from sweep.grid import Array, off_the_body
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.runge_kutta import RungeKuttaKernel
@@ -36,6 +37,7 @@ MAX_TRAJECTORIES = 1000
 # name: units, long_name
 SERIES: dict[str, tuple[str, str]] = {
     "spin": ("1", "spin about the upward normal, in sqrt(g/c)"),
+    "ripple_free_spin": ("1", "spin without the ripple of the rattle, in sqrt(g/c)"),
     "contact_x": ("1", "contact point along x, in c"),
     "contact_y": ("1", "contact point along y, in c"),
     "slip_1": ("1", "slip velocity v_p along x, in sqrt(g c)"),
@@ -79,8 +81,10 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     config = stepwise(as_config(config))
     job = plan(_choose(config, {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}))
     (part,) = job.parts
-    start = part.images.copy()
     executor.execute(part.kernel, part.images, stop_when_settled=job.config.integrator.stop_when_settled)
+    repeat_all([job], {part.method: (part.kernel, part.images)})
+    halvings = part.kernel.table(part.images)["halvings"]
+    start = cells_of([job], part.method, part.kernel, part.images).start(halvings)
     labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
     summary = labelled.reset_coords(drop=False)
     # With blocks of one step, advancing to the next sample takes no more steps than lie between the two.
@@ -157,6 +161,8 @@ def _sample(kernel: Kernel, start: Array, end: Array, every: float) -> dict[str,
     states, constants = kernel.unpack(table)
     spin, rattle, inertia = model.energy(states, constants)
     series = {"time": goals * step, "spin": spin, **model.observe(states, constants)}
+    if kernel.follows_ripple:
+        series["ripple_free_spin"] = kernel.steady_spin(table)
     if "energy_error" in kernel.measure:
         series["energy"] = rattle + 0.5 * inertia * spin**2
         series["dissipated"] = table[:, kernel.row("work")]

@@ -109,4 +109,4 @@ def test_a_kernel_that_no_cache_holds_is_built_in_a_process_of_its_own(
     monkeypatch.setattr(Kernel, "is_compiled", lambda _: False)
     monkeypatch.setattr("sweep.engine.plan.build", lambda *which: told.append(str(which)))
     plan(sweep.load_config(write()), compiling=lambda: told.append("compiling"))
-    assert told == ["compiling", "('dopri5', 'slip', ('reversals', 'energy_error', 'noise_limited'))"]
+    assert told == ["compiling", "('dopri5', 'slip', ('reversals', 'energy_error', 'noise_limited', 'resting_spin'))"]

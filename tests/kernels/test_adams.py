@@ -21,6 +21,7 @@ from sweep.kernels.layout import LANES
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
 from sweep.models import slip, slip_split
 from sweep.models.model import take
+from sweep.models.rocking import frequencies
 
 Write = Callable[..., Path]
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
@@ -93,7 +94,8 @@ def test_rocking_frequency_and_corrector_matrix(body: dict[str, float], weight: 
     p = take(slip_split.Constants.of(columns(**body)), 0)
     slopes = [slip_split.slow(*(1e-30j * np.eye(7)[i]), p)[0] for i in range(4)]
     J = np.array(slopes).T[:4].imag / 1e-30
-    assert slip_split.fastest_rocking(p) == pytest.approx(np.abs(np.linalg.eigvals(J).imag).max(), rel=1e-6, abs=1e-6)
+    theirs = np.sort(np.abs(np.linalg.eigvals(J).imag))[[0, -1]]
+    assert frequencies(p) == pytest.approx(theirs, rel=1e-6, abs=1e-6)
     inverse = np.reshape(slip_split.implicit(weight, p), (4, 4))
     np.testing.assert_allclose(inverse @ (np.eye(4) - weight * J), np.eye(4), atol=1e-12)
 
@@ -131,7 +133,7 @@ def test_automatic_step_meets_the_tolerance(parameters: dict[str, float], tolera
 
 def test_the_step_does_not_depend_on_friction() -> None:
     step = accurate_step(columns(mu=[1e2, 1e3, 1e4, 1e5]), 1e-6)
-    assert np.ptp(step) == 0
+    assert step == pytest.approx(step[0], rel=1e-3)
     # Between rolling and 1e5 as little is left as 1/μ says.
     rolling = kernel(model="noslip")
     exact = spin(rolling, run(rolling, 0.01, 100.0))

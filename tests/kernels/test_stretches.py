@@ -11,7 +11,7 @@ from support.kernels import finish, images, kernel
 
 from sweep.kernels.adams import stretches
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
-from sweep.models import analytic, linear, slip, slip_split
+from sweep.models import linear, slip, slip_split, stability
 from sweep.models.model import stack, take
 from sweep.models.modes import RATTLE, Rattle, bending
 
@@ -82,7 +82,7 @@ def test_energies_of_the_modes_add_up() -> None:
 
 def test_distances_are_those_from_the_critical_spins() -> None:
     rattle, _, _, body = resolved(1e-6, mu=200.0, n0=[0.05, -0.04])
-    upper, lower = linear.critical_spins(slip.MODEL, body, analytic.critical_spins(body))
+    upper, lower = stability.critical_spins(slip.MODEL, body)
     np.testing.assert_allclose(rattle.distances(), np.abs(body["n0"] - np.array([lower, upper])).T, rtol=0.07)
 
 
@@ -191,8 +191,10 @@ def test_windows_continue_after_a_stretch() -> None:
     finish(ADAMS, table, settle=False)
     one = table[0]
     assert one[row("closed_window")] == pytest.approx(one[row("spin")] * one[row("period")], rel=1e-12)
-    assert 0 <= one[row("phase")] < one[row("period")]
-    assert one[row("window")] == pytest.approx(one[row("spin")] * one[row("phase")], rel=1e-9)
+    assert one[row("closed_shifted")] == pytest.approx(one[row("closed_window")], rel=1e-12)
+    assert one[row("earlier_half")] == pytest.approx(one[row("closed_window")] / 2, rel=1e-12)
+    assert 0 <= one[row("phase")] < one[row("period")] / 2
+    assert one[row("half")] == pytest.approx(one[row("spin")] * one[row("phase")], rel=1e-9)
 
 
 def test_bit_identical_for_chunks() -> None:

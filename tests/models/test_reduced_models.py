@@ -20,8 +20,9 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS, averaged, effective, noslip
-from sweep.models.coefficients import coefficients, normal_coordinates, rattle_period
+from sweep.models.coefficients import coefficients, normal_coordinates
 from sweep.models.model import stack, take
+from sweep.models.rocking import slower_period
 
 Write = Callable[..., Path]
 
@@ -110,7 +111,7 @@ def test_effective_tends_to_averaged_for_small_rattle() -> None:
     change = {}
     for name in ("effective", "averaged"):
         sizes = np.array([2e-3, 1e-3])
-        ends = simulate(name, 20 * rattle_period(columns())[0], x0=sizes, y0=sizes, mu=1e4, n0=0.002)
+        ends = simulate(name, 20 * slower_period(columns())[0], x0=sizes, y0=sizes, mu=1e4, n0=0.002)
         change[name] = (spin(*ends) - 0.002) / sizes**2
     ratio = change["effective"] / change["averaged"]
     assert ratio == pytest.approx(1, abs=0.05)

@@ -28,19 +28,23 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
     for name, variable in small.variables.items():
         assert {"long_name", "units"} <= set(variable.attrs), name
     assert small["delta"].attrs["units"] == "radian"
-    assert set(small.data_vars) == {n for n in VARIABLES if "simulated" not in n} - {
-        "critical_reason",
+    assert set(small.data_vars) == {n for n in VARIABLES if not n.endswith("_reason") and "simulated" not in n} - {
         "method",
         "t_first_reversal",
         "inferred",
         "reversal_times",
+        "raw_reversals",
+        "reversals_low",
+        "reversals_high",
+        "sensitive",
     }
     assert {name: str(small[name].dtype) for name in ("reversals", "status", "spin_final", "reversals_predicted")} == {
         "reversals": "int16", "status": "int8", "spin_final": "float64", "reversals_predicted": "int16",
     }  # fmt: skip
     flags = dict(zip(small["status"].attrs["flag_values"], small["status"].attrs["flag_meanings"].split(), strict=True))
     assert flags == STATUSES
-    assert flags == {0: "not_run", 1: "settled", 2: "time_limit", 3: "lift_off", 4: "diverged", 5: "paradox"}
+    known = {0: "not_run", 1: "settled", 2: "time_limit", 3: "lift_off", 4: "diverged", 5: "paradox", 6: "toppled"}
+    assert flags == known
 
 
 def test_dataset_values_belong_to_their_labels(small: xr.Dataset, write: Write) -> None:

@@ -1,4 +1,4 @@
-"""Single trajectories and critical spins."""
+"""Single trajectories."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ import sweep
 from sweep import ConfigError
 from sweep.cli import main
 from sweep.plots.trajectories import reversal_times
-from sweep.studies.critical import critical
 
 Write = Callable[..., Path]
 STANDARD = "name: standard\nfriction: {mu: [60, 75]}\nintegrator: {t_end: 1500}\n"
@@ -96,67 +95,6 @@ def test_trajectory_command(write: Write, tmp_path: Path) -> None:
     assert (tmp_path / "o" / "standard_trajectory.png").read_bytes().startswith(b"\x89PNG")
     wrong = CliRunner().invoke(main, ["trajectory", str(write(STANDARD)), "--at", "mu"])
     assert (wrong.exit_code, "NAME=NUMBER" in wrong.stderr) == (2, True)
-
-
-@pytest.mark.campaign
-def test_critical_spins_by_simulation(write: Write) -> None:
-    # The growth of a tiny rattle changes sign at the eigenvalues' critical spin, to 1e-4.
-    spins = critical(sweep.load_config(write(STANDARD), {"mu": [75.0, 150.0], "t_end": 12_000.0}), width=1e-5)
-    assert spins.n_c1_plus_simulated.dims == ("mu",)
-    assert "n0" not in spins.coords
-    for side in ("plus", "minus"):
-        inner, outer = spins[f"n_c1_{side}_simulated_inner"], spins[f"n_c1_{side}_simulated_outer"]
-        assert (np.abs(outer / inner - 1) < 1.01e-5).all()
-        np.testing.assert_allclose(spins[f"n_c1_{side}_simulated"], spins[f"n_c1_{side}_linear"], rtol=1e-4)
-    # The first reversal needs about twice that.
-    for side in ("plus", "minus"):
-        ratio = spins[f"n_c2_{side}_simulated"] / spins[f"n_c1_{side}_linear"]
-        assert ((ratio > 1.9) & (ratio < 2.1)).all()
-    assert (spins.critical_reason == 0).all()
-
-
-def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
-    flags = {"exists": 0, "no_friction": 1, "no_coupling": 2, "not_found": 3}
-    config = sweep.load_config(write(STANDARD), {"mu": [0.0, 60.0], "delta": 0.0})
-    spins = critical(config)
-    assert list(spins.critical_reason) == [flags["no_friction"], flags["no_coupling"]]
-    assert np.isnan(spins.n_c1_plus_simulated).all()
-    assert np.isnan(spins.n_c2_minus_simulated).all()
-    assert (
-        dict(
-            zip(
-                spins.critical_reason.attrs["flag_meanings"].split(),
-                spins.critical_reason.attrs["flag_values"],
-                strict=True,
-            )
-        )
-        == flags
-    )
-    rolling = critical(sweep.load_config(write(STANDARD), {"model": "noslip", "mu": 60.0}))
-    assert int(rolling.critical_reason) == flags["no_friction"]
-
-
-def test_critical_command(write: Write, tmp_path: Path) -> None:
-    command = [
-        "critical",
-        write(STANDARD),
-        "--set",
-        "mu=[60,75]",
-        "--set",
-        "model=averaged",
-        "--set",
-        "t_end=12000",
-        "--width",
-        "0.01",
-        "--output",
-        tmp_path / "o",
-    ]
-    result = CliRunner().invoke(main, list(map(str, command)), catch_exceptions=False)
-    assert result.exit_code == 0
-    stored = xr.load_dataset(tmp_path / "o" / "standard_critical.nc")
-    np.testing.assert_allclose(stored.n_c1_plus_simulated, stored.n_c1_plus, rtol=0.02)
-    np.testing.assert_allclose(stored.n_c2_plus_simulated, 2 * stored.n_c1_plus, rtol=0.1)
-    assert (tmp_path / "o" / "standard_critical.png").exists()
 
 
 def test_first_reversal_is_measured_on_request(write: Write) -> None:

@@ -26,3 +26,15 @@ def columns(**parameters: Any) -> dict[str, np.ndarray]:
     """The standard case with some parameters replaced, as columns over cells."""
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (STANDARD | parameters).values()))
     return {name: array.copy() for name, array in zip(STANDARD | parameters, arrays, strict=True)}
+
+
+def wide_bodies(number: int) -> dict[str, np.ndarray]:
+    """Random bodies far beyond the paper's, as columns over cells; always the same ones."""
+    random = np.random.default_rng(1)
+
+    def between(low: Any, high: Any) -> Any:
+        return np.exp(random.uniform(np.log(low), np.log(high), number))
+
+    c = between(0.5, 2)
+    a = between(np.maximum(c, 1.5), 50)
+    return columns(a=a, b=between(c, a), c=c, delta=random.uniform(-0.5, 0.5, number), mu=between(0.1, 5000))

@@ -24,6 +24,18 @@ def motion(body: dict[str, np.ndarray], times: Any, *, rtol: float, atol: float)
     return np.asarray(solution.y)
 
 
+def spin(body: dict[str, np.ndarray], time: float, method: str = "DOP853") -> float:
+    """The spin of one cell, by one of SciPy's methods."""
+    constants, extended = take(slip.Constants.of(body), 0), _extended()
+
+    def slopes(t: float, y: np.ndarray) -> np.ndarray:
+        return np.asarray(extended(t, y, constants)[:7])
+
+    solution = solve_ivp(slopes, (0, time), stack(slip.start(body))[:, 0], method, rtol=1e-11, atol=1e-15)
+    assert solution.success
+    return float(slip.rhs(tuple(solution.y[:, -1]), constants)[1][0])
+
+
 @cache
 def _extended() -> Any:
     rhs = slip.rhs

@@ -7,10 +7,11 @@ Euler's equation, Newton's equation and that the contact point does not leave th
 from __future__ import annotations
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 
 def contact(u: np.ndarray, a: float, b: float, c: float, delta: float) -> np.ndarray:
-    turn = np.array([[np.cos(delta), -np.sin(delta), 0], [np.sin(delta), np.cos(delta), 0], [0, 0, 1]])
+    turn = _turn(delta)
     A = turn.T @ np.diag([a**2, b**2, c**2]) @ turn
     return -A @ u / np.sqrt(u @ A @ u)
 
@@ -46,5 +47,54 @@ def derivative(states: np.ndarray, a: float, b: float, c: float, delta: float, m
     return np.array([du[0], du[1], *domega, dv_p[0], dv_p[1]]), R
 
 
+def _turn(delta: float) -> np.ndarray:
+    return np.array([[np.cos(delta), -np.sin(delta), 0], [np.sin(delta), np.cos(delta), 0], [0, 0, 1]])
+
+
 def _unit(u: np.ndarray) -> np.ndarray:
     return u / np.linalg.norm(u)
+
+
+def end(
+    a: float, b: float, c: float, delta: float, mu: float, n0: float, x0: float, y0: float, t_end: float
+) -> tuple[float, float, float]:
+    """When and how a trajectory ends, by SciPy: the time, u3², and the normal force there.
+
+    It ends where the force vanishes or grows beyond all bounds, or where u3 vanishes.
+    """
+    turn = _turn(delta)
+    inverse = turn.T @ np.diag([a**-2.0, b**-2.0, c**-2.0]) @ turn
+    # The point (x0, y0, z) of the surface, with z > 0, where the normal of the surface is -u.
+    point = np.array([x0, y0, 0.0])
+    point[2] = c * np.sqrt(1 - point @ inverse @ point)
+    u = -_unit(inverse @ point)
+
+    def slopes(_: float, y: np.ndarray) -> np.ndarray:
+        return derivative(y, a, b, c, delta, mu)[0]
+
+    def force(_: float, y: np.ndarray) -> float:
+        return derivative(y, a, b, c, delta, mu)[1]
+
+    def jams(_: float, y: np.ndarray) -> float:
+        return force(0.0, y) - 1e4
+
+    def topples(_: float, y: np.ndarray) -> float:
+        return _height(y) - 1e-8
+
+    for event in (force, jams, topples):
+        event.terminal = True  # type: ignore[attr-defined]
+    with np.errstate(all="ignore"):
+        solution = solve_ivp(
+            slopes, (0, t_end), [*u[:2], *(n0 * u), 0.0, 0.0], "DOP853",
+            rtol=1e-9, atol=1e-12, events=[force, jams, topples],
+        )  # fmt: skip
+    assert solution.status == 1
+    y, time = solution.y[:, -1], solution.t[-1]
+    if len(solution.t_events[2]):  # u3 vanishes linearly in time, so u3² does like its square
+        time += _height(y) / (y[:2] @ slopes(time, y)[:2])
+    return time, _height(y), force(time, y)
+
+
+def _height(y: np.ndarray) -> float:
+    """u3²."""
+    return 1 - y[0] ** 2 - y[1] ** 2

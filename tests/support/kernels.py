@@ -19,7 +19,7 @@ from sweep.kernels import measures
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import make_kernel
-from sweep.models import MODELS, analytic, linear
+from sweep.models import MODELS, stability
 
 
 def kernel(
@@ -43,8 +43,7 @@ def images(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **p
     body = columns(**parameters)
     stable = None
     if settle:
-        upper, lower = linear.critical_spins(MODELS[kernel.model.name], body, analytic.critical_spins(body))
-        stable = np.stack([lower, upper, *np.full((4, len(upper)), np.nan)])
+        stable = stability.stable_ranges(MODELS[kernel.model.name], body)
     return images_of(kernel, body, step, t_end, stable)
 
 

@@ -48,6 +48,7 @@ from sweep.kernels.status import DIVERGED, RUNNING
 from sweep.models import friction, linear, slip, slip_split
 from sweep.models.model import Array, Columns, stack
 from sweep.models.modes import bending
+from sweep.models.rocking import frequencies
 from sweep.models.slip_split import SPLIT
 
 assert BLOCK % HISTORY == 0
@@ -87,19 +88,22 @@ class AdamsKernel(Kernel):
         table = self.table(images)
         self._set_method(table, self.unpack(images)[1])
         constants = table.columns(self.constants)
-        self._set_started(table, columns, start_up(step, constants, stack(slip.start(columns)).T, levels))
+        self._set_started(table, start_up(step, constants, stack(slip.start(columns)).T, levels))
         self._set_looks(table, columns)
         return images
 
-    def times(self, images: Array, t_end: float | Array) -> Array:
-        table = self.table(images)
+    def model_states(self, images: Array) -> Array:
+        return slip_split.velocities(*self.unpack(images))
+
+    def _reached(self, table: Table, t_end: float | Array) -> Array:
         reached = table["begin"] + table["done"] * table["step"]
         return np.where(table["done"] == table["goal"], t_end, reached)
 
     def _set_method(self, table: Table, constants: slip_split.Constants) -> None:
         """Set the weights of the formulas and the matrix P."""
         step = table["step"]
-        phase = slip_split.fastest_rocking(constants) * step
+        _, fastest = frequencies(constants)
+        phase = fastest * step
         correct = step[:, None] * fitted_weights(CORRECTOR_NODES, phase)
         table.set_columns(_PREDICT, step[:, None] * fitted_weights(PREDICTOR_NODES, phase))
         table.set_columns(_CORRECT, correct)
@@ -107,8 +111,9 @@ class AdamsKernel(Kernel):
         table["per_weight"] = 1 / correct[:, 0]
         table["gamma"] = BDF_GAMMA * step
 
-    def _set_started(self, table: Table, columns: Columns, started: Started) -> None:
+    def _set_started(self, table: Table, started: Started) -> None:
         """Set the state after start-up, and do what looks and measurements would have done during it."""
+        before = self.steady_spin(table.images)
         table.set_columns(SPLIT.states, started.states)
         table.set_columns(_HISTORY, started.history)
         table["begin"], table["status"] = started.begin, started.status
@@ -119,7 +124,8 @@ class AdamsKernel(Kernel):
         grown = energy > table["energy_start"] * (1 + self.energy_gain)
         table["status"] = np.where(grown, DIVERGED, table["status"])
         table["energy"], table["spin"] = energy, spin
-        stretch = Stretch(started.begin, (columns["n0"] + spin) / 2, spin, started.work, mode_energies=None)
+        mean = (before + self.steady_spin(table.images)) / 2
+        stretch = Stretch(started.begin, mean, spin, started.work, mode_energies=None)
         for each in self.measurements:
             each.skip(table, stretch)
 
@@ -169,7 +175,7 @@ class AdamsKernel(Kernel):
             f"{at('spin')} = spin if accepted else old",
             "work = work_of(group, lane, h, power)",
             f"now = {at('begin')} + (done + 1.0) * h",
-            "watch(group, lane, accepted, old, 0.5 * h * (old + spin), work, h, now)",
+            "watch(group, lane, accepted, y, p, old, work, h, now)",
         ]
 
     def _make_work(self) -> Any:

@@ -155,7 +155,7 @@ def _end_step(ticks: str) -> list[str]:
 
 _DOPRI5 = [
     *_BEGIN_STEP,
-    "new, _, _, done, sound, airborne, jammed = step(y, p, h)",
+    "new, _, done, sound, airborne, jammed = step(y, p, h)",
     "accepted = active & sound",
     *(f"{_at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(SPLIT.states)),
     f"failure = {PARADOX} if jammed else ({LIFT_OFF} if airborne else {DIVERGED})",

@@ -8,13 +8,18 @@ from sweep.kernels.measures.energy import EnergyError
 from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.measures.noise import NoiseLimited
+from sweep.kernels.measures.raw_reversals import RawReversals
+from sweep.kernels.measures.resting_spin import RestingSpin
 from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
+from sweep.kernels.measures.sensitivity import Sensitivity
 from sweep.models.model import Tier
 
-MEASURES: dict[str, type[Measurement]] = {
-    kind.name: kind for kind in (Reversals, EnergyError, FirstReversal, NoiseLimited, ReversalTimes)
-}
+_KINDS: tuple[type[Measurement], ...] = (
+    Reversals, EnergyError, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Sensitivity,
+)  # fmt: skip
+
+MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}
 
 
 def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
@@ -24,7 +29,7 @@ def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
         kind(int(settings[name])) if settings[name] else kind()  # type: ignore[call-arg]
         for name, kind in MEASURES.items()
         if name in settings
-    )
+    )  # fmt: skip
 
 
 def possible(tier: Tier) -> tuple[str, ...]:

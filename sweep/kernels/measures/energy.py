@@ -41,9 +41,7 @@ class EnergyError(Measurement):
         WORK = layout.at("work")
 
         @inline
-        def step(
-            group: Any, lane: int, accepted: Any, spin: Any, spin_integral: Any, work: Any, h: Any, now: Any
-        ) -> None:
+        def step(group: Any, lane: int, accepted: Any, spin: Any, steady: Any, work: Any, h: Any, now: Any) -> None:
             group[WORK + lane] += work if accepted else 0.0
 
         return step

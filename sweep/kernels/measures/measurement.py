@@ -46,7 +46,7 @@ class Stretch:
     time: Array
     """Length of the stretch."""
     mean_spin: Array
-    """Spin averaged over the stretch."""
+    """Ripple-free spin averaged over the stretch."""
     spin: Array
     """Spin at its end."""
     work: Array
@@ -72,6 +72,8 @@ class Measurement:
     """Whether it is made if the configuration names no measurement, provided that the model supports it."""
     follows_work: ClassVar[bool] = False
     """Whether it uses the work of friction in each step, which some methods compute only on request."""
+    follows_ripple: ClassVar[bool] = False
+    """Whether it uses the ripple-free spin in each step."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
@@ -100,12 +102,13 @@ class Measurement:
         return {}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
-        """Inline (group, lane, accepted, spin, spin_integral, work, h, now) -> None, called after every step.
+        """Inline (group, lane, accepted, spin, steady, work, h, now) -> None, called after every step.
 
         accepted : whether the step counts; if not, no quantity may change
         spin : before the step
-        spin_integral, work : integral of the spin, and work of friction, over the step; `work` may be
-            zero unless some measurement has `follows_work`
+        steady : ripple-free spin before the step (`sweep.models.ripple`); the spin itself unless some measurement
+            has `follows_ripple`
+        work : work of friction in the step; may be zero unless some measurement has `follows_work`
         h : length of the step
         now : time at the end of the step
 

@@ -1,8 +1,11 @@
-"""Reversals: changes of sign of the spin averaged over successive windows, each as long as one rattle period.
+"""Reversals: changes of sign of the ripple-free spin, averaged over successive windows of one period of the rattle.
 
-Changes of sign of n itself are too many, because the rattle makes n ripple at twice the frequency of the rattle.  The
-time of a reversal is where the straight line between two successive averages, each placed at the centre of its window,
-crosses zero.
+The ripple-free spin n* (`sweep.models.ripple`) is the spin without the ripple that the rattle imposes on it.  A window
+is as long as a period of the slower rocking, and the first begins at t = 0.  The time of a reversal is where the
+straight line between two successive averages, each placed at the centre of its window, crosses zero.
+
+The same is counted in windows that begin half a period later.  If the two counts differ, that of the trajectory is
+marked: it depends on where the windows begin.  Both kinds of window consist of halves, and each half is summed once.
 """
 
 from __future__ import annotations
@@ -16,8 +19,8 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
-from sweep.models.coefficients import rattle_period
 from sweep.models.model import COUNT, Array, Columns
+from sweep.models.rocking import slower_period
 from sweep.variables import Variable
 
 
@@ -27,65 +30,90 @@ class Reversals(Measurement):
     summary = "number of spin reversals, the time of the last, and the spin averaged over the rattle"
     asks = COUNT
     by_default = True
+    follows_ripple = True
     rows = (
-        "step_rate", "period", "phase", "window", "closed_window", "reversals", "last_reversal",
+        "period", "phase", "half", "earlier_half", "shifted", "closed_window", "closed_shifted",
+        "reversals", "reversals_shifted", "last_reversal",
     )  # fmt: skip
 
     variables = {
         "reversals": Variable("int16", "1", "spin reversals of the simulated trajectory", of_sound_runs=True),
         "t_last_reversal": Variable("float64", "1", "time of the last spin reversal, in sqrt(c/g)", of_sound_runs=True),
         "spin_mean": Variable(
-            "float64", "1", "spin averaged over the last full window before t_stop, in sqrt(g/c)", of_sound_runs=True
+            "float64", "1", "ripple-free spin averaged over the last full window before t_stop, in sqrt(g/c)",
+            of_sound_runs=True,
         ),
-    }
+        "window_dependent": Variable(
+            "int8", "1", "whether windows that begin half a period later give another number of reversals",
+            {0: "firm", 1: "window_dependent"}, of_sound_runs=True,
+        ),
+    }  # fmt: skip
 
     def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
-        return {"period": rattle_period(columns), "step_rate": 1 / step, "last_reversal": np.nan}
+        return {"period": slower_period(columns), "shifted": 1.0, "last_reversal": np.nan}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
-        STEP_RATE, PERIOD, PHASE, WINDOW, CLOSED, REVERSALS, LAST = map(layout.at, self.rows)
+        PERIOD, PHASE, HALF, EARLIER, SHIFTED, CLOSED, CLOSED_SHIFTED, COUNT, COUNT_SHIFTED, LAST = map(
+            layout.at, self.rows
+        )
 
         @inline
-        def step(
-            group: Any, lane: int, accepted: Any, spin: Any, spin_integral: Any, work: Any, h: Any, now: Any
-        ) -> None:
-            period, previous = group[PERIOD + lane], group[CLOSED + lane]
-            phase, window = group[PHASE + lane] + h, group[WINDOW + lane] + spin_integral
-            closes = accepted & (phase >= period)
-            # The integral over the part of the step beyond the end of the window; the spin is taken to be linear
-            # within the step.
-            over = phase - period
-            rate = group[STEP_RATE + lane]
-            after = over * (spin + (spin_integral * rate - spin) * (2.0 - over * rate))
-            closed = window - after
-            reverses = closes & (closed * previous < 0.0)
-            crossing = now - over - period * (0.5 + closed / (closed - previous))
-            group[REVERSALS + lane] += 1.0 if reverses else 0.0
+        def step(group: Any, lane: int, accepted: Any, spin: Any, steady: Any, work: Any, h: Any, now: Any) -> None:
+            period, shifted = group[PERIOD + lane], group[SHIFTED + lane]
+            phase, half, earlier = group[PHASE + lane] + h, group[HALF + lane], group[EARLIER + lane]
+            over = phase - 0.5 * period
+            closes = accepted & (over >= 0.0)
+            # The part of the step beyond the end of the half.  What is integrated changes slowly, so that its value
+            # before the step is good for the whole of it; half a step is taken off the time of the crossing.
+            after = over * steady
+            half = half + h * steady
+            closed = earlier + (half - after)
+            main, other = closes & (shifted == 0.0), closes & (shifted != 0.0)
+            previous, previous_shifted = group[CLOSED + lane], group[CLOSED_SHIFTED + lane]
+            reverses = main & (closed * previous < 0.0)
+            crossing = now - 0.5 * h - over - period * (0.5 + closed / (closed - previous))
+            group[COUNT + lane] += 1.0 if reverses else 0.0
+            group[COUNT_SHIFTED + lane] += 1.0 if other & (closed * previous_shifted < 0.0) else 0.0
             group[LAST + lane] = crossing if reverses else group[LAST + lane]
-            at_reversal(group, lane, reverses, group[REVERSALS + lane], crossing)
-            group[CLOSED + lane] = closed if closes else previous
+            at_reversal(group, lane, reverses, group[COUNT + lane], crossing)
+            group[CLOSED + lane] = closed if main else previous
+            group[CLOSED_SHIFTED + lane] = closed if other else previous_shifted
+            group[EARLIER + lane] = half - after if closes else earlier
+            group[SHIFTED + lane] = 1.0 - shifted if closes else shifted
             group[PHASE + lane] = (over if closes else phase) if accepted else group[PHASE + lane]
-            group[WINDOW + lane] = (after if closes else window) if accepted else group[WINDOW + lane]
+            group[HALF + lane] = (after if closes else half) if accepted else group[HALF + lane]
 
         return step
 
     def make_may_settle(self, layout: Layout) -> Any:
-        CLOSED = layout.at("closed_window")
+        CLOSED, CLOSED_SHIFTED = layout.at("closed_window"), layout.at("closed_shifted")
 
         @inline
         def may_settle(group: Any, lane: int, spin: Any, at_rest: Any) -> Any:
             # If the signs differ, a reversal is still to come: the average over a window has yet to follow the spin
             # through zero.
-            return (spin * group[CLOSED + lane] > 0.0) | at_rest
+            followed = (spin * group[CLOSED + lane] > 0.0) & (spin * group[CLOSED_SHIFTED + lane] > 0.0)
+            return followed | at_rest
 
         return may_settle
 
     def skip(self, table: Table, stretch: Stretch) -> None:
-        period, phase = table["period"], table["phase"] + stretch.time
-        closes, rest = phase >= period, phase % period
-        window = table["window"] + stretch.mean_spin * stretch.time
-        table["closed_window"] = np.where(closes, stretch.mean_spin * period, table["closed_window"])
-        table["window"] = np.where(closes, stretch.mean_spin * rest, window)
+        # The spin reverses only with a large rattle, so that no reversal falls into a stretch.
+        length, spin = 0.5 * table["period"], stretch.mean_spin
+        phase = table["phase"] + stretch.time
+        closings, rest = np.floor(phase / length), phase % length
+        first = table["half"] + spin * (length - table["phase"])
+        last = np.where(closings == 1, first, spin * length)
+        before = np.select([closings == 1, closings == 2], [table["earlier_half"], first], spin * length)
+        # The last window that closes, and the one half a period before it.
+        newest, second = before + last, np.where(closings == 2, table["earlier_half"] + first, 2 * spin * length)
+        for name, shifted in (("closed_window", 0), ("closed_shifted", 1)):
+            is_newest = (table["shifted"] + closings - 1) % 2 == shifted
+            closed = np.where(is_newest, newest, np.where(closings > 1, second, table[name]))
+            table[name] = np.where(closings > 0, closed, table[name])
+        table["half"] = np.where(closings > 0, spin * rest, table["half"] + spin * stretch.time)
+        table["earlier_half"] = np.where(closings > 0, last, table["earlier_half"])
+        table["shifted"] = (table["shifted"] + closings) % 2
         table["phase"] = rest
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
@@ -94,4 +122,5 @@ class Reversals(Measurement):
             "reversals": table["reversals"],
             "t_last_reversal": table["last_reversal"],
             "spin_mean": np.where(closed, table["closed_window"] / table["period"], np.nan),
+            "window_dependent": table["reversals"] != table["reversals_shifted"],
         }

@@ -1,0 +1,153 @@
+"""Whether a trajectory really meets what stopped it: approaches a failure in ever shorter steps.
+
+A step that is too long has stages at states that the trajectory never visits.  If one of these has no positive normal
+force, or no positive Painlevé denominator, the kernel stops, but the failure may be one of the step alone.  So from the
+last sound state the same motion is followed again in steps of dopri5 with error control.  A step with such a stage is
+tried again at half its length.  If this never ends, the failure is one of the body, and happens here and now.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from inspect import getfile
+from typing import Any
+
+import numba
+import numpy as np
+
+from sweep.jit import OPTIONS, parallel
+from sweep.kernels.codegen import compile_inline, tuple_of
+from sweep.kernels.runge_kutta import make_step
+from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
+from sweep.kernels.tableau import DOPRI5
+from sweep.models.model import Array, Model, stack
+
+# Relative error of a step.  States below `_SMALL` count as if they were of this size.
+_TOLERANCE, _SMALL = 1e-12, 1e-3
+
+# A step that fails although it is shorter than this, in sqrt(c/g), has met a true failure.
+_SHORTEST = 1e-10
+
+# Where the states change too fast for any step, a failure this near, in sqrt(c/g), is the reason.
+_NEAR = 1e-6
+
+# The body has toppled when the cosine of its tilt is below this.  The equations divide by it; from here the time left
+# is extrapolated, with an error of the order of its square.
+_UPRIGHT = 1e-5
+
+# Steps after which nothing is confirmed: two seconds.
+_MOST_STEPS = 3_000_000
+
+
+def approach(model: Model, states: Array, constants: Any, stretch: Array) -> tuple[Array, Array]:
+    """What happens to trajectories within a stretch of time.
+
+    Parameters
+    ----------
+    states : as `model.rhs` takes them, shape (states, cells)
+    constants : as `model.rhs` takes them, each of shape (cells,)
+    stretch : length of the stretch, in sqrt(c/g), shape (cells,)
+
+    Returns
+    -------
+    The status of each trajectory, shape (cells,): `LIFT_OFF`, `PARADOX` or `TOPPLED`; `RUNNING` if it passes the
+    stretch; `DIVERGED` if the states cannot be followed.  And the time from the beginning of the stretch to this,
+    shape (cells,), in sqrt(c/g).
+    """
+    status, time = np.empty(len(stretch)), np.empty(len(stretch))
+    rows = np.ascontiguousarray(np.concatenate([stack(tuple(states)), stack(tuple(constants))]).T)
+    _approach(model)(rows, np.ascontiguousarray(stretch, dtype=float), status, time)
+    return status, time
+
+
+def compile_approach(model: Model) -> None:
+    """Compile `approach` for a model, or load it from disk."""
+    _approach(model).compile((numba.float64[:, ::1], *3 * [numba.float64[::1]]))
+
+
+@cache
+def _approach(model: Model) -> Any:
+    """Compiled (rows, stretch, status, time) -> None: `approach` for the cells of `rows`, states and constants."""
+    n, record = len(model.states), model.constants
+    names = tuple_of(f"rows[i, {j}]" for j in range(n))
+    load = compile_inline("load_states", f"def load_states(rows, i):\n    return {names}", {})
+    fields = " ".join(f"rows[i, {n + j}]," for j in range(len(record._fields)))
+    load_constants = compile_inline(
+        "load_constants", f"def load_constants(rows, i):\n    return record({fields})", {"record": record}
+    )
+    follow = _make_follow(model)
+
+    def run(rows: Any, stretch: Any, status: Any, time: Any) -> None:
+        for i in numba.prange(len(rows)):
+            status[i], time[i] = follow(load(rows, i), load_constants(rows, i), stretch[i])
+
+    return parallel(run, f"approach-{model.name}", getfile(model.rhs))
+
+
+def _make_follow(model: Model) -> Any:
+    """Compiled (states, constants, stretch) -> (status, time): `approach` for one trajectory."""
+    n, rhs, tilt = len(model.states), model.rhs, model.tilt
+    # Not inlined: it would be compiled three times over.
+    step = numba.njit(make_step(DOPRI5, model.rhs, n), **OPTIONS)
+    terms = [f"abs(one[{i}] - two[{i}]) / max(abs(two[{i}]), {_SMALL!r})" for i in range(n)]
+    source = f"def difference(one, two):\n    return max({', '.join(terms)})"
+    difference = compile_inline("difference", source, {})
+    # The difference of one step from two of half the length exceeds the error of the latter by this factor.
+    allowed = _TOLERANCE * (2**DOPRI5.order - 1)
+
+    @numba.njit(**OPTIONS)
+    def kind(y: Any, p: Any, infinite: Any) -> Any:
+        """What a step from `y` that is next to nothing has met.
+
+        Its stages do not tell.  Where the denominator goes to zero the force goes to infinity, or stays finite because
+        the numerator goes to zero as well; then either sign may come first.  Where the body lifts off the force alone
+        goes to zero.
+        """
+        _, (_, _, force, denominator) = rhs(y, p)
+        jams = (denominator <= 0.0) | (denominator < force)
+        return DIVERGED if infinite else (PARADOX if jams else LIFT_OFF)
+
+    @numba.njit(**OPTIONS)
+    def probe(y: Any, p: Any) -> Any:
+        """What lies just ahead of `y`, where errors allow no step that is as long as the shortest.
+
+        Near the paradox the denominator goes to zero as the root of the time left.
+        """
+        h = _SHORTEST
+        while h < _NEAR:
+            _, _, _, sound, airborne, jammed = step(y, p, h)
+            if not sound:
+                return kind(y, p, not (airborne | jammed))
+            h = 2.0 * h
+        return DIVERGED
+
+    @numba.njit(**OPTIONS)
+    def follow(y: Any, p: Any, stretch: float) -> Any:
+        time, h, cosine = 0.0, stretch / 8.0, np.sqrt(1.0 - tilt(y))
+        for _ in range(_MOST_STEPS):
+            if time >= stretch:
+                return RUNNING, stretch
+            h = min(h, stretch - time)
+            one, _, _, sound1, airborne1, jammed1 = step(y, p, h)
+            half, _, _, sound2, airborne2, jammed2 = step(y, p, 0.5 * h)
+            two, _, _, sound3, airborne3, jammed3 = step(half, p, 0.5 * h)
+            if not (sound1 & sound2 & sound3):
+                h = 0.5 * h
+                if h < _SHORTEST:
+                    met = airborne1 | jammed1 | airborne2 | jammed2 | airborne3 | jammed3
+                    return kind(y, p, not met), time
+                continue
+            error = difference(one, two) / allowed
+            if not error <= 1.0:
+                h = h * max(0.2, 0.9 * error**-0.2) if error < 1e30 else 0.2 * h
+                if h < _SHORTEST:
+                    return probe(y, p), time
+                continue
+            y, time = two, time + h
+            before, cosine = cosine, np.sqrt(1.0 - tilt(y))
+            if (cosine < _UPRIGHT) & (cosine < before):
+                return TOPPLED, time + h * cosine / (before - cosine)
+            h = h * min(2.0, 0.9 * error**-0.2) if error > 0.0 else 2.0 * h
+        return DIVERGED, time
+
+    return follow

@@ -1,0 +1,46 @@
+"""Raw reversals: every change of sign of the spin from one step to the next, those due to the ripple included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sweep.jit import inline
+from sweep.kernels.layout import Layout, Table
+from sweep.kernels.measures.measurement import Measurement, Stretch
+from sweep.models.model import COUNT, Array, Columns
+from sweep.variables import Variable
+
+
+@dataclass(frozen=True)
+class RawReversals(Measurement):
+    name = "raw_reversals"
+    summary = "number of sign changes of the spin itself, which ripples with the rattle"
+    asks = COUNT
+    rows = ("raw_reversals", "earlier_spin")
+
+    variables = {
+        "raw_reversals": Variable("int16", "1", "sign changes of the spin, ripple included", of_sound_runs=True)
+    }
+
+    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+        return {"earlier_spin": columns["n0"]}
+
+    def make_step(self, layout: Layout, at_reversal: Any) -> Any:
+        COUNT, EARLIER = map(layout.at, self.rows)
+
+        @inline
+        def step(group: Any, lane: int, accepted: Any, spin: Any, steady: Any, work: Any, h: Any, now: Any) -> None:
+            earlier = group[EARLIER + lane]
+            group[COUNT + lane] += 1.0 if accepted & (spin * earlier < 0.0) else 0.0
+            group[EARLIER + lane] = spin if accepted else earlier
+
+        return step
+
+    def skip(self, table: Table, stretch: Stretch) -> None:
+        table["raw_reversals"] += stretch.spin * table["earlier_spin"] < 0
+        table["earlier_spin"] = stretch.spin
+
+    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
+        return {"raw_reversals": table["raw_reversals"]}

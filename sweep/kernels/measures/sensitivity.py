@@ -1,0 +1,39 @@
+"""How far a count can be trusted: each cell is run again from a start that differs by 1e-10, in steps of other length.
+
+Where the motion is chaotic, or a spin comes close to a critical one, differences of this size decide how often the spin
+reverses, and no integration knows the count.  The second run costs as much as the first.  Following the linearised flow
+instead would cost more: every right-hand side once again, and its derivative.
+
+The kernel has nothing to do for it; the engine makes the runs (`sweep.engine.sensitivity`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sweep.kernels.measures.measurement import Measurement
+from sweep.models.model import COUNT
+from sweep.variables import Variable
+
+
+@dataclass(frozen=True)
+class Sensitivity(Measurement):
+    name = "sensitivity"
+    summary = "range of counts that K runs from starts 1e-10 apart give: {sensitivity: K}, by default K = 1"
+    asks = COUNT
+    needs = ("reversals",)
+    variables = {
+        "reversals_low": Variable("int16", "1", "fewest spin reversals from starts 1e-10 apart", of_sound_runs=True),
+        "reversals_high": Variable("int16", "1", "most spin reversals from starts 1e-10 apart", of_sound_runs=True),
+        "sensitive": Variable(
+            "int8", "1", "whether starts 1e-10 apart differ in their number of reversals",
+            {0: "firm", 1: "sensitive"}, of_sound_runs=True,
+        ),
+    }  # fmt: skip
+    bounds = (1, 100)
+    count: int = 1
+    """K, the number of runs beside the first."""
+
+    @property
+    def spec(self) -> str:
+        return f"{self.name}={self.count}"

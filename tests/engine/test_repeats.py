@@ -1,0 +1,240 @@
+"""Cells that fail or miss their tolerance: no failure is false, true ones have their time, and the rest stays."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import ROOT, STANDARD, adaptive, columns, independent
+from support.kernels import threads
+from support.runs import same_numbers
+
+import sweep
+from sweep.engine import local, repeats
+from sweep.engine.reporter import Progress, Reporter
+from sweep.kernels import methods
+from sweep.kernels.method import FIXED, MISSED, REPEAT
+from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, TIME_LIMIT, TOPPLED
+
+Write = Callable[..., Path]
+
+THIN = {"a": 50.0, "b": 1.01, "c": 1.0, "delta": 0.5, "mu": 200.0, "n0": 0.05}
+"""A body whose normal force rises to hundreds for a moment; with too long a step it seems to be a paradox."""
+
+STIFF = STANDARD | {"mu": 1e5, "n0": 1.0}
+
+ENDS = {
+    TOPPLED: {"a": 8.36, "b": 1.73, "c": 1.54, "delta": 0.179, "mu": 178.0, "n0": 1.0, "x0": 0.573, "y0": 0.0569},
+    LIFT_OFF: {"a": 15.7, "b": 1.05, "c": 0.732, "delta": 0.171, "mu": 33.0, "n0": 1.0, "x0": -3.49, "y0": 0.576},
+    PARADOX: {"a": 13.5, "b": 2.92, "c": 1.13, "delta": -0.326, "mu": 173.0, "n0": -1.0, "x0": 0.643, "y0": 0.209},
+}
+"""Bodies and starts by how they end."""
+
+MISSES = {"b": 2.8, "mu": 100.0, "n0": 0.02}
+"""The step of adams is twice too long for it."""
+
+MIXED = (*ENDS.values(), MISSES, THIN, {}, {"n0": 0.02}, ENDS[TOPPLED] | {"n0": -1.0})
+"""Cells that fail truly, fail falsely, miss their tolerance, or need no repeat."""
+
+
+@pytest.fixture
+def cells(tmp_path: Path) -> Callable[..., xr.Dataset]:
+    """Runs cells given by their parameters, along the dimension `case`."""
+
+    def run(bodies: Iterable[Mapping[str, float]], output: Path | None = None, **settings: Any) -> xr.Dataset:
+        rows = [",".join(STANDARD), *(",".join(map(repr, (STANDARD | dict(body)).values())) for body in bodies)]
+        (tmp_path / "cells.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+        (tmp_path / "cells.yaml").write_text("name: cells\ncases: cells.csv\n", encoding="utf-8")
+        options = {key: settings.pop(key) for key in ("reporter",) if key in settings}
+        return sweep.run(tmp_path / "cells.yaml", output, **options, **settings)
+
+    return run
+
+
+@pytest.mark.parametrize("method", ["adams", "dopri5"])
+def test_true_failures_have_their_time(cells: Callable[..., xr.Dataset], method: str) -> None:
+    found = cells(ENDS.values(), method=method, t_end=50.0)
+    expected = [independent.end(**end, t_end=50.0)[0] for end in ENDS.values()]
+    assert found.status.values.tolist() == list(ENDS)
+    np.testing.assert_allclose(found.t_stop, expected, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["adams", "dopri5"])
+def test_a_false_paradox_is_gone_on_from(cells: Callable[..., xr.Dataset], method: str) -> None:
+    found = cells([THIN], method=method, t_end=2.5)
+    expected = adaptive.spin(columns(**THIN), 2.5)
+    assert (int(found.status[0]), float(found.t_stop[0])) == (TIME_LIMIT, 2.5)
+    assert float(found.spin_final[0]) == pytest.approx(expected, abs=1e-5)
+    assert float(found.energy_error[0]) < 1e-4
+
+
+def test_a_false_paradox_at_strong_friction(cells: Callable[..., xr.Dataset]) -> None:
+    found = cells([STIFF], method="adams", t_end=14.5)
+    assert (int(found.status[0]), float(found.t_stop[0])) == (TIME_LIMIT, 14.5)
+    assert float(found.spin_final[0]) == pytest.approx(adaptive.spin(columns(**STIFF), 14.5, "Radau"), abs=1e-7)
+
+
+def test_without_a_second_look_both_would_be_paradoxes(
+    cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(local, "repeat_all", lambda *_: None)
+    found = cells([THIN, STIFF], method="adams", t_end=14.5)
+    assert found.status.values.tolist() == [PARADOX, PARADOX]
+
+
+def lengthen(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+    """Make the automatic steps of first runs longer than they should be."""
+    automatic = methods.automatic_step
+
+    def long_step(*which: Any) -> tuple[np.ndarray, np.ndarray]:
+        step, rule = automatic(*which)
+        return factor * step, rule
+
+    monkeypatch.setattr("sweep.engine.plan.methods.automatic_step", long_step)
+
+
+def test_one_run_is_not_believed(cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever a run has met, the next one has to meet the same."""
+    claims = iter([PARADOX, LIFT_OFF, TOPPLED] * 3)
+
+    def claim(model: Any, states: Any, constants: Any, stretch: Any) -> Any:  # noqa: ARG001
+        return np.full(len(stretch), next(claims)), stretch / 2
+
+    monkeypatch.setattr(repeats, "approach", claim)
+    lengthen(monkeypatch, 50)
+    found = cells([THIN], method="dopri5", t_end=1.0)
+    assert int(found.status[0]) == TIME_LIMIT
+    assert len(list(claims)) < 8  # more than one was made
+
+
+def test_a_fixed_step_stays(cells: Callable[..., xr.Dataset]) -> None:
+    found = cells([MISSES, THIN, ENDS[TOPPLED]], method="adams", step=0.2, t_end=100.0)
+    np.testing.assert_allclose(found.step, 0.2, rtol=2e-3)
+    assert set(found.step_rule.values.tolist()) == {FIXED}
+    assert found.status.values.tolist() == [TIME_LIMIT, DIVERGED, TOPPLED]
+    assert float(found.t_stop[2]) == pytest.approx(1.9815107, abs=1e-3)  # as near as its step allows
+
+
+def test_a_true_failure_at_a_fixed_step(cells: Callable[..., xr.Dataset]) -> None:
+    found = cells(ENDS.values(), method="dopri5", step=5e-5, t_end=50.0)
+    automatic = cells(ENDS.values(), method="dopri5", t_end=50.0)
+    assert found.status.values.tolist() == list(ENDS)
+    np.testing.assert_allclose(found.t_stop, automatic.t_stop, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(found.step, 5e-5, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("body", "step"), [({"b": 2.8, "mu": 100.0, "n0": 0.02}, 0.4), ({"b": 2.0, "mu": 100.0, "n0": 0.1}, 0.2)]
+)
+def test_no_energy_error_above_a_hundredth_without_a_failure(
+    cells: Callable[..., xr.Dataset], body: dict[str, float], step: float
+) -> None:
+    found = cells([body], method="adams", step=step, t_end=400.0)
+    assert float(found.energy_error[0]) > 0.01
+    assert (int(found.status[0]), float(found.t_stop[0])) == (DIVERGED, 400.0)
+
+
+def test_a_missed_tolerance_is_repeated(cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = {"method": "adams", "t_end": 400.0, "stop_when_settled": False}
+    lengthen(monkeypatch, 4)
+    repeated = cells([MISSES], **settings)
+    unmeasured = cells([MISSES], measure=["reversals"], **settings)
+    monkeypatch.setattr(repeats, "ROUNDS", 0)
+    once = cells([MISSES], **settings)
+    expected = adaptive.spin(columns(**MISSES), 400.0)
+    assert abs(float(once.spin_final[0]) - expected) > 1e-7
+    assert abs(float(repeated.spin_final[0]) - expected) < 3e-8
+    assert float(once.step[0] / repeated.step[0]) in (pytest.approx(2, rel=1e-2), pytest.approx(4, rel=1e-2))
+    assert int(repeated.step_rule[0]) == REPEAT
+    assert unmeasured.spin_final == once.spin_final  # nothing says that it missed
+
+
+def test_a_tolerance_that_no_repeat_keeps_is_told(
+    cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(repeats, "ROUNDS", 1)
+    lengthen(monkeypatch, 4)
+    found = cells([MISSES], method="adams", t_end=400.0, tolerance=1e-13)
+    assert (int(found.status[0]), int(found.step_rule[0])) == (TIME_LIMIT, MISSED)
+
+
+@pytest.mark.parametrize("method", ["adams", "auto"])
+@pytest.mark.parametrize("size", [1, 3])
+def test_tiles_and_threads_do_not_touch_the_numbers(
+    cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch, size: int, method: str
+) -> None:
+    settings = {"method": method, "t_end": 30.0, "tolerance": 1e-9}
+    whole = cells(MIXED, **settings)
+    assert {TIME_LIMIT, *ENDS} <= set(whole.status.values.tolist())
+    assert REPEAT in whole.step_rule
+    monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: size)  # noqa: ARG005
+    monkeypatch.setattr("sweep.engine.local.GROUP", 2 * size)
+    with threads(1):
+        same_numbers(cells(MIXED, **settings), whole)
+    same_numbers(cells(MIXED[::-1], **settings).isel(case=slice(None, None, -1)).assign_coords(case=whole.case), whole)
+
+
+class Stops(Reporter):
+    """Interrupts once, while cells are repeated."""
+
+    def __init__(self) -> None:
+        self.repeating = self.stopped = False
+        self.seen: list[Progress] = []
+
+    def chunk(self, progress: Progress) -> None:
+        self.seen.append(progress)
+        if self.repeating and not self.stopped:
+            self.stopped = True
+            raise KeyboardInterrupt
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_an_interrupt_while_cells_are_repeated(
+    cells: Callable[..., xr.Dataset], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = {"method": "adams", "t_end": 30.0}
+    whole, stops, repeat_all = cells(MIXED, **settings), Stops(), repeats.repeat_all
+
+    def repeat(*arguments: Any) -> None:
+        stops.repeating = True
+        repeat_all(*arguments)
+        stops.repeating = False
+
+    monkeypatch.setattr(local, "repeat_all", repeat)
+    out = tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt):
+        cells(MIXED, out, reporter=stops, **settings)
+    assert [path.name for path in out.iterdir()] == ["cells.checkpoint"]
+    same_numbers(cells(MIXED, out, reporter=stops, **settings), whole)
+    # A failure is reported only when it is certain, and no progress is taken back.
+    assert stops.stopped
+    failed = [progress.failed for progress in stops.seen]
+    assert max(failed) == failed[-1] == int(np.isin(whole.status, list(ENDS)).sum())
+
+
+def test_a_trajectory_is_that_of_the_run(cells: Callable[..., xr.Dataset], write: Write) -> None:
+    for body in (ENDS[PARADOX], THIN):
+        found = cells([body], method="dopri5", t_end=3.0)
+        series = sweep.trajectory(sweep.load_config(write("integrator: {t_end: 3, method: dopri5}\n"), STANDARD | body))
+        for name in ("status", "t_stop", "step", "step_rule", "spin_final", "energy_error"):
+            np.testing.assert_array_equal(series[name].values, found[name].values)
+        last = int(np.isfinite(series.spin[0]).sum()) - 1
+        assert float(series.spin[0, last]) == float(found.spin_final[0])
+        assert float(series.time[0, last]) == pytest.approx(float(found.t_stop[0]), abs=2 * float(found.step[0]))
+
+
+@pytest.mark.parametrize("method", ["adams", pytest.param("dopri5", marks=pytest.mark.campaign)])
+def test_300_wide_cells_end_as_they_truly_do(cells: Callable[..., xr.Dataset], method: str) -> None:
+    with (ROOT / "data" / "reference_wide.csv").open(encoding="utf-8") as table:
+        rows = list(csv.DictReader(table))
+    bodies = [{name: float(row[name]) for name in STANDARD} for row in rows]
+    found = cells(bodies, method=method, t_end=400.0, stop_when_settled=False)
+    ends = {"time_limit": TIME_LIMIT, "toppled": TOPPLED}
+    np.testing.assert_array_equal(found.status, [ends[row["end"]] for row in rows])
+    np.testing.assert_allclose(found.t_stop, [float(row["t_end"]) for row in rows], rtol=0, atol=2e-6)
+    assert float(found.energy_error.max()) < 0.01

@@ -1,0 +1,55 @@
+"""Counts that cannot be known, and where settled trajectories come to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from support.kernels import default_measures
+
+import sweep
+from sweep.kernels.status import SETTLED
+from sweep.plots import picture
+
+CHAOTIC = {"a": 39.7614, "b": 11.6247, "c": 1.19954, "delta": 0.020937, "mu": 240.612}
+CHAOTIC |= {"n0": -0.0490836, "x0": 8.26e-4, "y0": 2.26e-4}
+
+
+def run(**settings: object) -> xr.Dataset:
+    return sweep.run("configs/quick.yaml", **{"x0": 0.01, "y0": 0.01, **settings})
+
+
+def test_a_chaotic_cell_has_a_range_of_counts() -> None:
+    found = run(**CHAOTIC, t_end=10_000, measure=["reversals", "sensitivity"])
+    assert int(found.sensitive) == 1
+    assert int(found.reversals_low) <= int(found.reversals) <= int(found.reversals_high)
+    assert int(found.reversals_low) < int(found.reversals_high)
+
+
+def test_the_papers_counts_are_firm_and_unmarked() -> None:
+    found = run(b=[2.0, 2.5, 3.0, 4.0], mu=[60, 70, 80, 100], n0=0.05, t_end=9000, measure=["reversals", "sensitivity"])
+    assert not found.sensitive.any()
+    xr.testing.assert_equal(found.reversals_low.drop_attrs(), found.reversals_high.drop_attrs())
+
+
+def test_maps_mark_counts_that_are_not_certain() -> None:
+    found = run(b=np.linspace(2, 6, 6).tolist(), mu=np.linspace(40, 90, 6).tolist(), n0=0.05, t_end=100)
+    assert "count not certain" not in labels(found)
+    assert "count not certain: 1 of 36" in labels(found.assign(sensitive=(found.b == 2.0) & (found.mu == 40)))
+
+
+def labels(dataset: xr.Dataset) -> str:
+    """The entries of all legends of the maps."""
+    legends = [axes.get_legend() for axes in picture.draw(dataset).axes]
+    return " ".join(text.get_text() for legend in legends if legend for text in legend.get_texts())
+
+
+def test_settled_trajectories_come_to_rest_where_they_are_said_to() -> None:
+    settings: dict[str, object] = {"b": [2.0, 3.0, 6.0], "mu": [40, 80], "n0": 0.05, "t_end": 30_000, "method": "adams"}
+    settings["measure"] = list(default_measures("slip"))
+    left, later = run(**settings), run(**settings, stop_when_settled=False)
+    settled = (left.status == SETTLED).values
+    assert settled.sum() >= 4
+    rest, end = left.spin_rest.values[settled], later.spin_final.values[settled]
+    np.testing.assert_allclose(rest, end, rtol=1e-3)
+    assert np.abs(left.spin_final.values[settled] / end - 1).max() > 0.01
+    assert np.isnan(left.spin_rest.values[~settled]).all()

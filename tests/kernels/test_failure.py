@@ -1,0 +1,72 @@
+"""The approach to a failure, against SciPy on the equations derived another way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import columns, independent
+
+from sweep.kernels.failure import approach
+from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
+from sweep.models import MODELS, slip
+from sweep.models.model import Array, stack
+
+ENDS = {
+    LIFT_OFF: {"a": 18.6, "b": 1.7, "c": 0.66, "delta": 0.269, "mu": 3.85, "n0": 2.0, "x0": -4.47, "y0": 0.798},
+    PARADOX: {"a": 15.6, "b": 1.38, "c": 1.3, "delta": 0.15, "mu": 17.3, "n0": 1.0, "x0": 0.893, "y0": 0.236},
+    TOPPLED: {"a": 12.7, "b": 1.61, "c": 1.53, "delta": -0.0446, "mu": 0.237, "n0": -1.0, "x0": -3.29, "y0": -0.38},
+}
+"""Bodies and starts by how they end, all within t = 2.5."""
+
+
+def met(body: dict[str, np.ndarray], stretch: float) -> tuple[Array, Array]:
+    """What cells meet within so long a time from their start."""
+    cells = len(body["a"])
+    return approach(MODELS["slip"], stack(slip.start(body)), slip.Constants.of(body), np.full(cells, stretch))
+
+
+@pytest.mark.parametrize("kind", ENDS)
+def test_failures_and_their_times(kind: int) -> None:
+    (status,), (time,) = met(columns(**ENDS[kind]), 5.0)
+    expected, height, force = independent.end(**ENDS[kind], t_end=5.0)
+    assert status == kind
+    assert time == pytest.approx(expected, abs=1e-7)
+    # And SciPy ended there for the same reason.
+    assert (height < 1e-6, abs(force) < 1e-6, force > 1e3) == (kind == TOPPLED, kind == LIFT_OFF, kind == PARADOX)
+
+
+def test_a_stretch_without_failure_is_passed() -> None:
+    body = columns(**ENDS[LIFT_OFF])
+    _, (time,) = met(body, 5.0)
+    (status,), (passed,) = met(body, 0.999 * time)
+    assert (status, passed) == (RUNNING, 0.999 * time)
+    assert met(body, 1.001 * time)[0] == LIFT_OFF
+
+
+def test_the_paradox_may_have_a_finite_force() -> None:
+    """Numerator and denominator of the force go to zero together: which sign a step meets first is chance."""
+    body = {"a": 12.8, "b": 2.4, "c": 1.71, "delta": 0.16, "mu": 172.0, "n0": 1.0, "x0": 2.93, "y0": 0.241}
+    (status,), (time,) = met(columns(**body), 2.0)
+    assert status == PARADOX
+    assert time == pytest.approx(0.72344473, abs=1e-7)  # SciPy's DOP853 on the independent equations
+
+
+def test_states_that_cannot_be_followed() -> None:
+    body = columns()
+    states = stack(slip.start(body))
+    states[2] = np.nan
+    (status,), (time,) = approach(MODELS["slip"], states, slip.Constants.of(body), np.ones(1))
+    assert (status, time) == (DIVERGED, 0.0)
+
+
+def test_a_body_that_is_in_the_air_at_once() -> None:
+    (status,), (time,) = met(columns(n0=30.0, x0=4.0, mu=20.0), 1.0)
+    assert (status, time) == (LIFT_OFF, 0.0)
+
+
+def test_each_cell_by_itself() -> None:
+    bodies = {name: np.array([end[name] for end in ENDS.values()]) for name in columns()}
+    together = met(bodies, 5.0)
+    for i in range(len(ENDS)):
+        alone = met({name: values[[i]] for name, values in bodies.items()}, 5.0)
+        assert (alone[0][0], alone[1][0]) == (together[0][i], together[1][i])

@@ -1,0 +1,107 @@
+"""Critical spins and stable ranges of a model, against growth rates, other codes and the limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import columns, wide_bodies
+from support.kernels import threads
+
+import sweep
+from sweep.grid import Grid
+from sweep.kernels.status import SETTLED
+from sweep.models import MODELS, linear, slip, stability
+from sweep.models.model import stack
+from sweep.prediction import predict
+
+SLIP = MODELS["slip"]
+
+
+def growth(model: str, body: dict[str, np.ndarray], spin: Any) -> np.ndarray:
+    return linear.growth_rate(MODELS[model], MODELS[model].constants.of(body), np.broadcast_to(spin, body["a"].shape))
+
+
+def test_critical_spins_of_an_independent_implementation() -> None:
+    plus, minus = stability.critical_spins(SLIP, columns(mu=[75, 200]))
+    assert [round(plus[0], 7), round(minus[0], 7)] == [0.0019611, -0.0116503]
+    assert [round(plus[1], 6), round(minus[1], 6)] == [0.000736, -0.004353]
+
+
+def test_rattle_neither_grows_nor_decays_at_a_critical_spin() -> None:
+    body = columns(mu=[20, 75, 200], b=[2, 3, 8])
+    for spin in stability.critical_spins(SLIP, body):
+        assert np.abs(growth("slip", body, spin)).max() < 1e-13
+        assert (growth("slip", body, 0.99 * spin) < 0).all()
+        assert (growth("slip", body, 1.01 * spin) > 0).all()
+
+
+@pytest.mark.parametrize("name", ["slip", "effective", "averaged"])
+def test_no_range_of_spin_is_missed(name: str) -> None:
+    """Whether the rattle grows, sampled finely in the spin, changes at the ends of the ranges and nowhere else."""
+    body = wide_bodies(40)
+    spins = np.geomspace(1e-6, 10, 800)
+    ranges = stability.stable_ranges(MODELS[name], body)
+    for sign, (end, near, far) in ((1, ranges[[1, 4, 5]]), (-1, -ranges[[0, 3, 2]])):
+        for spin in spins:
+            inner, outer, beyond = spin < end, (spin > near) & (spin < far), spin > np.where(np.isnan(far), 11, far)
+            close = np.abs(stack((end, near, far)) / spin - 1).min(axis=0, initial=1, where=~np.isnan([end, near, far]))
+            known = ~beyond & (close > 1e-4)
+            np.testing.assert_array_equal((growth(name, body, sign * spin) < 0)[known], (inner | outer)[known])
+
+
+def test_a_narrow_range_in_which_the_rattle_grows_is_not_missed() -> None:
+    """It ends at 1.36 times the spin at which it begins; a search by factors of 1.7 went past it to 7.7."""
+    body = columns(a=3.3471, b=1.7666, c=1.5477, delta=0.0297, mu=232.6374)
+    _, minus = stability.critical_spins(SLIP, body)
+    assert minus[0] == pytest.approx(-0.179, abs=0.001)
+    assert growth("slip", body, 1.01 * minus)[0] > 0 > growth("slip", body, 2 * minus)[0]
+
+
+def test_a_nearly_round_body_is_stable_again_at_faster_spin() -> None:
+    body = columns(b=8.0, mu=100.0)
+    lower, _, far, near, *_ = stability.stable_ranges(SLIP, body)
+    assert np.abs(growth("slip", body, near)) < 1e-13
+    assert np.abs(growth("slip", body, far)) < 1e-13
+    assert far < -0.05 < near < lower
+    assert growth("slip", body, (near + far) / 2) < 0
+    assert np.isnan(stability.stable_ranges(SLIP, columns())[2:]).all()
+
+
+def test_uncoupled_amplitudes_decay_at_every_spin() -> None:
+    """In the averaged equations nothing else can make them grow; in the full ones friction does, at a fast spin."""
+    for body in (columns(delta=0.0), columns(a=5, b=5)):
+        assert stability.critical_spins(MODELS["averaged"], body) == (np.inf, -np.inf)
+        upper, lower = stability.critical_spins(SLIP, body)
+        assert upper == pytest.approx(-lower, rel=1e-9)
+        assert growth("slip", body, 0.99 * upper) < 0 < growth("slip", body, 1.01 * upper)
+
+
+def test_an_uncoupled_body_settles_only_at_a_stable_spin(write: Callable[..., Path]) -> None:
+    """Taken to be stable at any spin, it had settled at the spin of its start."""
+    run = sweep.run(write("body: {delta: 0}\nfriction: {mu: 20}\nstart: {n0: [0.06, 0.1]}\n"))
+    assert set(run.status.values) == {SETTLED}
+    assert run.spin_final[0] == pytest.approx(0.06, rel=1e-3)
+    assert 0.05 < run.spin_final[1] < 0.07 < run.n_c1_plus_linear
+    assert run.t_stop[1] > 1000
+
+
+def test_without_friction_no_spin_is_stable() -> None:
+    assert np.isnan(stability.stable_ranges(SLIP, columns(mu=0.0))).all()
+    assert np.isnan(stability.stable_ranges(MODELS["noslip"], columns())).all()
+
+
+def test_stability_is_the_same_on_any_number_of_threads() -> None:
+    bodies = columns(mu=np.linspace(20, 200, 1201), b=np.linspace(1.2, 9.8, 1201), n0=0.3)
+    found = []
+    for number in (1, 2):
+        with threads(number):
+            stability_ = predict(slip.MODEL, Grid({}, {}, bodies)).stability
+        assert stability_
+        found.append(stability_.ranges)
+    np.testing.assert_array_equal(found[0], found[-1])
+    np.testing.assert_array_equal(found[0], stability.stable_ranges(slip.MODEL, bodies))
+    assert np.isfinite(found[0][2:]).any()
