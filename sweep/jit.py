@@ -60,8 +60,8 @@ def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -
 
 
 def serial(function: Callable[..., Any], specialisation: str) -> Any:
-    """As `parallel`, but on one thread, for short tasks: on a busy machine threads are slow to start."""
-    return _cached(numba.njit(function, **OPTIONS), specialisation)
+    """As `parallel`, but on the thread that calls it, while other threads go on."""
+    return _cached(numba.njit(function, nogil=True, **OPTIONS), specialisation)
 
 
 def _cached(dispatcher: Any, specialisation: str, *modules: str) -> Any:

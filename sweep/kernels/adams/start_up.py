@@ -8,13 +8,13 @@ computed by itself, so it does not matter which ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 
-from sweep.jit import OPTIONS, parallel
+from sweep.jit import serial
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
     CONSTANTS,
@@ -110,19 +110,42 @@ def start_up(step: Array, constants: Array, starts: Array, levels: Array) -> Sta
     starts : states of the slip model at t = 0, shape (cells, 7)
     levels : number of levels, from `count_levels`, shape (cells,)
     """
-    cells = np.argsort(levels, kind="stable")
-    counts = np.bincount(levels)
-    # The places in this order at which groups end: a group has at most LANES cells, all with equally many levels.
-    ends = [np.arange(last, last - n, -LANES)[::-1] for n, last in zip(counts, np.cumsum(counts), strict=True)]
-    n = len(step)
+    groups = [
+        rows[begin : begin + LANES]
+        for count in np.unique(levels)
+        for rows in [np.flatnonzero(levels == count)]
+        for begin in range(0, len(rows), LANES)
+    ]
+    begins = np.concatenate([starts, constants], axis=1)
     started = Started(
-        np.empty((n, len(SPLIT.states))), np.empty((n, HISTORY * len(POINT))), np.empty((n, 3)),
-        np.empty(n), np.empty(n), np.empty(n),
-    )  # fmt: skip
-    # Always of the same memory layout: for another one the kernel would be compiled again, in this process.
-    begins = np.ascontiguousarray(np.concatenate([starts, constants], axis=1))
-    _start_up(started, step, begins, levels, _steps(levels.max()), cells, np.concatenate(ends))
+        *(np.empty((len(step), n)) for n in (len(SPLIT.states), HISTORY * len(POINT), 3)),
+        *(np.empty(len(step)) for _ in range(3)),
+    )
+
+    def take(cells: Array) -> None:
+        """Take the cells of one group through start-up; lanes that would stay empty repeat the last of them."""
+        lanes, steps = np.pad(cells, (0, LANES - len(cells)), mode="edge"), _steps(levels[cells[0]])
+        group = np.zeros((len(_GROUP.names), LANES))
+        group[: begins.shape[1]] = begins[lanes].T
+        group[_GROUP.row("spacing")] = step[lanes] / 2.0 ** len(steps)
+        group[_GROUP.row("h")] = 0.5 * group[_GROUP.row("spacing")]
+        points = np.zeros((HISTORY + steps.max(), len(_POINT.names), LANES))
+        _run(group.ravel(), points.ravel(), steps)
+        _store(started, cells, group[:, : len(cells)], points[:HISTORY, :, : len(cells)])
+
+    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
+        list(pool.map(take, groups))
     return started
+
+
+def _store(started: Started, cells: Array, group: Array, points: Array) -> None:
+    """Write what a group has come to, its quantities of shape (rows, cells), to the rows of these cells."""
+    started.states[cells] = group[: len(SPLIT.states)].T
+    started.history[cells] = points[:, : len(POINT)].reshape(-1, len(cells)).T
+    started.powers[cells] = points[:-4:-1, _POINT.row("power{}")].T
+    ticks, spacing = group[_GROUP.row("ticks")], group[_GROUP.row("spacing")]
+    started.begin[cells] = ticks * spacing
+    started.status[cells], started.work[cells] = group[_GROUP.row("status")], group[_GROUP.row("work")]
 
 
 def _at(name: str) -> str:
@@ -209,7 +232,6 @@ def _make_run() -> Any:
     advance = compile_lanes("advance", "group, points, ticks", _ADVANCE, names)
     size, dopri5_steps = _POINT_SIZE, _DOPRI5_STEPS
 
-    @numba.njit(**OPTIONS)
     def run(group: Any, points: Any, steps: Any) -> None:
         for n in range(dopri5_steps + 1):
             if n:
@@ -221,72 +243,13 @@ def _make_run() -> Any:
         for level in range(len(steps)):
             set_step(group, 2.0**level)
             for n in range(steps[level]):
-                advance(group, points[n * size : (n + HISTORY + 1) * size], 2.0**level)
+                advance(group, points[n * size :], 2.0**level)
             # Keep every second point, counted from the last: the history for the doubled step.
             for j in range(HISTORY):
-                at = (steps[level] - HISTORY + 1 + 2 * j) * size
-                points[j * size : (j + 1) * size] = points[at : at + size]
+                for i in range(size):
+                    points[j * size + i] = points[(steps[level] - HISTORY + 1 + 2 * j) * size + i]
 
-    return run
-
-
-def _make_load() -> Any:
-    """Compiled (step, begins, cells, levels) -> the group of these cells; `begins` are states and constants."""
-    n_rows, n_begins = len(_GROUP.names), len(SPLIT.states) + len(CONSTANTS)
-    SPACING, H = _GROUP.at("spacing"), _GROUP.at("h")
-
-    @numba.njit(**OPTIONS)
-    def load(step: Any, begins: Any, cells: Any, levels: int) -> Any:
-        group = np.zeros(n_rows * LANES)
-        for lane in range(LANES):
-            # Lanes that would stay empty repeat the last cell.
-            cell = cells[min(lane, len(cells) - 1)]
-            for i in range(n_begins):
-                group[i * LANES + lane] = begins[cell, i]
-            group[SPACING + lane] = step[cell] / 2.0**levels
-            group[H + lane] = 0.5 * group[SPACING + lane]
-        return group
-
-    return load
+    return serial(run, "start-up")
 
 
-def _make_store() -> Any:
-    """Compiled (started, cells, group, points) -> None: writes the result to the rows of these cells."""
-    n_states, n_point, size = len(SPLIT.states), len(POINT), _POINT_SIZE
-    SPACING, STATUS, TICKS, WORK = map(_GROUP.at, ("spacing", "status", "ticks", "work"))
-    POWER = _POINT.at("power{}")
-
-    @numba.njit(**OPTIONS)
-    def store(started: Any, cells: Any, group: Any, points: Any) -> None:
-        for lane in range(len(cells)):
-            cell = cells[lane]
-            for i in range(n_states):
-                started.states[cell, i] = group[i * LANES + lane]
-            for j in range(HISTORY):
-                for i in range(n_point):
-                    started.history[cell, n_point * j + i] = points[j * size + i * LANES + lane]
-            for j in range(3):
-                started.powers[cell, j] = points[(HISTORY - 1 - j) * size + POWER + lane]
-            started.begin[cell] = group[TICKS + lane] * group[SPACING + lane]
-            started.status[cell] = group[STATUS + lane]
-            started.work[cell] = group[WORK + lane]
-
-    return store
-
-
-def _make_start_up() -> Callable[..., None]:
-    load, run, store, size = _make_load(), _make_run(), _make_store(), _POINT_SIZE
-
-    def run_all(started: Any, step: Any, begins: Any, levels: Any, steps: Any, cells: Any, ends: Any) -> None:
-        for g in numba.prange(len(ends)):
-            mine = cells[(ends[g - 1] if g else 0) : ends[g]]
-            doublings = levels[mine[0]]
-            group, points = load(step, begins, mine, doublings), np.zeros((HISTORY + steps.max()) * size)
-            run(group, points, steps[:doublings])
-            store(started, mine, group, points)
-
-    compiled: Callable[..., None] = parallel(run_all, "start-up", slip.__file__)
-    return compiled
-
-
-_start_up = _make_start_up()
+_run = _make_run()

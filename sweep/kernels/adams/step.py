@@ -1,7 +1,7 @@
 """One step of the stiff method, used both in its main loop and in its start-up.
 
 The arithmetic is in `solve`, an ordinary inline function.  Only the sums over the history are generated as text,
-because the slots of the ring have to be known when the code is compiled.
+because the places of the points have to be known when the code is compiled.
 """
 
 from __future__ import annotations

@@ -12,16 +12,11 @@ the nodes.  The terms are computed once, in exact fractions; a cell then costs 2
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from fractions import Fraction as F
 from functools import cache
-from typing import Any
 
 import numpy as np
 
-from sweep.jit import serial
-from sweep.kernels.codegen import compile_lanes
-from sweep.kernels.layout import LANES
 from sweep.models.model import Array
 
 HARMONIC = 3
@@ -48,9 +43,13 @@ def fitted_weights(nodes: tuple[int, ...], phase: Array) -> Array:
     -------
     Weights of shape (cells, k).
     """
-    weights = np.empty((len(phase), len(nodes)))
-    _fit(np.square(phase), *_tables(nodes), weights)
-    return weights
+    plain, null, series = _tables(nodes)
+    A, square = np.zeros((20, len(phase))), np.square(phase)
+    for terms in series[::-1]:
+        A = A * square + terms[:, None]
+    c = _solve(A.reshape(4, 5, -1))
+    # Term by term: the sums of a matrix product depend on how many cells there are.
+    return np.asarray(plain + sum(c[r, :, None] * null[:, r] for r in range(4)))
 
 
 @cache
@@ -98,41 +97,15 @@ def _invert(matrix: list[list[F]]) -> list[list[F]]:
     return [row[n:] for row in rows]
 
 
-def _solve_lines() -> list[str]:
-    """Gauss-Jordan elimination for the equations `A` of one lane.
+def _solve(A: Array) -> Array:
+    """Solutions of four equations, shape (4, cells), by Gauss-Jordan elimination; A is of shape (4, 5, cells).
 
     It does without pivoting, because up to θ = 0.6 the diagonal stays away from zero.
     """
-    lines = [f"a{r}{s} = A[{(5 * r + s) * LANES} + lane]" for r in range(4) for s in range(5)]
+    A = A.copy()
     for r in range(4):
-        lines += [f"a{r}{s} = a{r}{s} / a{r}{r}" for s in range(4, r, -1)]
-        lines += [f"a{i}{s} = a{i}{s} - a{i}{r} * a{r}{s}" for i in range(4) if i != r for s in range(4, r, -1)]
-    return [*lines, *(f"c[{r * LANES} + lane] = a{r}4" for r in range(4))]
-
-
-def _make_fit() -> Callable[..., None]:
-    """Compiled (θ², plain weights, N, series, weights) -> None: writes the fitted weights of all cells to `weights`."""
-    terms = [f"A[{i * LANES} + lane] = A[{i * LANES} + lane] * x[lane] + terms[{i}]" for i in range(20)]
-    sums = ["w[lane] = plain" + "".join(f" + null[{r}] * c[{r * LANES} + lane]" for r in range(4))]
-    horner = compile_lanes("horner", "A, x, terms", terms, {})
-    solve = compile_lanes("solve", "A, c", _solve_lines(), {})
-    combine = compile_lanes("combine", "w, c, plain, null", sums, {})
-
-    def fit(squares: Any, plain: Any, null: Any, series: Any, weights: Any) -> None:
-        cells = len(squares)
-        for first in range(0, cells, LANES):
-            count = min(LANES, cells - first)
-            A, c, x, w = np.zeros(20 * LANES), np.zeros(4 * LANES), np.zeros(LANES), np.zeros(LANES)
-            x[:count] = squares[first : first + count]
-            for m in range(len(series) - 1, -1, -1):
-                horner(A, x, series[m])
-            solve(A, c)
-            for j in range(len(plain)):
-                combine(w, c, plain[j], null[j])
-                weights[first : first + count, j] = w[:count]
-
-    compiled: Callable[..., None] = serial(fit, "fit")
-    return compiled
-
-
-_fit = _make_fit()
+        A[r, r + 1 :] /= A[r, r]
+        for i in range(4):
+            if i != r:
+                A[i, r + 1 :] -= A[i, r] * A[r, r + 1 :]
+    return A[:, 4]
