@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
 from sweep.grid import Array, Grid
+from sweep.kernels.stability import stable_ranges
 from sweep.models import analytic, stability
-from sweep.models.model import FORMULAS, Columns, Model, Tier
-
-# Bodies that a thread handles at a time.  NumPy computes eigenvalues on one thread, in 0.2 ms a body, which counts
-# beside the 1 ms of a trajectory; so the bodies are shared among threads.  With fewer bodies at a time the calls
-# take longer than the arithmetic; with more, Ctrl-C has to wait longer.
-_PART = 1000
+from sweep.models.linear import fastest_spin
+from sweep.models.model import FORMULAS, Model, Tier
 
 
 @dataclass(frozen=True)
@@ -30,13 +25,14 @@ class Formulas:
 
 @dataclass(frozen=True)
 class Stability:
-    """The spins at which a model's rattle decays, over the bodies."""
+    """The spins at which a model's rattle decays."""
 
     n_c1: tuple[Array, Array]
-    """n_c1+ and n_c1- by the eigenvalues: infinite where the rattle decays at every spin, NaN where it does not decay
-    at rest.  NaN too for a model without formulas."""
+    """n_c1+ and n_c1- of the linear theory, over the bodies: infinite where the rattle decays at every spin, NaN where
+    it does not decay at rest.  NaN too for a model without formulas."""
     ranges: Array
-    """Ranges of spin in which the rattle decays, shape (6, bodies), as `stability.stable_ranges` gives them."""
+    """Ranges of spin in which the rattle decays, shape (6, cells), as `stability.stable_ranges` gives them: all those
+    that the trajectory of the cell can reach."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +53,23 @@ def predict(tier: Tier, grid: Grid) -> Prediction:
     if not isinstance(tier, Model):
         return prediction
     if prediction.formulas is None:
-        ranges = np.full((6, len(prediction.form_factor)), np.nan)
-    else:
-        ranges = _stable_ranges(tier, grid.bodies()[0].columns())
-    return replace(prediction, stability=Stability((ranges[1], ranges[0]), ranges))
+        nothing = np.full_like(prediction.form_factor, np.nan)
+        return replace(prediction, stability=Stability((nothing, nothing), np.full((6, grid.size), np.nan)))
+    return replace(prediction, stability=_stability(tier, grid))
+
+
+def _stability(model: Model, grid: Grid) -> Stability:
+    bodies, place = grid.bodies()
+    columns = bodies.columns()
+    near, covered = stable_ranges(model, columns)
+    ranges = near[:, place]
+    # A body may have ranges at spins that only some of its trajectories reach.
+    far = fastest_spin(model, grid.columns()) > covered[place]
+    if far.any():
+        some, again = np.unique(place[far], return_inverse=True)
+        all_of_them = stability.stable_ranges(model, {name: values[some] for name, values in columns.items()})
+        ranges[:, far] = all_of_them[:, again]
+    return Stability((near[1], near[0]), ranges)
 
 
 def formulas(tier: Tier, grid: Grid) -> Prediction:
@@ -70,10 +79,3 @@ def formulas(tier: Tier, grid: Grid) -> Prediction:
     if FORMULAS in tier.offers:
         found = Formulas(analytic.reversal_count(grid.columns()), analytic.critical_spins(bodies))
     return Prediction(analytic.form_factor(bodies), found, None)
-
-
-def _stable_ranges(model: Model, bodies: Columns) -> Array:
-    parts = np.array_split(np.arange(len(bodies["a"])), max(1, round(len(bodies["a"]) / _PART)))
-    some = [{name: values[part] for name, values in bodies.items()} for part in parts]
-    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-        return np.concatenate(list(pool.map(lambda each: stability.stable_ranges(model, each), some)), axis=1)

@@ -81,7 +81,7 @@ def plan(config: Config, grid: Grid | None = None, compiling: Callable[[], None]
     columns = grid.columns()
     prediction = predict(model, grid)
     assert prediction.stability is not None  # it is a model
-    stable = prediction.stability.ranges[:, grid.bodies()[1]]
+    stable = prediction.stability.ranges
     if integrator.method == AUTO:
         chosen = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:

@@ -18,9 +18,9 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.method import TOLERANCE, Method
+from sweep.kernels.stability import fastest_motion
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5, Tableau
-from sweep.models import linear
 from sweep.models.model import Array, Columns, Model
 
 
@@ -121,7 +121,7 @@ _LAYER_ERROR, _UNRESOLVED = 0.02, 3.0
 
 
 def _accurate_step(model: Model, columns: Columns, tolerance: float) -> Array:
-    motion = linear.fastest_motion(model, columns)
+    motion = fastest_motion(model, columns)
     step = model.radians_a_step * (tolerance / TOLERANCE) ** (1 / DOPRI5.order) / motion
     decay = model.fastest_decay(columns)
     if not decay.any():

@@ -6,6 +6,7 @@ import datetime
 import platform
 import subprocess
 from collections.abc import Iterable
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -40,12 +41,18 @@ def identify(config: Config) -> Identity:
     return Identity(config.to_yaml(), config.fingerprint(), *sources())
 
 
+@cache
 def sources() -> tuple[str, str]:
     """Hash of the decisive source files, and the versions of what compiles and runs them."""
-    own, libraries = metadata.version("rattleback-sweep"), ("numba", "llvmlite", "numpy")
-    found = [f"{name} {metadata.version(name)}" for name in libraries]
+    own, libraries = _version("rattleback-sweep"), ("numba", "llvmlite", "numpy")
+    found = [f"{name} {_version(name)}" for name in libraries]
     versions = ", ".join([f"sweep {own}", f"Python {platform.python_version()}", *found])
     return fingerprint(*map(str, decisive_sources())), versions
+
+
+@cache
+def _version(package: str) -> str:
+    return metadata.version(package)
 
 
 def this_cpu() -> str:
@@ -62,9 +69,9 @@ def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] =
         "source_hash": identity.source_hash,
         "versions": identity.versions,
         "integrator": _integrator_words(config),
-        "sweep_version": metadata.version("rattleback-sweep"),
+        "sweep_version": _version("rattleback-sweep"),
         "git_commit": _git_commit(),
-        **{f"{name}_version": metadata.version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
+        **{f"{name}_version": _version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
         "python_version": platform.python_version(),
         "cpu": ", ".join(sorted(set(cpus) or {this_cpu()})),
         "threads": numba.get_num_threads(),
@@ -86,6 +93,7 @@ def _integrator_words(config: Config) -> str:
     return f"{name}, fixed step, per trajectory by {rule}"
 
 
+@cache
 def _git_commit() -> str:
     """The commit of the checkout from which the package runs; "unknown" for an installed package."""
     root = _PACKAGE.parent

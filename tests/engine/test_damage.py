@@ -23,6 +23,7 @@ from support.same import contents
 import sweep
 from sweep.engine import executor, local
 from sweep.engine.reporter import Progress, Reporter
+from sweep.results import provenance
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity
@@ -190,6 +191,20 @@ def test_another_configuration_is_refused(config: Path, out: Path) -> None:
     assert "+ delta: 0.04" in result.stderr.replace("{", "").replace("}", "")
 
 
+@pytest.fixture
+def forgets() -> Iterator[None]:
+    """A process reads versions and sources once, as if they never changed while it runs."""
+
+    def forget() -> None:
+        provenance.sources.cache_clear()
+        provenance._version.cache_clear()
+
+    forget()
+    yield
+    forget()
+
+
+@pytest.mark.usefixtures("forgets")
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.campaign)], ids=["half", "whole"])
 @pytest.mark.parametrize("package", ["rattleback-sweep", "numba"])
 def test_another_version_is_refused(
@@ -203,12 +218,15 @@ def test_another_version_is_refused(
         patch.setattr(metadata, "version", lambda name: "9.9" if name == package else true(name))
         if package == "numba":
             patch.setattr(numba, "__version__", "9.9")
+        provenance.sources.cache_clear()
+        provenance._version.cache_clear()
         result = invoke("run", config, "--output", out)
     assert (result.exit_code, "not resumed, it comes from other versions: sweep" in result.stderr) == (2, True)
     assert f"{package.removeprefix('rattleback-')} 9.9" in result.stderr.partition(", now")[2]
     assert {path: path.read_bytes() for path in out.rglob("*.*") if path.is_file()} == before
 
 
+@pytest.mark.usefixtures("forgets")
 def test_other_sources_are_refused(config: Path, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweep.results.provenance.fingerprint", lambda *_: "0" * 16)
     result = invoke("run", config, "--output", out)

@@ -15,7 +15,7 @@ from support.kernels import finish, images, kernel, run, spin, threads
 import sweep
 from sweep import ConfigError
 from sweep.kernels.adams.method import accurate_step
-from sweep.kernels.adams.step import BDF, BDF_GAMMA, CORRECTOR_NODES, EXTRAPOLATE, HISTORY, PREDICTOR_NODES
+from sweep.kernels.adams.step import BDF, BDF_GAMMA, CORRECTOR_NODES, EXTRAPOLATE, PREDICTOR_NODES
 from sweep.kernels.adams.weights import fitted_weights, plain_weights
 from sweep.kernels.layout import LANES
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT

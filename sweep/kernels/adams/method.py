@@ -6,6 +6,7 @@ import numpy as np
 
 from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.method import Method
+from sweep.kernels.stability import fastest_motion
 from sweep.models import friction, linear, slip
 from sweep.models.ellipsoid import inertia
 from sweep.models.model import Array, Columns
@@ -33,7 +34,7 @@ def accurate_step(columns: Columns, tolerance: float) -> Array:
     adams = 7.6 * rise**1.54 * (1 + rise) ** 1.6 * reach**0.45
     bdf = 0.074 * rise**0.81 * reach**1.01 * np.minimum(1, 30 / np.maximum(resistance, 30)) ** 2
     phase = np.minimum((tolerance / adams) ** (1 / 7), (tolerance / bdf) ** (1 / 4))
-    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / linear.fastest_motion(slip.MODEL, columns))
+    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / fastest_motion(slip.MODEL, columns))
 
 
 METHOD = Method(

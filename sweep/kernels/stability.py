@@ -1,0 +1,408 @@
+"""The linear theory of `sweep.models.linear` and `sweep.models.stability` for models with slip, compiled.
+
+A rattle of the slip model has six states.  Friction makes the slip v decay much faster than the body rocks, so that in
+a slow rattle v = X z, where z are the four states of the rocking.  From
+
+    z' = A z + B v,   v' = C z + D v    follows    X = D⁻¹ (X (A + B X) - C),
+
+which is solved by iteration: each round gains the ratio of the two rates.  The rocking then has the characteristic
+polynomial λ⁴ + c3 λ³ + c2 λ² + c1 λ + c0 of A + B X, and it decays where
+
+    c3 > 0,  c1 > 0,  c0 > 0  and  c1 (c2 c3 - c1) - c3² c0 > 0
+
+(Routh and Hurwitz).  The coefficients are smooth functions of the spin, which a polynomial through few samples gives
+to rounding errors.  Changes of sign of the four functions of it are looked for from zero spin outwards.  A body of
+which anything remains in doubt is left to the eigenvalues: its slip may decay too slowly, the polynomial may not fit,
+or two changes may lie close together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numba
+import numpy as np
+
+from sweep.jit import OPTIONS, serial
+from sweep.kernels.codegen import compile_inline, tuple_of
+from sweep.models import analytic, linear, stability
+from sweep.models.model import Array, Columns, Model, stack
+
+# Samples of the coefficients, at Chebyshev points; the last two terms of their Chebyshev series must be below this
+# share of the largest.
+_NODES, _FITS = 13, 1e-10
+
+# Points on each side of zero at which signs are looked at, at distances that grow with the square of their number.
+_POINTS = 40
+
+# Spins are looked at up to this, in sqrt(g/c), or up to twice the paper's n_c1 if that is more; and if rattles grow
+# nowhere there, up to four times as far, and so on.
+_USUAL, _BEYOND, _WIDENED, _WIDER = 0.12, 2.0, 3, 4.0
+
+# Rounds of the iteration for X, beyond which the slip does not count as fast.
+_ROUNDS = 60
+
+# Two changes may lie between points if a parabola through three of them comes this near to zero, relative to the
+# sample in the middle.
+_NEAR = 0.2
+
+# Cells that a thread takes at a time.
+_PART = 256
+
+
+def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
+    """As `sweep.models.stability.stable_ranges`, shape (6, bodies), and the |spin| up to which no range is missing.
+
+    The range about zero is always found; of the ranges beyond it, those that begin within the |spin| in the second
+    array, shape (bodies,), which is infinite where the eigenvalues were asked.
+    """
+    if not _has_fast_slip(model):
+        return stability.stable_ranges(model, columns), np.full(len(columns["a"]), np.inf)
+    usual = _USUAL / np.sqrt(columns["c"])
+    limits = [np.fmax(usual, _BEYOND * np.abs(n_c1)) for n_c1 in analytic.critical_spins(columns)]
+    limits = np.minimum(np.stack(limits, axis=-1), stability.SPIN_LIMIT)
+    ranges = np.empty((len(limits), 6))
+    search, series = _search(model), _series()
+    _by_parts(lambda rows, limits, ranges: search(rows, limits, *series, ranges), _rows(model, columns), limits, ranges)
+    covered, doubtful = limits.min(axis=1), np.flatnonzero(np.isnan(ranges[:, 0]))
+    if len(doubtful):
+        ranges[doubtful] = stability.stable_ranges(model, _take(columns, doubtful)).T
+        covered[doubtful] = np.inf
+    return ranges.T, covered
+
+
+def fastest_motion(model: Model, columns: Columns) -> Array:
+    """As `sweep.models.linear.fastest_motion`."""
+    if not _has_fast_slip(model):
+        return linear.fastest_motion(model, columns)
+    motion = np.empty(len(columns["a"]))
+    _by_parts(_fastest(model), _rows(model, columns), linear.fastest_spin(model, columns), motion)
+    doubtful = np.flatnonzero(np.isnan(motion))
+    if len(doubtful):
+        motion[doubtful] = linear.fastest_motion(model, _take(columns, doubtful))
+    return motion
+
+
+def _has_fast_slip(model: Model) -> bool:
+    return len(model.states) == 7 and model.states[5:] == ("v1", "v2")
+
+
+def _rows(model: Model, columns: Columns) -> Array:
+    """The constants of the model, shape (cells, constants)."""
+    return np.ascontiguousarray(stack(tuple(model.constants.of(columns))).T)
+
+
+def _take(columns: Columns, cells: Array) -> Columns:
+    return {name: values[cells] for name, values in columns.items()}
+
+
+def _by_parts(function: Callable[..., None], *arrays: Array) -> None:
+    """Call a compiled function for some rows of the arrays at a time, on all threads."""
+    parts = [slice(begin, begin + _PART) for begin in range(0, len(arrays[0]), _PART)]
+    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
+        list(pool.map(lambda part: function(*(array[part] for array in arrays)), parts))
+
+
+def _make_jacobian(model: Model) -> Any:
+    """Compiled (rows, i, spin, J) -> None: the Jacobian of `sweep.models.linear`, of the body in row i, to J (6, 6)."""
+    rattle = [i for i in range(len(model.states)) if i != model.spin_state]
+    slopes = numba.njit(compile_inline("slopes", "def slopes(y, p):\n    return rhs(y, p)[0]", {"rhs": model.rhs}))
+    constants = " ".join(f"rows[i, {j}]," for j in range(len(model.constants._fields)))
+    lines = [f"p, y = Constants({constants}), upright(spin)"]
+    for column, state in enumerate(rattle):
+        shifted = tuple_of(f"y[{i}] + {'1e-30j' if i == state else '0j'}" for i in range(len(model.states)))
+        lines.append(f"slope = slopes({shifted}, p)")
+        lines += [f"J[{row}, {column}] = slope[{i}].imag * 1e30" for row, i in enumerate(rattle)]
+    source = "\n    ".join(["def jacobian(rows, i, spin, J):", *lines])
+    names = {"slopes": slopes, "Constants": model.constants, "upright": model.upright}
+    return numba.njit(compile_inline("jacobian", source, names), **OPTIONS)
+
+
+@numba.njit(**OPTIONS)
+def _quartic(J: Any, X: Any, c: Any) -> Any:
+    """Write c0 … c3 of the rocking to c, and X, of shape (2, 4), from J, of shape (6, 6).
+
+    False if the slip is not fast.
+    """
+    E = np.empty((2, 2))
+    determinant = J[4, 4] * J[5, 5] - J[4, 5] * J[5, 4]
+    E[0, 0], E[0, 1] = J[5, 5] / determinant, -J[4, 5] / determinant
+    E[1, 0], E[1, 1] = -J[5, 4] / determinant, J[4, 4] / determinant
+    G, W = np.empty((4, 4)), np.empty((2, 4))
+    for _ in range(_ROUNDS):
+        for i in range(4):
+            for j in range(4):
+                G[i, j] = J[i, j] + J[i, 4] * X[0, j] + J[i, 5] * X[1, j]
+        for i in range(2):
+            for j in range(4):
+                W[i, j] = X[i, 0] * G[0, j] + X[i, 1] * G[1, j] + X[i, 2] * G[2, j] + X[i, 3] * G[3, j] - J[4 + i, j]
+        change, size = 0.0, 0.0
+        for i in range(2):
+            for j in range(4):
+                new = E[i, 0] * W[0, j] + E[i, 1] * W[1, j]
+                change, size = max(change, abs(new - X[i, j])), max(size, abs(new))
+                X[i, j] = new
+        if change <= 4e-15 * size:
+            break
+    # The slip that is not slaved to the rocking: v' = F v.
+    F00, F01 = J[4, 4], J[4, 5]
+    F10, F11 = J[5, 4], J[5, 5]
+    for k in range(4):
+        F00, F01 = F00 - X[0, k] * J[k, 4], F01 - X[0, k] * J[k, 5]
+        F10, F11 = F10 - X[1, k] * J[k, 4], F11 - X[1, k] * J[k, 5]
+    trace, determinant = F00 + F11, F00 * F11 - F01 * F10
+    _characteristic(G, c)
+    # It decays without rocking by itself.
+    return (change <= 4e-15 * size) & (trace < 0.0) & (2.0 * determinant <= trace * trace) & (determinant > 0.0)
+
+
+@numba.njit(**OPTIONS)
+def _characteristic(G: Any, c: Any) -> None:
+    """Write the coefficients c0 … c3 of the characteristic polynomial of a matrix, of shape (4, 4), to c."""
+    c[:] = 0.0
+    for i in range(4):
+        c[3] -= G[i, i]
+        for j in range(i):
+            c[2] += G[i, i] * G[j, j] - G[i, j] * G[j, i]
+    for i in range(4):  # the minors that leave out i
+        p, q, r = (i + 1) % 4, (i + 2) % 4, (i + 3) % 4
+        c[1] -= (
+            G[p, p] * (G[q, q] * G[r, r] - G[q, r] * G[r, q])
+            - G[p, q] * (G[q, p] * G[r, r] - G[q, r] * G[r, p])
+            + G[p, r] * (G[q, p] * G[r, q] - G[q, q] * G[r, p])
+        )
+    for j in range(1, 4):  # by the minors of the first two rows, of the columns 0 and j, and of the other two
+        k, m = 1 + j % 3, 1 + (j + 1) % 3
+        c[0] += (G[0, 0] * G[1, j] - G[0, j] * G[1, 0]) * (G[2, k] * G[3, m] - G[2, m] * G[3, k])
+        c[0] += (G[0, k] * G[1, m] - G[0, m] * G[1, k]) * (G[2, 0] * G[3, j] - G[2, j] * G[3, 0])
+
+
+@cache
+def _series() -> tuple[Array, Array, Array]:
+    """Chebyshev points in [-1, 1], and matrices that turn values there into coefficients of powers, and of T_k."""
+    points = np.polynomial.chebyshev.chebpts1(_NODES)
+    chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(points, _NODES - 1))
+    powers = np.stack([np.pad(np.polynomial.chebyshev.cheb2poly(np.eye(k + 1)[k]), (0, _NODES - 1 - k))
+                       for k in range(_NODES)], axis=-1)  # fmt: skip
+    return points, powers @ chebyshev, chebyshev
+
+
+@numba.njit(**OPTIONS)
+def _functions(powers: Any, t: float, f: Any) -> None:
+    """Write to f the four functions that are positive where the rattle decays; `powers` as `fit` writes them."""
+    c0, c1, c2, c3 = 0.0, 0.0, 0.0, 0.0
+    for k in range(len(powers) - 1, -1, -1):
+        c0, c1, c2, c3 = c0 * t + powers[k, 0], c1 * t + powers[k, 1], c2 * t + powers[k, 2], c3 * t + powers[k, 3]
+    f[0], f[1], f[2], f[3] = c0, c1, c3, c1 * (c2 * c3 - c1) - c3 * c3 * c0
+
+
+@numba.njit(**OPTIONS)
+def _narrow(powers: Any, near: float, far: float, at_near: float, at_far: float, which: int) -> float:
+    """The t between `near` and `far` at which function `which`, of opposite signs there, vanishes (Illinois)."""
+    f, t = np.empty(4), near
+    for _ in range(60):
+        t = (near * at_far - far * at_near) / (at_far - at_near)
+        if t in (near, far):
+            break
+        _functions(powers, t, f)
+        if f[which] == 0.0:
+            break
+        if (f[which] > 0.0) == (at_far > 0.0):
+            far, at_far, at_near = t, f[which], 0.5 * at_near
+        else:
+            near, at_near, at_far = t, f[which], 0.5 * at_far
+    return t
+
+
+@numba.njit(**OPTIONS)
+def _may_touch(x: Any, y: Any, which: int) -> Any:
+    """Whether a parabola through three values of a function, of the same sign, comes near zero between them."""
+    first = (y[1, which] - y[0, which]) / (x[1] - x[0])
+    second = (y[2, which] - y[1, which]) / (x[2] - x[1])
+    bend = (second - first) / (x[2] - x[0])
+    if bend * y[1, which] <= 0.0:
+        return False
+    vertex = 0.5 * (x[0] + x[1] - first / bend)
+    if (vertex - x[0]) * (vertex - x[2]) >= 0.0:
+        return False
+    lowest = y[0, which] + first * (vertex - x[0]) + bend * (vertex - x[0]) * (vertex - x[1])
+    return lowest * y[1, which] <= _NEAR * y[1, which] * y[1, which]
+
+
+@numba.njit(**OPTIONS)
+def _changes(powers: Any, zero: float, end: float, found: Any) -> int:
+    """Write the first three changes between `zero`, the t of zero spin, and `end` to `found`.
+
+    Returns which function vanishes at the first one, or -1 if anything is in doubt.
+    """
+    x, y = np.zeros(3), np.zeros((3, 4))
+    n, stable, first = 0, True, 0
+    found[:] = np.nan
+    x[2] = zero
+    _functions(powers, zero, y[2])
+    if not y[2].min() > 0.0:
+        return -1
+    for k in range(1, _POINTS + 1):
+        x[0], x[1], x[2] = x[1], x[2], zero + (end - zero) * (k / _POINTS) ** 2
+        y[0], y[1] = y[1], y[2]
+        _functions(powers, x[2], y[2])
+        differ, which = 0, 0
+        for i in range(4):
+            if (y[1, i] > 0.0) != (y[2, i] > 0.0):
+                differ, which = differ + 1, i
+            elif k > 1 and (y[0, i] > 0.0) == (y[1, i] > 0.0) and _may_touch(x, y, i):
+                return -1
+        # Two functions that change at once may do so in either order; one that changes while another is negative
+        # makes no difference.
+        if differ > 1:
+            return -1
+        if differ == 1 and (y[2].min() > 0.0) != stable:
+            stable = not stable
+            found[n] = _narrow(powers, x[1], x[2], y[1, which], y[2, which], which)
+            first = which if n == 0 else first
+            n += 1
+            if n == len(found):
+                break
+    return first
+
+
+@numba.njit(**OPTIONS)
+def _sample(polynomial: Any, spin: float, X: Any, c: Any) -> Any:
+    """As `_quartic`, at a spin."""
+    J = np.empty((6, 6))
+    for i in range(6):
+        for j in range(6):
+            J[i, j] = polynomial[0, i, j] + spin * (polynomial[1, i, j] + spin * polynomial[2, i, j])
+    return _quartic(J, X, c)
+
+
+@numba.njit(**OPTIONS)
+def _fit(polynomial: Any, low: float, high: float, series: Any, powers: Any) -> Any:
+    """Write c0 … c3 as polynomials in t to `powers`, where t = -1 … 1 is the spin from `low` to `high`.
+
+    False if the slip is not fast or the polynomials do not fit.
+    """
+    points, to_powers, to_chebyshev = series
+    X, c = np.zeros((2, 4)), np.empty((_NODES, 4))
+    for k in range(_NODES):
+        if not _sample(polynomial, 0.5 * (low + high) + 0.5 * (high - low) * points[k], X, c[k]):
+            return False
+    for i in range(4):
+        largest, last = 0.0, 0.0
+        for k in range(_NODES):
+            power, term = 0.0, 0.0
+            for j in range(_NODES):
+                power, term = power + to_powers[k, j] * c[j, i], term + to_chebyshev[k, j] * c[j, i]
+            powers[k, i] = power
+            largest, last = max(largest, abs(term)), max(last, abs(term)) if k >= _NODES - 2 else 0.0
+        if last > _FITS * largest:
+            return False
+    return True
+
+
+@numba.njit(**OPTIONS)
+def _polish(polynomial: Any, low: float, high: float, powers: Any, t: float, which: int) -> float:
+    """The spin at which function `which` vanishes, from the t at which its polynomial does: two steps of Newton."""
+    half = 0.5 * (high - low)
+    X, c, f = np.zeros((2, 4)), np.empty((1, 4)), np.empty((2, 4))
+    _functions(powers, t - 1e-5, f[0])
+    _functions(powers, t + 1e-5, f[1])
+    slope, spin = (f[1, which] - f[0, which]) / (2e-5 * half), 0.5 * (low + high) + half * t
+    for _ in range(2):
+        _sample(polynomial, spin, X, c[0])
+        _functions(c, 0.0, f[0])
+        spin -= f[0, which] / slope
+    return spin
+
+
+@cache
+def _search(model: Model) -> Any:
+    """Compiled (rows, limits, points, to_powers, to_chebyshev, ranges) -> None: NaN for a body that remains in doubt.
+
+    rows : constants, shape (bodies, constants)
+    limits : |spin| up to which to look on the positive and on the negative side, shape (bodies, 2)
+    ranges : shape (bodies, 6)
+    """
+    jacobian = _make_jacobian(model)
+
+    @numba.njit(**OPTIONS)
+    def expand(rows: Any, body: int, polynomial: Any) -> None:
+        """Write J0, J1 and J2 of J = J0 + n J1 + n² J2."""
+        for k in range(3):
+            jacobian(rows, body, (0.0, 1.0, -1.0)[k], polynomial[k])
+        for i in range(6):
+            for j in range(6):
+                plus, minus = polynomial[1, i, j], polynomial[2, i, j]
+                polynomial[1, i, j] = 0.5 * (plus - minus)
+                polynomial[2, i, j] = 0.5 * (plus + minus) - polynomial[0, i, j]
+
+    def search(rows: Any, limits: Any, points: Any, to_powers: Any, to_chebyshev: Any, ranges: Any) -> None:
+        polynomial, powers, found = np.empty((3, 6, 6)), np.empty((_NODES, 4)), np.empty((2, 3))
+        for body in range(len(rows)):
+            ranges[body] = np.nan
+            expand(rows, body, polynomial)
+            high, low = limits[body, 0], -limits[body, 1]
+            for _ in range(_WIDENED + 1):
+                if not _fit(polynomial, low, high, (points, to_powers, to_chebyshev), powers):
+                    break
+                zero = -(high + low) / (high - low)
+                above, below = _changes(powers, zero, 1.0, found[0]), _changes(powers, zero, -1.0, found[1])
+                if above < 0 or below < 0:
+                    break
+                if not np.isnan(found[0, 0] + found[1, 0]):
+                    ranges[body, 0] = _polish(polynomial, low, high, powers, found[1, 0], below)
+                    ranges[body, 1] = _polish(polynomial, low, high, powers, found[0, 0], above)
+                    half, middle = 0.5 * (high - low), 0.5 * (high + low)
+                    # A range that does not end where it is looked for goes on.
+                    if not np.isnan(found[1, 1]):
+                        ranges[body, 2] = -np.inf if np.isnan(found[1, 2]) else middle + half * found[1, 2]
+                        ranges[body, 3] = middle + half * found[1, 1]
+                    if not np.isnan(found[0, 1]):
+                        ranges[body, 4] = middle + half * found[0, 1]
+                        ranges[body, 5] = np.inf if np.isnan(found[0, 2]) else middle + half * found[0, 2]
+                    break
+                high *= _WIDER if np.isnan(found[0, 0]) else 1.0
+                low *= _WIDER if np.isnan(found[1, 0]) else 1.0
+
+    return serial(search, f"stability-{model.name}")
+
+
+@cache
+def _fastest(model: Model) -> Any:
+    """Compiled (rows, reach, motion) -> None: the fastest motion of each cell, NaN where it remains in doubt."""
+    jacobian = _make_jacobian(model)
+
+    @numba.njit(**OPTIONS)
+    def moving(half_trace: float, square: float) -> float:
+        """|λ| of a pair with this sum of half its λ and this |λ|², if it moves more than it decays; else 0."""
+        return np.sqrt(square) if -half_trace <= np.sqrt(max(square - half_trace * half_trace, 0.0)) else 0.0
+
+    @numba.njit(**OPTIONS)
+    def largest(c: Any) -> Any:
+        """|λ| of the faster pair that moves; NaN if the polynomial has real roots."""
+        if c[2] * c[2] < 4.0 * c[0] or c[2] <= 0.0:
+            return np.nan
+        root = 1j * np.sqrt(0.5 * (c[2] + np.sqrt(c[2] * c[2] - 4.0 * c[0])))
+        for _ in range(20):
+            value = (((root + c[3]) * root + c[2]) * root + c[1]) * root + c[0]
+            change = value / (((4.0 * root + 3.0 * c[3]) * root + 2.0 * c[2]) * root + c[1])
+            root = root - change
+            if abs(change) <= 1e-12 * abs(root):
+                square = root.real * root.real + root.imag * root.imag
+                return max(moving(root.real, square), moving(-0.5 * c[3] - root.real, c[0] / square))
+        return np.nan
+
+    def fastest(rows: Any, reach: Any, motion: Any) -> None:
+        J, X, c = np.empty((6, 6)), np.zeros((2, 4)), np.empty(4)
+        for cell in range(len(rows)):
+            motion[cell] = 0.0
+            for sign in (1.0, -1.0):
+                X[:] = 0.0
+                jacobian(rows, cell, sign * reach[cell], J)
+                sound = _quartic(J, X, c)
+                motion[cell] = max(motion[cell], largest(c)) if sound else np.nan
+
+    return serial(fastest, f"fastest-motion-{model.name}")
