@@ -145,25 +145,41 @@ def trajectory(config: Path, cells: tuple[str, ...], output: Path | None, settin
               help="Relative width of the brackets from simulation.")  # fmt: skip
 @OUTPUT
 @SETTINGS
+@click.option("--dry-run", is_flag=True, help="Print bodies, simulations and estimated time; compute nothing.")
+@click.option("--fresh", is_flag=True, help="Discard what an earlier search left instead of resuming it.")
 @QUIET
-def critical(config: Path, width: float, output: Path | None, settings: tuple[str, ...], quiet: bool) -> None:
+def critical(
+    config: Path, width: float, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool, quiet: bool
+) -> None:
     """Find the critical spins over all axes of CONFIG except n0.
 
     They come from the paper's formulas, from the model's linear stability, and from simulation.
-    Writes NAME_critical.nc and .png.
+    Writes NAME_critical.nc and .png.  If it is interrupted, finished simulations are kept, and the
+    same command resumes the search.
     """
     with _explained():
-        from sweep.plots import critical as critical_plot
-        from sweep.results.folder import RunFiles
+        checked = _load(config, settings)
+        if dry_run:
+            from sweep.studies.critical import estimate
+
+            click.echo(estimate(checked))
+            return
+        from sweep.progress import Terminal
         from sweep.studies.critical import critical as search
         from sweep.studies.critical import remarks
 
-        checked = _load(config, settings)
-        result = search(checked, width, lambda message: None if quiet else click.echo(message, err=True))
-        files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_critical")
-        files.save_result(result, critical_plot.draw(result))
+        folder = output or Path("runs") / checked.name
+        with Terminal(quiet, "bodies") as terminal:
+            try:
+                result = search(checked, width, folder, fresh=fresh, reporter=terminal)
+            except KeyboardInterrupt:
+                done = f"{terminal.last.done:.0f} of {terminal.last.cells} bodies" if terminal.last else "no body"
+                terminal.note(f"interrupted: {done} settled, all simulations kept; the same command resumes the search")
+                sys.exit(INTERRUPTED)
+        if found := remarks(result):
+            _say("\n".join(found), err=quiet)
         if not quiet:
-            _say("\n".join([*remarks(result), f"wrote {files.dataset} and .png"]))
+            _say(f"wrote {folder / checked.name}_critical.nc and .png")
 
 
 @main.command()

@@ -10,15 +10,16 @@ from sweep.engine.reporter import Reporter
 
 
 class Terminal(Reporter):
-    """A bar with the cells done, failures so far, trajectories per second and time left."""
+    """A bar with what is done and the time left; of cells also failures so far and trajectories per second."""
 
-    def __init__(self, quiet: bool = False) -> None:
+    def __init__(self, quiet: bool = False, unit: str = "cells") -> None:
         self.console = Console(stderr=True, quiet=quiet, highlight=False)
         self.last: Done | None = None
+        cells = TextColumn("{task.fields[failed]} failed · {task.fields[rate]:.3g} trajectories/s ·")
         self._bar = Progress(
-            TextColumn("{task.completed:.0f}/{task.total:.0f} cells"),
+            TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"),
             BarColumn(),
-            TextColumn("{task.fields[failed]} failed · {task.fields[rate]:.3g} trajectories/s ·"),
+            *([cells] if unit == "cells" else []),
             TimeRemainingColumn(compact=True),
             TextColumn("left"),
             console=self.console,
@@ -43,5 +44,5 @@ class Terminal(Reporter):
         rate = (progress.done - progress.done_before) / progress.seconds
         if self._task is None:
             self._bar.start()
-            self._task = self._bar.add_task("cells", total=progress.cells, failed=0, rate=0.0)
+            self._task = self._bar.add_task("", total=progress.cells, failed=0, rate=0.0)
         self._bar.update(self._task, total=progress.cells, completed=progress.done, failed=progress.failed, rate=rate)

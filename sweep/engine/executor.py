@@ -16,6 +16,9 @@ from sweep.kernels.status import RUNNING
 CHUNK_SECONDS = 0.7
 """Length of a chunk.  Progress, checkpoints and Ctrl-C wait for the end of one."""
 
+STEP_SECONDS = 25e-9
+"""Rough time of a step of one lane on one thread, measured on the slip model with dopri5 (`sweep bench`)."""
+
 _MOST_BLOCKS = 2**40
 
 
@@ -26,6 +29,7 @@ def execute(
     stop_when_settled: bool,
     after_chunk: Callable[[], None] | None = None,
     chunk_blocks: int | None = None,
+    chunk_seconds: float | None = None,
 ) -> None:
     """Advance all unfinished `images`, in place, until every trajectory has ended.
 
@@ -35,7 +39,8 @@ def execute(
     stop_when_settled : end a trajectory as soon as its spin can no longer reverse
     after_chunk : called after each chunk, when `images` is consistent: to report, save, or stop
         by raising an exception
-    chunk_blocks : blocks of steps per chunk; by default as many as take about `CHUNK_SECONDS`
+    chunk_blocks : blocks of steps per chunk; by default as many as take about `chunk_seconds`
+    chunk_seconds : by default `CHUNK_SECONDS`
 
     Notes
     -----
@@ -53,23 +58,20 @@ def execute(
         kernel.advance(images, pending, blocks, stop_when_settled)
         kernel.carry(images)
         if chunk_blocks is None:
-            blocks = _rescale(blocks, time.perf_counter() - chunk_began)
+            blocks = _rescale(blocks, time.perf_counter() - chunk_began, chunk_seconds or CHUNK_SECONDS)
         if after_chunk:
             after_chunk()
 
 
-def _rescale(blocks: int, seconds: float) -> int:
+def _rescale(blocks: int, seconds: float, wanted: float) -> int:
     # While the last trajectories pause often, every call is short, and `blocks` would grow without end.
-    return min(max(1, int(blocks * np.clip(CHUNK_SECONDS / seconds, 0.25, 8))), _MOST_BLOCKS)
+    return min(max(1, int(blocks * np.clip(wanted / seconds, 0.25, 8))), _MOST_BLOCKS)
 
 
 def nominal_seconds(images: Array, kernel: Kernel) -> float:
-    """Rough upper bound on the time for `images`, as if each were stepped to its time limit.
-
-    Assumes 25 ns per step and lane on one thread, measured on the slip model with dopri5 (`sweep bench`).
-    """
+    """Rough upper bound on the time for `images`, as if each were stepped to its time limit."""
     goal = images[:, kernel.row("goal")] - images[:, kernel.row("done")]
     threads = numba.get_num_threads()
     lanes = max(threads * LANES, len(images))
     blocks = np.ceil(goal / BLOCK)
-    return float(max(blocks.mean() * lanes / threads, blocks.max() * LANES) * BLOCK * 25e-9)
+    return float(max(blocks.mean() * lanes / threads, blocks.max() * LANES) * BLOCK * STEP_SECONDS)

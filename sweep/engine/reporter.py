@@ -17,9 +17,10 @@ class Progress:
 
     cells: int
     """To be simulated in all, as far as known: a refined run adds more with each pass."""
-    done: int
+    done: float
+    """A fraction where parts of a cell count, as in a search."""
     failed: int
-    done_before: int
+    done_before: float
     """Of `done`, those finished by an earlier run."""
     seconds: float
     """Since this run began."""

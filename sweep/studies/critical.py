@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, Fault, Values
+from sweep.engine.reporter import Reporter
 from sweep.grid import Array, Grid
+from sweep.jit import fingerprint
 from sweep.models import MODELS
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
-from sweep.results import dataset
+from sweep.results import dataset, netcdf
+from sweep.results.checkpoint import Checkpoint
 from sweep.results.dataset import DISAGREES, EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
-from sweep.results.provenance import provenance
+from sweep.results.folder import RunFiles
+from sweep.results.identity import Identity
+from sweep.results.memory import Memory
+from sweep.results.provenance import identify, provenance
+from sweep.results.store import Store
 from sweep.studies import bracket
 from sweep.studies.bracket import Bracket
 from sweep.studies.growth import find_n_c1
-from sweep.studies.reversing import find_n_c2
+from sweep.studies.reversing import USUAL, body_seconds, find_n_c2
+from sweep.studies.rounds import Rounds
+from sweep.studies.settled import Settled
 from sweep.studies.stepwise import stepwise
 
 WIDTH = 1e-3
@@ -31,6 +41,9 @@ _ERROR = 1e-4
 
 # Bodies searched together (about 100 MB of images).
 _GROUP = 4096
+
+# Bodies by which the time for all others is judged.
+_SAMPLE = 256
 
 _REMARKS = {
     NO_FRICTION: "without friction",
@@ -51,7 +64,14 @@ _REASON_OF = {
 }
 
 
-def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] = lambda _: None) -> xr.Dataset:
+def critical(
+    config: Config,
+    width: float = WIDTH,
+    output: str | Path | None = None,
+    *,
+    fresh: bool = False,
+    reporter: Reporter | None = None,
+) -> xr.Dataset:
     """Critical spins over all axes of `config` except n0.
 
     n_c1 is the first spin, outwards from zero, at which a tiny rattle grows.  n_c2 is the first spin, outwards from
@@ -60,7 +80,10 @@ def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] =
     Parameters
     ----------
     width : of the brackets, relative to the spin
-    note : called with a line before each search
+    output : folder for NAME_critical.nc and .png; until they are finished it holds a checkpoint, from which the same
+        call resumes.  By default nothing is written
+    fresh : discard what an earlier search left in `output`
+    reporter : receives progress, counted in bodies, and messages; by default there are none
 
     Returns
     -------
@@ -72,32 +95,52 @@ def critical(config: Config, width: float = WIDTH, note: Callable[[str], None] =
     ------
     ConfigError
         if the model is a formula, or the start point is an axis.
+    StoreError
+        if what `output` holds cannot be used.
     """
-    stepwise(config)  # raises if there is nothing to simulate
-    if beyond := sorted((START - {"n0"}) & set(config.axes)):
-        raise ConfigError([Fault("critical", None, None, ("start", beyond[0]), "an axis; allowed: a number")])
-    config = _without_n0(config)
+    config, reporter = _searchable(config), reporter or Reporter()
+    if output is None:
+        return _search(config, width, Memory(), reporter)
+    files, identity = RunFiles(Path(output), f"{config.name}_critical"), _identify(config, width)
+    with files.locked():
+        if fresh:
+            files.discard()
+        if files.has_dataset(identity):
+            reporter.note(f"{files.dataset}: already complete, nothing to compute")
+        else:
+            files.picture.unlink(missing_ok=True)  # of a dataset that is gone
+            store = Checkpoint(files.checkpoint, identity, reporter.note)
+            netcdf.write(files.dataset, _search(config, width, store, reporter))
+        files.discard_checkpoint()
+        result = netcdf.open_dataset(files.dataset)
+        if not files.picture.exists():
+            from sweep.plots import critical as plots  # matplotlib takes a third of the time of `import sweep`
+
+            files.save_picture(plots.draw(result))
+    return result
+
+
+def estimate(config: Config) -> str:
+    """Bodies, simulations and time of a search, a line each, told from a sample of the bodies.
+
+    Raises
+    ------
+    ConfigError
+        as `critical`.
+    """
+    config = _searchable(config)
     grid = Grid.of(config)
-    prediction = predict(MODELS[config.model], grid)
-    arrays: dict[str, Array] = dict(dataset.predicted(prediction))
-    arrays.pop("reversals_predicted", None)
-    reasons = np.full((2, 2, grid.size), NO_FRICTION)
-    ends = np.full((2, 2, 2, grid.size), np.nan)
-    searched = np.flatnonzero(_decays_at_rest(prediction, grid))
-    for begin in range(0, len(searched), _GROUP):
-        cells = searched[begin : begin + _GROUP]
-        for event, found in enumerate(_search(config, grid, prediction, cells, width, note)):
-            ends[event][:, :, cells], reasons[event][:, cells] = found
-    for event, name in enumerate(("n_c1", "n_c2")):
-        for side, inner, outer, reason in zip(("plus", "minus"), *ends[event], reasons[event], strict=True):
-            arrays[f"{name}_{side}_simulated"] = (inner + outer) / 2
-            arrays[f"{name}_{side}_simulated_inner"] = inner
-            arrays[f"{name}_{side}_simulated_outer"] = outer
-            arrays[f"{name}_{side}_reason"] = reason
-    four = reasons.reshape(4, -1)
-    arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(grid.size)]
-    attributes = {"relative_width": width, **provenance(config, 0.0, grid.size)}
-    return dataset.label(config, grid, arrays, attributes).drop_vars("n0")
+    axes = " × ".join(f"{name} {len(values)}" for name, values in grid.axes.items())
+    if grid.cases is not None:
+        axes = f"case {grid.size}"
+    usual, most = (grid.size * seconds for seconds in body_seconds(config, grid.sample(_SAMPLE).columns()))
+    return "\n".join(
+        [
+            f"bodies:      {grid.size} ({axes or 'one body'}), each with spins of both signs",
+            f"simulations: about {USUAL} for each n_c2, to t = {config.integrator.t_end:g} at most",
+            f"time:        about {usual:.3g} s; at most about {most:.3g} s, if every simulation runs to t_end",
+        ]
+    )
 
 
 def remarks(result: xr.Dataset) -> list[str]:
@@ -111,11 +154,57 @@ def remarks(result: xr.Dataset) -> list[str]:
     return lines
 
 
-def _without_n0(config: Config) -> Config:
-    """`config` with a single start spin, since no critical spin depends on it."""
+def _searchable(config: Config) -> Config:
+    """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
+    stepwise(config)  # raises if there is nothing to simulate
+    if beyond := sorted((START - {"n0"}) & set(config.axes)):
+        raise ConfigError([Fault("critical", None, None, ("start", beyond[0]), "an axis; allowed: a number")])
     parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
     return replace(config, parameters=parameters, cases=cases or None)
+
+
+def _identify(config: Config, width: float) -> Identity:
+    """What a search depends on: what a run does, the width, and the sources of the search."""
+    run, search = identify(config), fingerprint(*(str(path) for path in sorted(Path(__file__).parent.glob("*.py"))))
+    return replace(
+        run,
+        config=f"{run.config}# width of the brackets: {width!r}\n",
+        config_hash=f"{run.config_hash}-{width!r}",
+        source_hash=f"{run.source_hash}-{search}",
+    )
+
+
+def _search(config: Config, width: float, store: Store, reporter: Reporter) -> xr.Dataset:
+    """Search the critical spins of all bodies; rounds that `store` has are not simulated again."""
+    if store.done or store.load_running():
+        reporter.note(f"resuming an earlier search, which finished {len(store.done)} rounds of simulations")
+    grid = Grid.of(config)
+    prediction = predict(MODELS[config.model], grid)
+    arrays: dict[str, Array] = dict(dataset.predicted(prediction))
+    arrays.pop("reversals_predicted", None)
+    reasons = np.full((2, 2, grid.size), NO_FRICTION)
+    ends = np.full((2, 2, 2, grid.size), np.nan)
+    searched = np.flatnonzero(_decays_at_rest(prediction, grid))
+    settled = Settled(reporter, grid.size, len(searched))
+    rounds = Rounds(store, settled.advanced)
+    for begin in range(0, len(searched), _GROUP):
+        cells = searched[begin : begin + _GROUP]
+        group = _Group(config, grid, prediction, cells, width, rounds, settled, reporter)
+        for event, found in enumerate(group.search()):
+            ends[event][:, :, cells], reasons[event][:, cells] = found
+        settled.group(len(cells))
+    for event, name in enumerate(("n_c1", "n_c2")):
+        for side, inner, outer, reason in zip(("plus", "minus"), *ends[event], reasons[event], strict=True):
+            arrays[f"{name}_{side}_simulated"] = (inner + outer) / 2
+            arrays[f"{name}_{side}_simulated_inner"] = inner
+            arrays[f"{name}_{side}_simulated_outer"] = outer
+            arrays[f"{name}_{side}_reason"] = reason
+    four = reasons.reshape(4, -1)
+    arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(grid.size)]
+    origin = provenance(config, rounds.seconds, grid.size) | _identify(config, width).__dict__
+    attributes = {"relative_width": width, **origin}
+    return dataset.label(config, grid, arrays, attributes).drop_vars("n0")
 
 
 def _decays_at_rest(prediction: Prediction, grid: Grid) -> Array:
@@ -126,33 +215,48 @@ def _decays_at_rest(prediction: Prediction, grid: Grid) -> Array:
     return np.asarray((grid.columns()["mu"] > 0) & ~np.isnan(prediction.stability.n_c1[0]))
 
 
-def _search(
-    config: Config, grid: Grid, prediction: Prediction, cells: Array, width: float, note: Callable[[str], None]
-) -> Iterator[tuple[Array, Array]]:
-    """For n_c1 and for n_c2: the ends of the brackets, shape (2, 2, cells), and the reasons, shape (2, cells).
+@dataclass(frozen=True)
+class _Group:
+    """Bodies whose spins of both signs are searched together, so that their simulations share the threads."""
 
-    The axes are inner and outer end, positive and negative side, cells.
-    """
-    assert prediction.formulas is not None
-    assert prediction.stability is not None
-    bodies = {name: np.tile(values[cells], 2) for name, values in grid.columns().items()}
-    sign = np.repeat([1.0, -1.0], len(cells))
-    uncoupled = np.isnan(prediction.formulas.n_c1[0][np.tile(cells, 2)])
-    linear = np.abs(np.concatenate([n_c1[cells] for n_c1 in prediction.stability.n_c1]))
+    config: Config
+    grid: Grid
+    prediction: Prediction
+    cells: Array
+    """Indices of the bodies in the grid."""
+    width: float
+    rounds: Rounds
+    settled: Settled
+    reporter: Reporter
 
-    note(f"n_c1 of {len(cells)} bodies")
-    first = find_n_c1(config, bodies, sign, width)
-    reason = _reasons(first)
-    reason[(reason == NOT_FOUND) & uncoupled] = NO_COUPLING
-    reason[(first.outcome != bracket.FAILED) & ~_agrees(first, linear, width)] = DISAGREES
-    yield (sign * [first.inner, first.outer]).reshape(2, 2, -1), reason.reshape(2, -1)
+    def search(self) -> Iterator[tuple[Array, Array]]:
+        """For n_c1 and for n_c2: the ends of the brackets, shape (2, 2, cells), and the reasons, shape (2, cells).
 
-    note(f"n_c2 of {len(cells)} bodies")
-    at = np.flatnonzero(first.outcome == bracket.HAPPENS)
-    second = find_n_c2(config, {name: values[at] for name, values in bodies.items()}, (sign * first.outer)[at], width)
-    ends, reason = np.full((2, len(sign)), np.nan), reason.copy()
-    ends[:, at], reason[at] = sign[at] * [second.inner, second.outer], _reasons(second)
-    yield ends.reshape(2, 2, -1), reason.reshape(2, -1)
+        The axes are inner and outer end, positive and negative side, cells.
+        """
+        assert self.prediction.formulas is not None
+        assert self.prediction.stability is not None
+        cells, width, compiling = self.cells, self.width, self.reporter.compiling
+        bodies = {name: np.tile(values[cells], 2) for name, values in self.grid.columns().items()}
+        sign = np.repeat([1.0, -1.0], len(cells))
+        uncoupled = np.isnan(self.prediction.formulas.n_c1[0][np.tile(cells, 2)])
+        linear = np.abs(np.concatenate([n_c1[cells] for n_c1 in self.prediction.stability.n_c1]))
+        stable = np.tile(self.prediction.stability.ranges[:, cells], 2)
+
+        settled = self.settled.first
+        first = find_n_c1(self.config, bodies, sign, linear, width, self.rounds, settled, compiling)
+        reason = _reasons(first)
+        reason[(reason == NOT_FOUND) & uncoupled] = NO_COUPLING
+        reason[(first.outcome != bracket.FAILED) & ~_agrees(first, linear, width)] = DISAGREES
+        yield (sign * [first.inner, first.outer]).reshape(2, 2, -1), reason.reshape(2, -1)
+
+        at = np.flatnonzero(first.outcome == bracket.HAPPENS)
+        ends, reason = np.full((2, len(sign)), np.nan), reason.copy()
+        theirs, begin = {name: values[at] for name, values in bodies.items()}, (sign * first.outer)[at]
+        settled = self.settled.second
+        second = find_n_c2(self.config, theirs, begin, stable[:, at], width, self.rounds, settled, compiling)
+        ends[:, at], reason[at] = sign[at] * [second.inner, second.outer], _reasons(second)
+        yield ends.reshape(2, 2, -1), reason.reshape(2, -1)
 
 
 def _reasons(found: Bracket) -> Array:

@@ -7,22 +7,24 @@ The disturbances at the end make up the propagator of the linear motion, whose l
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine import executor
 from sweep.engine.plan import plan
 from sweep.grid import Array, Grid
 from sweep.kernels.kernel import Kernel
+from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import TIME_LIMIT
 from sweep.kernels.tableau import DOPRI5
 from sweep.models.linear import jacobian
 from sweep.models.model import Columns, Model, stack
 from sweep.models.rocking import slower_period
 from sweep.models.stability import SPIN_LIMIT
-from sweep.studies.bracket import FAILED, HAPPENS, NOT_YET, Bracket, search
+from sweep.studies.bracket import FAILED, HAPPENS, NOT_YET, Bracket, Question, search
+from sweep.studies.rounds import Batch, Rounds, Simulations
 from sweep.studies.stepwise import stepwise
 
 TINY = 1e-30
@@ -42,26 +44,44 @@ _GROWTH = 10.0
 _BELOW_ALL = 0.02
 
 
-def find_n_c1(config: Config, bodies: Columns, sign: Array, width: float) -> Bracket:
+def find_n_c1(
+    config: Config,
+    bodies: Columns,
+    sign: Array,
+    expected: Array,
+    width: float,
+    rounds: Rounds,
+    settled: Callable[[Array], None] = lambda share: None,  # noqa: ARG005
+    compiling: Callable[[], None] = lambda: None,
+) -> Bracket:
     """The first |spin|, outwards from zero, at which a tiny rattle grows.
 
     Parameters
     ----------
     bodies : parameters, each of shape (cells,); the start is of no account
     sign : of all spins, shape (cells,)
+    expected : |spin| that the eigenvalues give, shape (cells,).  Where it is right, all spins of the search are
+        simulated at once.  Growth is simulated below it all the same, and the bracket lies wherever that begins
+    rounds : run or recall the simulations
+    settled : as of `bracket.search`
+    compiling : called before a kernel is compiled
     """
     first = {name: values[:1] for name, values in bodies.items()}
-    (part,) = plan(replace(stepwise(config), measure=()), Grid({}, {}, first)).parts
+    (part,) = plan(replace(stepwise(config), measure=()), Grid({}, {}, first), compiling).parts
 
-    def ask(cells: Array, size: Array) -> Array:
-        growth = simulated_growth(part.kernel, {name: v[cells] for name, v in bodies.items()}, sign[cells] * size)
-        return np.where(np.isnan(growth), FAILED, np.where(growth >= 0, HAPPENS, NOT_YET))
+    def growth(cells: Array, spin: Array) -> Array:
+        return simulated_growth(part.kernel, {name: v[cells] for name, v in bodies.items()}, spin, rounds)
 
-    decay = -simulated_growth(part.kernel, bodies, np.zeros(len(sign)))
-    return search(ask, np.fmax(_BELOW_ALL * decay, 1e-12), SPIN_LIMIT, width)
+    def ask(question: Question) -> tuple[Array, Array]:
+        rate = growth(question.search, sign[question.search] * question.size)
+        return np.where(np.isnan(rate), FAILED, np.where(rate >= 0, HAPPENS, NOT_YET)), -rate
+
+    decay = -growth(np.arange(len(sign)), np.zeros(len(sign)))
+    begin = np.fmax(_BELOW_ALL * decay, 1e-12)
+    return search(ask, begin, SPIN_LIMIT, width, expected, precisely=True, settled=settled)
 
 
-def simulated_growth(kernel: Kernel, bodies: Columns, spin: Array) -> Array:
+def simulated_growth(kernel: Kernel, bodies: Columns, spin: Array, rounds: Rounds) -> Array:
     """Growth rate of the rattle at constant `spin`, in sqrt(g/c), shape (cells,): negative where it decays.
 
     NaN where a simulation failed.
@@ -70,25 +90,32 @@ def simulated_growth(kernel: Kernel, bodies: Columns, spin: Array) -> Array:
     ----------
     kernel : of dopri5, as the states that its images start from are replaced
     bodies : physical parameters, each of shape (cells,); the start point is of no account
+    rounds : run or recall the simulations
     """
     model = kernel.model
     columns = {**bodies, "n0": spin, "x0": np.zeros_like(spin), "y0": np.zeros_like(spin)}
     rattle = [i for i in range(len(model.states)) if i != model.spin_state]
     duration, step = _duration_and_step(model, columns)
-    images = np.repeat(kernel.images(columns, step, duration), len(rattle), axis=0)
-    states = kernel.states(images)
-    states[:] = np.repeat(stack(model.upright(spin)), len(rattle), axis=1)
-    for disturbance, component in enumerate(rattle):
-        states[component, disturbance :: len(rattle)] = TINY
-    spins, rattles, inertia = model.energy(*kernel.unpack(images))
-    kernel.table(images)["energy"] = rattles + 0.5 * inertia * spins**2
-    executor.execute(kernel, images, stop_when_settled=False)
 
-    sound = (kernel.table(images)["status"] == TIME_LIMIT).reshape(len(spin), len(rattle)).all(axis=1)
-    disturbed = kernel.states(images)[rattle].reshape(len(rattle), len(spin), len(rattle)).swapaxes(0, 1)
-    propagator = np.where(sound[:, None, None], disturbed / TINY, 1.0)
-    growth = np.log(np.abs(np.linalg.eigvals(propagator)).max(axis=-1)) / duration
-    return np.asarray(np.where(sound, growth, np.nan))
+    def start() -> Batch:
+        images = np.repeat(kernel.images(columns, step, duration), len(rattle), axis=0)
+        states = kernel.states(images)
+        states[:] = np.repeat(stack(model.upright(spin)), len(rattle), axis=1)
+        for disturbance, component in enumerate(rattle):
+            states[component, disturbance :: len(rattle)] = TINY
+        spins, rattles, inertia = model.energy(*kernel.unpack(images))
+        kernel.table(images)["energy"] = rattles + 0.5 * inertia * spins**2
+        return {PLAIN: Simulations(kernel, images)}
+
+    def read(batch: Batch) -> dict[str, Array]:
+        images = batch[PLAIN].images
+        sound = (kernel.table(images)["status"] == TIME_LIMIT).reshape(len(spin), len(rattle)).all(axis=1)
+        disturbed = kernel.states(images)[rattle].reshape(len(rattle), len(spin), len(rattle)).swapaxes(0, 1)
+        propagator = np.where(sound[:, None, None], disturbed / TINY, 1.0)
+        growth = np.log(np.abs(np.linalg.eigvals(propagator)).max(axis=-1)) / duration
+        return {"growth": np.where(sound, growth, np.nan)}
+
+    return np.asarray(rounds.answer(start, read, stop_when_settled=False)["growth"])
 
 
 def _duration_and_step(model: Model, columns: Columns) -> tuple[Array, Array]:

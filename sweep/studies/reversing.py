@@ -2,54 +2,178 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
+import numba
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine import executor
-from sweep.engine.plan import Part, plan
+from sweep.engine.executor import STEP_SECONDS
+from sweep.engine.plan import plan
 from sweep.grid import Array, Grid
+from sweep.kernels import methods
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.methods import AUTO, METHODS, allowed
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
+from sweep.models import MODELS, linear
 from sweep.models.model import Columns
 from sweep.models.stability import SPIN_LIMIT
-from sweep.studies.bracket import FAILED, HAPPENS, NOT_YET, UNDECIDED, Bracket, search
+from sweep.studies.bracket import FAILED, HAPPENS, NOT_YET, UNDECIDED, Bracket, Question, search
+from sweep.studies.rounds import Batch, Rounds, Simulations
 
 # The search ends at this multiple of n_c1.  The paper's n_c2 is 2 n_c1; over 200 bodies (a = 1.5 … 50, |δ| <= 0.5,
 # μ = 0.1 … 5000) it was found at up to 7.7 n_c1, with a median of 2.01.  Beyond, fast spins take long to simulate, and
 # the body topples or leaves the plane instead: of 40 bodies searched up to a spin of 10, none reversed there.
 _FARTHEST = 8.0
 
+# The way outwards is simulated at first up to just beyond this multiple of n_c1.
+_EXPECTED = 2.2
 
-def find_n_c2(config: Config, bodies: Columns, n_c1: Array, width: float) -> Bracket:
+# Spins of the way outwards are simulated with this error in spin at t = 400, relative to the start spin, or with the
+# tolerance of the configuration if that is larger, and with the cheapest method.  Most of them are far from n_c2, and
+# where a body is nearly round they take most of the time: 33 s of 41 for 64 bodies with a = 10, b = 1.2 … 9.8.
+_COARSE = 1e-4
+
+
+USUAL = 9
+"""Simulations that a search usually takes."""
+
+# The same where none reverses up to the end of the search.
+_MOST = 11
+
+# How long they last, in decay times of the rattle at rest: the median of 2305 with a = 10, b = 1.2 … 9.8, μ = 20 … 200
+# is 7, and half of them lie between 4 and 13.
+_USUAL_TIME = 10.0
+
+
+def find_n_c2(
+    config: Config,
+    bodies: Columns,
+    n_c1: Array,
+    stable: Array,
+    width: float,
+    rounds: Rounds,
+    settled: Callable[[Array], None] = lambda share: None,  # noqa: ARG005
+    compiling: Callable[[], None] = lambda: None,
+) -> Bracket:
     """The first |spin|, outwards from `n_c1`, from which the trajectory from the start point in `bodies` reverses.
+
+    A trajectory that does not reverse ends at a spin that falls to zero where n_c2 is reached: that is the margin of
+    its start spin.
 
     Parameters
     ----------
     bodies : parameters, each of shape (cells,)
     n_c1 : spin to begin at; its sign is that of all spins, shape (cells,)
+    stable : ranges of spin in which the rattle decays, shape (6, cells), as `Kernel.images` takes them
+    rounds : run or recall the simulations
+    settled : as of `bracket.search`
+    compiling : called before a kernel is compiled
     """
 
-    def ask(cells: Array, size: Array) -> Array:
-        spins = np.sign(n_c1[cells]) * size
-        return _reverses(config, {name: values[cells] for name, values in bodies.items()} | {"n0": spins})
+    def trajectories(question: Question, spins: Array) -> _Trajectories:
+        at, asked = question.search, config.integrator.tolerance
+        columns = {name: values[at] for name, values in bodies.items()} | {"n0": spins}
+        tolerance = np.where(question.exact, asked, np.maximum(asked, _COARSE * question.size))
+        return _Trajectories(config, question.exact, columns, stable[:, at], tolerance, compiling)
 
-    return search(ask, np.abs(n_c1), np.minimum(_FARTHEST * np.abs(n_c1), SPIN_LIMIT), width)
+    def ask(question: Question) -> tuple[Array, Array]:
+        sign = np.sign(n_c1[question.search])
+        asked = trajectories(question, sign * question.size)
+
+        def read(batch: Batch) -> dict[str, Array]:
+            outcomes, ends = np.empty(len(sign), int), np.empty(len(sign))
+            for method, cells in asked.cells().items():
+                outcomes[cells], ends[cells] = _outcomes(batch[method])
+            return {"outcomes": outcomes, "margins": np.where(outcomes == NOT_YET, sign * ends, np.nan)}
+
+        answers = rounds.answer(asked.start, read, stop_when_settled=True, end_early=_end_reversed)
+        return answers["outcomes"], answers["margins"]
+
+    size = np.abs(n_c1)
+    limit = np.minimum(_FARTHEST * size, SPIN_LIMIT)
+    return search(ask, size, limit, width, _EXPECTED * size, settled=settled)
 
 
-def _reverses(config: Config, columns: Columns) -> Array:
-    planned = plan(replace(config, measure=("reversals",)), Grid({}, {}, dict(columns)))
-    outcomes = np.empty(planned.grid.size, int)
-    for part in planned.parts:
-        executor.execute(part.kernel, part.images, stop_when_settled=True, after_chunk=partial(_end_reversed, part))
-        table = part.kernel.table(part.images)
-        known = [table["reversals"] > 0, table["status"] == SETTLED, table["status"] == TIME_LIMIT]
-        outcomes[part.cells] = np.select(known, [HAPPENS, NOT_YET, UNDECIDED], FAILED)
-    return outcomes
+def body_seconds(config: Config, bodies: Columns) -> tuple[float, float]:
+    """Rough time to find n_c2 of both signs for a body like these, one of many: as a rule, and at most."""
+    model, integrator = MODELS[config.model], config.integrator
+    decay = -linear.growth_rate(model, model.constants.of(bodies), np.zeros(len(bodies["a"])))
+    bodies, decay = {name: values[decay > 0] for name, values in bodies.items()}, decay[decay > 0]
+    if not len(decay):
+        return 0.0, 0.0
+
+    def seconds(spin: Array, time: Array | float, simulations: int) -> float:
+        columns, costs = bodies | {"n0": spin}, list[Array]()
+        for method in allowed(model) if integrator.method == AUTO else (integrator.method,):
+            step: Any = integrator.step
+            if step == "auto":
+                step, _ = methods.automatic_step(method, model, columns, integrator.tolerance)
+            costs.append(METHODS[method].step_cost * (time / step + METHODS[method].start_up_cost))
+        a_step = STEP_SECONDS / numba.get_num_threads()
+        return float(2 * simulations * np.min(costs, axis=0).mean()) * a_step
+
+    # n_c1 is about the decay rate at rest.
+    usual = seconds(2 * decay, np.minimum(_USUAL_TIME / decay, integrator.t_end), USUAL)
+    return usual, seconds(_FARTHEST * decay, integrator.t_end, _MOST)
 
 
-def _end_reversed(part: Part) -> None:
+@dataclass(frozen=True)
+class _Trajectories:
+    """Trajectories that answer a question, with the method and step that the configuration asks for."""
+
+    config: Config
+    exact: Array
+    """Whether to use the method that the configuration names, or else the cheapest, shape (simulations,)."""
+    columns: Columns
+    """Physical parameters by name, each of shape (simulations,)."""
+    stable: Array
+    """Shape (6, simulations)."""
+    tolerance: Any
+    """Shape (simulations,); the rules for steps take one tolerance for all cells, or one for each."""
+    compiling: Callable[[], None]
+
+    def cells(self) -> dict[str, Array]:
+        """Indices of the simulations that each method runs."""
+        model, integrator = MODELS[self.config.model], self.config.integrator
+        chosen = methods.cheapest(model, self.columns, self.tolerance, integrator.t_end)
+        if integrator.method != AUTO:
+            named = self.exact | (integrator.step != "auto")
+            chosen = np.where(named, list(METHODS).index(integrator.method), chosen)
+        return {list(METHODS)[i]: np.flatnonzero(chosen == i) for i in np.unique(chosen)}
+
+    def start(self) -> Batch:
+        """The trajectories at t = 0."""
+        model, integrator, batch = MODELS[self.config.model], self.config.integrator, {}
+        for method, cells in self.cells().items():
+            theirs = {name: values[cells] for name, values in self.columns.items()}
+            if integrator.step == "auto":
+                step, _ = methods.automatic_step(method, model, theirs, self.tolerance[cells])
+            else:
+                step = np.full(len(cells), integrator.step)
+            kernel = self._kernel(method)
+            batch[method] = Simulations(kernel, kernel.images(theirs, step, integrator.t_end, self.stable[:, cells]))
+        return batch
+
+    def _kernel(self, method: str) -> Kernel:
+        integrator = self.config.integrator.model_copy(update={"method": method})
+        config = replace(self.config, integrator=integrator, measure=("reversals",))
+        first = {name: values[:1] for name, values in self.columns.items()}
+        (part,) = plan(config, Grid({}, {}, first), self.compiling).parts
+        return part.kernel
+
+
+def _outcomes(ended: Simulations) -> tuple[Array, Array]:
+    """What simulations say of their start spins, and their last ripple-free spins, both of shape (simulations,)."""
+    table = ended.kernel.table(ended.images)
+    known = [table["reversals"] > 0, table["status"] == SETTLED, table["status"] == TIME_LIMIT]
+    with np.errstate(invalid="ignore"):  # the states of a run that failed
+        return np.select(known, [HAPPENS, NOT_YET, UNDECIDED], FAILED), ended.kernel.steady_spin(ended.images)
+
+
+def _end_reversed(running: Simulations) -> None:
     """End the trajectories that have reversed: what they do later is of no account."""
-    table = part.kernel.table(part.images)
+    table = running.kernel.table(running.images)
     table["status"] = np.where((table["status"] == RUNNING) & (table["reversals"] > 0), SETTLED, table["status"])

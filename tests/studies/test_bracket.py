@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 
-from sweep.studies.bracket import AT_ONCE, FAILED, HAPPENS, NOT_YET, UNDECIDED, Bracket, search
+from sweep.studies.bracket import AT_ONCE, FAILED, HAPPENS, NOT_YET, UNDECIDED, Bracket, Question, search
 
 
-def find(*searches: list[tuple[float, int]], begin: float = 0.01, limit: float = 10.0, width: float = 1e-3) -> Bracket:
-    """Brackets where the outcome, `NOT_YET` at first, changes at the spins of each search."""
+def find(
+    *searches: list[tuple[float, int]],
+    begin: float = 0.01,
+    limit: float = 10.0,
+    width: float = 1e-3,
+    expected: float = 1.0,
+    precisely: bool = False,
+    margin: Callable[[float], float] = lambda _: np.nan,
+    coarse: Callable[[float], float] = lambda spin: spin,
+    asked: list[tuple[int, float, bool]] | None = None,
+) -> Bracket:
+    """Brackets where the outcome, `NOT_YET` at first, changes at the spins of each search.
 
-    def ask(which: Any, spins: Any) -> Any:
-        return np.array([
-            next((outcome for start, outcome in reversed(searches[i]) if spin >= start), NOT_YET)
-            for i, spin in zip(which, spins, strict=True)
-        ])  # fmt: skip
+    `coarse` is the spin for which an answer that need not be exact is given.
+    """
 
-    return search(ask, np.full(len(searches), begin), limit, width)
+    def ask(question: Question) -> Any:
+        each = list(zip(question.search.tolist(), question.size.tolist(), question.exact.tolist(), strict=True))
+        if asked is not None:
+            asked.extend(each)
+        outcomes = [
+            next((outcome for start, outcome in reversed(searches[i]) if (s if sure else coarse(s)) >= start), NOT_YET)
+            for i, s, sure in each
+        ]
+        return np.array(outcomes), np.array([margin(spin) for i, spin, _ in each])
+
+    return search(
+        ask, np.full(len(searches), begin), limit, width, np.full(len(searches), expected), precisely=precisely
+    )
 
 
 def test_brackets_hold_the_first_change_and_are_narrow() -> None:
@@ -61,3 +82,52 @@ def test_a_time_limit_at_the_inner_end_is_told() -> None:
     assert np.isnan(found.inner[[0, 2]]).all()
     assert 0.2 <= found.outer[0] <= 0.2002
     assert np.isnan(found.outer[2])
+
+
+@pytest.mark.parametrize("expected", [0.001, 0.03, 0.8, 5.0, np.inf, np.nan])
+@pytest.mark.parametrize("precisely", [False, True])
+def test_what_is_expected_does_not_change_what_is_found(expected: float, precisely: bool) -> None:
+    starts = [0.011, 0.3, 0.8001, 4.9]
+    found = find(*([(start, HAPPENS)] for start in starts), [], expected=expected, precisely=precisely)
+    assert list(found.outcome) == [HAPPENS] * 4 + [NOT_YET]
+    assert (found.inner[:4] < starts).all()
+    assert (starts <= found.outer[:4]).all()
+    assert (found.outer - found.inner <= 1e-3 * found.outer)[:4].all()
+
+
+def test_an_expected_spin_does_not_hide_an_event_before_it() -> None:
+    found = find([(0.2, HAPPENS), (0.29, NOT_YET), (0.8, HAPPENS)], expected=0.8, precisely=True)
+    assert found.inner[0] < 0.2 <= found.outer[0]
+
+
+@pytest.mark.parametrize(
+    ("margin", "most"),
+    [
+        (lambda spin: 0.8 - spin, 4),
+        (lambda spin: 0.8 - spin if spin < 0.8 else np.nan, 4),
+        (lambda spin: 0.9 * (0.8 - spin) + (0.8 - spin) ** 2 if spin < 0.8 else np.nan, 7),
+        (lambda spin: 100 * (0.8 - spin) if spin < 0.8 else np.nan, 16),
+        (lambda _: 1e-9, 16),
+        (lambda _: -1.0, 16),
+    ],
+)
+def test_margins_only_propose_spins(margin: Callable[[float], float], most: int) -> None:
+    """A true margin saves simulations; one that misleads costs some, and changes nothing of what is found."""
+    asked: list[tuple[int, float, bool]] = []
+    found = find([(0.8, HAPPENS)], margin=margin, asked=asked)
+    assert found.inner[0] < 0.8 <= found.outer[0]
+    assert found.outer[0] - found.inner[0] <= 1e-3 * found.outer[0]
+    assert sum(exact for _, _, exact in asked) <= most
+
+
+def test_both_ends_of_a_bracket_are_exact() -> None:
+    """The way outwards says of every spin what is true of one 0.3 % farther out, or nearer."""
+    for error in (1.003, 0.997):
+        for start in 0.01 * 1.25 ** np.arange(8) * np.array([0.999, 1.001])[:, None]:
+            asked: list[tuple[int, float, bool]] = []
+            searches = [[(at, HAPPENS)] for at in start.tolist()]
+            found = find(*searches, width=0.3, coarse=lambda spin, error=error: error * spin, asked=asked)
+            exact = {(i, spin) for i, spin, sure in asked if sure}
+            for i in np.flatnonzero(found.outcome == HAPPENS):
+                assert found.inner[i] < start[i] <= found.outer[i]
+                assert {(i, found.inner[i]), (i, found.outer[i])} <= exact

@@ -18,9 +18,11 @@ import sweep
 from sweep.cli import main
 from sweep.models import MODELS, linear, stability
 from sweep.results.dataset import REASONS
+from sweep.results.memory import Memory
 from sweep.studies import growth
 from sweep.studies.critical import critical, remarks
 from sweep.studies.growth import simulated_growth
+from sweep.studies.rounds import Rounds
 
 Write = Callable[..., Path]
 STANDARD = "name: standard\nfriction: {mu: 75}\nintegrator: {t_end: 12000}\n"
@@ -76,7 +78,7 @@ def test_a_tiny_rattle_grows_at_the_rate_of_its_eigenvalue() -> None:
     constants = MODELS["slip"].constants.of(bodies)
     at_rest = linear.growth_rate(MODELS["slip"], constants, np.zeros(40))
     for share in (0, 0.5, 1, 1.25, 4):
-        simulated = simulated_growth(kernel("dopri5", "slip", ()), bodies, share * n_c1)
+        simulated = simulated_growth(kernel("dopri5", "slip", ()), bodies, share * n_c1, Rounds(Memory()))
         exact = linear.growth_rate(MODELS["slip"], constants, share * n_c1)
         assert (np.abs(simulated - exact) < 2e-5 * np.maximum(np.abs(at_rest), np.abs(exact))).all()
 
@@ -107,12 +109,18 @@ def test_runs_reverse_on_one_side_of_n_c2(write: Write) -> None:
 
 def test_a_disagreement_is_a_reason_and_a_line(write: Write, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Growth is measured at a spin 1 % too low, so that n_c1 comes out 1 % too large, ten times the width."""
-    monkeypatch.setattr(growth, "simulated_growth", lambda k, bodies, n: simulated_growth(k, bodies, 0.99 * n))
+    monkeypatch.setattr(
+        growth, "simulated_growth", lambda k, bodies, n, rounds: simulated_growth(k, bodies, 0.99 * n, rounds)
+    )
     out = tmp_path / "o"
     settings = ["--set", "mu=[60,75]", "--set", "t_end=100"]
-    result = CliRunner().invoke(main, ["critical", str(write(STANDARD)), *settings, "--output", str(out)])
+    command = ["critical", str(write(STANDARD)), *settings, "--output", str(out)]
+    result = CliRunner().invoke(main, command)
     assert result.exit_code == 0
-    assert "n_c1_minus: 2 disagree with the eigenvalues, of 2\n" in result.stdout
+    said = "n_c1_minus: 2 disagree with the eigenvalues, of 2\n"
+    assert said in result.stdout
+    quiet = CliRunner().invoke(main, [*command, "--fresh", "--quiet"])
+    assert (quiet.stdout, said in quiet.stderr) == ("", True)
     spins = xr.load_dataset(out / "standard_critical.nc")
     assert reasons(spins, "n_c1_plus") == reasons(spins, "n_c1_minus") == ["disagrees"] * 2
     assert [REASONS[code] for code in spins.critical_reason.values] == ["disagrees"] * 2
