@@ -115,16 +115,18 @@ def run(
               help="Which cell, e.g. --at mu=60 --at b=3; a parameter given again adds a trajectory.")  # fmt: skip
 @OUTPUT
 @SETTINGS
-def trajectory(config: Path, cells: tuple[str, ...], output: Path | None, settings: tuple[str, ...]) -> None:
+@click.option("--dry-run", is_flag=True, help="Print trajectories, steps and estimated time; compute nothing.")
+@QUIET
+def trajectory(
+    config: Path, cells: tuple[str, ...], output: Path | None, settings: tuple[str, ...], dry_run: bool, quiet: bool
+) -> None:
     """Follow single cells of CONFIG densely in time.
 
     Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip,
     normal force, energy and the work of friction.  Several trajectories are drawn over each other.
     """
     with _explained():
-        from sweep.plots import trajectories as plots
-        from sweep.results.folder import RunFiles
-        from sweep.studies.trajectory import trajectory as follow
+        from sweep.studies.trajectory import estimate
 
         checked = _load(config, settings)
         at: dict[str, Any] = {}
@@ -133,10 +135,20 @@ def trajectory(config: Path, cells: tuple[str, ...], output: Path | None, settin
         if unknown := [name for name in at if name not in PARAMETERS]:
             message = f"unknown parameter; allowed: {', '.join(PARAMETERS)}"
             raise ConfigError([Fault("--at", None, None, (unknown[0],), message)])
-        result = follow(checked, **at)
+        if dry_run:
+            click.echo(estimate(checked, at))
+            return
+        from sweep.plots import trajectories as plots
+        from sweep.progress import Terminal
+        from sweep.results.folder import RunFiles
+        from sweep.studies.trajectory import trajectory as follow
+
+        with Terminal(quiet, "sqrt(c/g)") as terminal:
+            result = follow(checked, reporter=terminal, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
         files.save_result(result, plots.draw(result))
-        _say(f"wrote {files.dataset} and .png")
+        if not quiet:
+            _say(f"wrote {files.dataset} and .png")
 
 
 @main.command()

@@ -15,7 +15,7 @@ from sweep.kernels.status import FAILURES, RUNNING
 class Progress:
     """How far a run has come."""
 
-    cells: int
+    cells: float
     """To be simulated in all, as far as known: a refined run adds more with each pass."""
     done: float
     """A fraction where parts of a cell count, as in a search."""

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from math import prod
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, Fault, as_config
 from sweep.engine import executor
+from sweep.engine.executor import STEP_SECONDS
 from sweep.engine.plan import plan
 from sweep.engine.repeats import cells_of, repeat_all
-from sweep.grid import Array, off_the_body
+from sweep.engine.reporter import Progress, Reporter
+from sweep.grid import Array, Grid, off_the_body
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.runge_kutta import RungeKuttaKernel
+from sweep.kernels.layout import BLOCK, LANES
+from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import RUNNING
-from sweep.models import TIERS
+from sweep.models import MODELS, TIERS
 from sweep.models.linear import fastest_motion
 from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
@@ -30,6 +35,15 @@ from sweep.studies.stepwise import stepwise
 
 SAMPLES_A_RADIAN = 3
 """Samples per radian of the fastest motion: nearly twenty per period."""
+
+# The fewest blocks of steps between two marks of a run, and the most marks, counting those of each trajectory.
+_BLOCKS, _MARKS = 8, 2048
+
+# Samples whose images are held at a time (about 100 MB).
+_SAMPLES = 200_000
+
+# Blocks of steps: as many as are needed.
+_UNTIL_ALL_STOP = 2**40
 
 MAX_TRAJECTORIES = 1000
 """Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
@@ -56,14 +70,24 @@ SERIES: dict[str, tuple[str, str]] = {
 }
 
 
-def trajectory(config: Config | str | Path, *, every: float | None = None, **at: float | Sequence[float]) -> xr.Dataset:
+def trajectory(
+    config: Config | str | Path,
+    *,
+    every: float | None = None,
+    reporter: Reporter | None = None,
+    **at: float | Sequence[float],
+) -> xr.Dataset:
     """Follow the cells of `config` picked by their parameters, such as ``mu=60, n0=[0.02, 0.05]``.
+
+    The method is always dopri5, whatever the configuration names.  A sample is a state between two steps, and adams
+    can stop only after every eighth step, a rattle period apart at times, and leaps over stretches of small rattle.
 
     Parameters
     ----------
     config : a configuration or the path of one
     every : time between samples, in sqrt(c/g), rounded to whole steps; by default nearly twenty
         per period of the fastest motion
+    reporter : receives progress, counted in time, and messages; by default there are none
     at : values by parameter; each combination is one trajectory.  An axis of `config` that is not
         named takes its first value
 
@@ -78,23 +102,27 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     ConfigError
         if the model is a formula, or `at` picks cells that cannot be run.
     """
-    config = stepwise(as_config(config))
-    job = plan(_choose(config, {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}))
+    chosen, reporter = choose(config, at), reporter or Reporter()
+    job = plan(chosen, compiling=reporter.compiling)
     (part,) = job.parts
-    executor.execute(part.kernel, part.images, stop_when_settled=job.config.integrator.stop_when_settled)
-    repeat_all([job], {part.method: (part.kernel, part.images)})
+    t_end, began = chosen.integrator.t_end, time.perf_counter()
+
+    def report() -> None:
+        table = part.kernel.table(part.images)
+        covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
+        seconds = time.perf_counter() - began
+        reporter.chunk(Progress(len(part.images) * t_end, float(covered), 0, 0, seconds))
+
+    settles = chosen.integrator.stop_when_settled
+    marks = _run(part.kernel, part.images, settles, report)
+    repeat_all([job], {part.method: (part.kernel, part.images)}, report)
     halvings = part.kernel.table(part.images)["halvings"]
-    start = cells_of([job], part.method, part.kernel, part.images).start(halvings)
+    if halvings.any():
+        marks = _run(part.kernel, cells_of([job], part.method, part.kernel, part.images).start(halvings), settles)
     labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
     summary = labelled.reset_coords(drop=False)
-    # With blocks of one step, advancing to the next sample takes no more steps than lie between the two.
-    assert isinstance(part.kernel, RungeKuttaKernel)  # which is plain enough to stop after each step
-    kernel = part.kernel.stepwise()
-    columns = job.grid.columns()
-    series = []
-    for i in range(len(start)):
-        interval = every or _interval(part.kernel.model, {name: values[[i]] for name, values in columns.items()})
-        series.append(_sample(kernel, start[[i]], part.images[i], interval))
+    interval = np.full(job.grid.size, every) if every else _intervals(part.kernel.model, job.grid.columns())
+    series = [_series(part.kernel, *found) for found in _sample(part.kernel, marks, part.images, interval)]
     length = max(len(s["time"]) for s in series)
     variables: dict[str, Any] = {}
     for name in series[0]:
@@ -106,6 +134,33 @@ def trajectory(config: Config | str | Path, *, every: float | None = None, **at:
     flat = summary.rename({"case": "trajectory"})
     index = ("trajectory", flat["trajectory"].values, {"units": "1", "long_name": "number of the trajectory"})
     return flat.drop_vars("trajectory").assign(variables).assign_coords(trajectory=index)
+
+
+def estimate(config: Config, at: Mapping[str, float | Sequence[float]]) -> str:
+    """Trajectories, steps, samples and time, a line each; parameters and errors as of `trajectory`."""
+    chosen = choose(config, at)
+    columns, integrator = Grid.of(chosen).columns(), chosen.integrator
+    model, step = MODELS[chosen.model], integrator.step
+    steps = np.full(len(columns["a"]), integrator.t_end)
+    steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
+    samples = (integrator.t_end / _intervals(model, columns)).sum()
+    # A step of a group of lanes takes as long whether they are idle or not.
+    groups = -(-len(steps) // (LANES * numba.get_num_threads()))
+    seconds = groups * steps.max() * LANES * STEP_SECONDS
+    return "\n".join(
+        [
+            f"trajectories: {len(steps)}",
+            f"steps:        at most {steps.sum():.3g}",
+            f"samples:      at most {samples:.3g}",
+            f"time:         at most about {seconds:.3g} s, if all run to t_end; those that settle stop earlier",
+        ]
+    )
+
+
+def choose(config: Config | str | Path, at: Mapping[str, float | Sequence[float]]) -> Config:
+    """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
+    wanted = {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}
+    return _choose(stepwise(as_config(config)), wanted)
 
 
 def _choose(config: Config, at: dict[str, list[float]]) -> Config:
@@ -142,33 +197,78 @@ def _wrong(config: Config, name: str, values: list[float]) -> str:
     return f"{wrong[0]:g}; allowed: {PARAMETERS[name].allowed}" if wrong else ""
 
 
-def _sample(kernel: Kernel, start: Array, end: Array, every: float) -> dict[str, Array]:
-    """Step a trajectory again from `start` to its `end`, stopping at each sample.
+Marks = list[Array]
+"""Copies of all images at some moments of a run, each of shape (trajectories, rows)."""
 
-    The steps are the sweep's own, and so equal to the last bit.
+
+def _run(
+    kernel: Kernel, images: Array, stop_when_settled: bool, after_chunk: Callable[[], None] = lambda: None
+) -> Marks:
+    """Run `images` to their ends, in place, and mark moments between which samples can be taken side by side."""
+    marks = [images.copy()]
+
+    def mark() -> None:
+        marks.append(images.copy())
+        after_chunk()
+
+    longest = kernel.table(images)["goal"].max() / BLOCK
+    blocks = max(_BLOCKS, int(np.ceil(longest * len(images) / _MARKS)))
+    executor.execute(kernel, images, stop_when_settled=stop_when_settled, after_chunk=mark, chunk_blocks=blocks)
+    return marks
+
+
+def _sample(kernel: Kernel, marks: Marks, ends: Array, intervals: Array) -> Iterator[tuple[Array, Array]]:
+    """For each trajectory the numbers of the sampled steps, shape (samples,), and its images there.
+
+    Each is stepped again from the mark before to the samples, and stops at each of them.  The steps are the sweep's
+    own, and so equal to the last bit.  All stretches between two marks are stepped side by side, on all threads.
     """
+    table, marked = kernel.table(ends), np.array([kernel.table(mark)["done"] for mark in marks])
+    some: list[Array] = []
+    for i, (step, steps, interval) in enumerate(zip(table["step"], table["done"].astype(int), intervals, strict=True)):
+        stride = max(1, round(interval / step))
+        some.append(np.unique([*range(0, steps, stride), steps]))
+        if i + 1 == len(ends) or sum(map(len, some)) > _SAMPLES:
+            first = i + 1 - len(some)
+            # Of each sample of these trajectories: its trajectory, and the last mark before it.
+            which = np.repeat(np.arange(first, i + 1), [len(each) for each in some])
+            before = [np.searchsorted(marked[:, first + j], each, "right") - 1 for j, each in enumerate(some)]
+            images = _advance(kernel, marks, which, np.concatenate(before), np.concatenate(some))
+            parts = np.split(images, np.cumsum([len(each) for each in some])[:-1])
+            yield from zip(some, parts, strict=True)
+            some = []
+
+
+def _advance(kernel: Kernel, marks: Marks, which: Array, before: Array, steps: Array) -> Array:
+    """The images of samples, shape (samples, rows): of the trajectories `which` after so many `steps`, by the marks
+    `before` them; all in the order of trajectories and steps."""
+    begins = np.flatnonzero(np.diff(which * len(marks) + before, prepend=-1))
+    counts = np.diff(begins, append=len(steps))
+    stretches = np.array([marks[before[i]][which[i]] for i in begins])
+    samples = np.empty((len(steps), stretches.shape[1]))
+    table = kernel.table(stretches)
+    for i in range(counts.max()):
+        active = np.flatnonzero(counts > i)
+        table["goal"][active], table["status"][active] = steps[begins[active] + i], RUNNING
+        kernel.advance(stretches, active, _UNTIL_ALL_STOP, False)
+        samples[begins[active] + i] = stretches[active]
+    return samples
+
+
+def _series(kernel: Kernel, steps: Array, images: Array) -> dict[str, Array]:
+    """The series of a trajectory, each of shape (samples,), from its images after `steps`."""
     model = kernel.model
-    step, steps = float(end[kernel.row("step")]), int(end[kernel.row("done")])
-    stride = max(1, round(every / step))
-    goals = np.unique([*range(0, steps, stride), steps])
-    images, snapshots = start.copy(), [start[0].copy()]
-    for goal in goals[1:]:
-        images[:, kernel.row("goal")] = goal
-        images[:, kernel.row("status")] = RUNNING
-        kernel.advance(images, np.zeros(1, dtype=np.int64), int(goal - images[0, kernel.row("done")]), False)
-        snapshots.append(images[0].copy())
-    table = np.array(snapshots)
-    states, constants = kernel.unpack(table)
+    states, constants = kernel.unpack(images)
     spin, rattle, inertia = model.energy(states, constants)
-    series = {"time": goals * step, "spin": spin, **model.observe(states, constants)}
+    series = {"time": steps * kernel.table(images)["step"], "spin": spin, **model.observe(states, constants)}
     if kernel.follows_ripple:
-        series["ripple_free_spin"] = kernel.steady_spin(table)
+        series["ripple_free_spin"] = kernel.steady_spin(images)
     if "energy_error" in kernel.measure:
         series["energy"] = rattle + 0.5 * inertia * spin**2
-        series["dissipated"] = table[:, kernel.row("work")]
-    return {name: np.broadcast_to(values, goals.shape) for name, values in series.items()}
+        series["dissipated"] = images[:, kernel.row("work")]
+    return {name: np.broadcast_to(values, steps.shape) for name, values in series.items()}
 
 
-def _interval(model: Model, columns: Columns) -> float:
-    """Time between samples for the body `columns`."""
-    return float(1 / (SAMPLES_A_RADIAN * max(fastest_motion(model, columns)[0], 0.1)))
+def _intervals(model: Model, columns: Columns) -> Array:
+    """Time between samples, shape (trajectories,)."""
+    return np.asarray(1 / (SAMPLES_A_RADIAN * np.maximum(fastest_motion(model, columns), 0.1)))
