@@ -8,7 +8,6 @@ The disturbances at the end make up the propagator of the linear motion, whose l
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -67,7 +66,7 @@ def find_n_c1(
     compiling : called before a kernel is compiled
     """
     first = {name: values[:1] for name, values in bodies.items()}
-    (part,) = plan(replace(stepwise(config), measure=()), Grid({}, {}, first), compiling).parts
+    (part,) = plan(stepwise(config), Grid({}, {}, first), compiling).parts
 
     def growth(cells: Array, spin: Array) -> Array:
         return simulated_growth(part.kernel, {name: v[cells] for name, v in bodies.items()}, spin, rounds)

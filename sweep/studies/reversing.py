@@ -159,10 +159,15 @@ class _Trajectories:
 
     def _kernel(self, method: str) -> Kernel:
         integrator = self.config.integrator.model_copy(update={"method": method})
-        config = replace(self.config, integrator=integrator, measure=("reversals",))
+        config = replace(self.config, integrator=integrator, measure=_measure(self.config))
         first = {name: values[:1] for name, values in self.columns.items()}
         (part,) = plan(config, Grid({}, {}, first), self.compiling).parts
         return part.kernel
+
+
+def _measure(config: Config) -> tuple[str, ...]:
+    """The measurements of `config`, so that a kernel compiled for its run serves here too, if reversals are counted."""
+    return config.measure if "reversals" in config.measure else ("reversals",)
 
 
 def _outcomes(ended: Simulations) -> tuple[Array, Array]:

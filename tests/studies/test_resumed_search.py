@@ -1,0 +1,191 @@
+"""Real processes of `sweep critical` and `sweep trajectory` that are killed or interrupted.
+
+Whatever happens, the same command goes on and finds the very same spins.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+from support import nursery
+from support.cli import invoke, refused
+from support.runs import Stop, same_numbers
+
+import sweep
+from sweep.studies.critical import critical
+
+TEXT = """\
+name: standard
+body: {a: 10.0, b: [3.0, 5.0], delta: 0.03}
+friction: {mu: [60, 75, 100]}
+integrator: {t_end: 12000}
+"""
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("config") / "standard.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def undisturbed(config: Path) -> xr.Dataset:
+    return critical(sweep.load_config(config))
+
+
+@pytest.fixture
+def start(config: Path, tmp_path: Path) -> Iterator[Callable[..., Any]]:
+    """Starts a process of a command on the configuration, its files in tmp_path/out and what it says in `log`."""
+    started: list[Any] = []
+
+    def start_process(verb: str, *arguments: str) -> Any:
+        asked = [verb, str(config), *arguments, "--output", str(tmp_path / "out")]
+        log = tmp_path / f"log{len(started)}"
+        process = nursery.context().Process(target=nursery.command, args=(asked, log))
+        process.start()
+        process.log = log
+        started.append(process)
+        return process
+
+    yield start_process
+    for process in started:
+        process.kill()
+        process.join()
+        process.close()
+
+
+def rounds(folder: Path) -> int:
+    return len([path for path in folder.glob("*.npz") if path.name != "running.npz"])
+
+
+def strike(process: Any, now: Callable[[], bool], with_signal: int) -> bool:
+    """Send a signal at the moment `now`; False if the process ended before."""
+    while not now():
+        if not process.is_alive():
+            return False
+        time.sleep(5e-4)
+    os.kill(process.pid, with_signal)
+    process.join(60)
+    return True
+
+
+@pytest.mark.parametrize("with_signal", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize(
+    "wanted", [range(1, 6, 2), pytest.param(range(12), marks=pytest.mark.campaign)], ids=["some", "many"]
+)
+def test_a_stopped_search_goes_on(
+    start: Callable[..., Any], tmp_path: Path, undisturbed: xr.Dataset, wanted: range, with_signal: int
+) -> None:
+    """Stopped within round after round, also between two saved states of the same one."""
+    checkpoint = tmp_path / "out" / "standard_critical.checkpoint"
+    stops = 0
+    for done in wanted:
+        running, before = checkpoint / "running.npz", os.stat(checkpoint).st_mtime_ns if checkpoint.exists() else 0
+
+        def within(done: int = done, before: int = before, running: Path = running) -> bool:
+            saved = running.exists() and running.stat().st_mtime_ns > before
+            return rounds(checkpoint) > done or (rounds(checkpoint) == done and saved)
+
+        process = start("critical")
+        if not strike(process, within, with_signal):
+            break
+        stops += 1
+        assert process.exitcode == (130 if with_signal == signal.SIGINT else -signal.SIGKILL)
+        if with_signal == signal.SIGINT:
+            (said,) = [line for line in process.log.read_text().splitlines() if "interrupted" in line]
+            assert re.fullmatch(
+                r"interrupted: \d of 6 bodies settled, all simulations kept; the same command resumes the search", said
+            )
+            assert "Traceback" not in process.log.read_text()
+    assert stops >= 2
+    kept = rounds(checkpoint)
+    process = start("critical")
+    process.join(120)
+    said = process.log.read_text()
+    assert process.exitcode == 0, said
+    assert f"resuming an earlier search, which finished {kept} rounds" in said
+    same_numbers(xr.load_dataset(tmp_path / "out" / "standard_critical.nc"), undisturbed)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"standard_critical.nc", "standard_critical.png"}
+
+
+def test_rounds_that_are_done_are_not_simulated_again(
+    config: Path, tmp_path: Path, undisturbed: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each resumed search begins with the round that was at work, from the images saved last."""
+    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.01)
+    simulated, checkpoint = list[tuple[int, float]](), tmp_path / "standard_critical.checkpoint"
+    execute = sweep.studies.rounds.executor.execute
+
+    def noted(kernel: Any, images: Any, **options: Any) -> None:
+        simulated.append((rounds(checkpoint), float(kernel.table(images)["done"].sum())))
+        execute(kernel, images, **options)
+
+    monkeypatch.setattr("sweep.studies.rounds.executor.execute", noted)
+    for chunks in (20, 40, 60):
+        with pytest.raises(KeyboardInterrupt):
+            critical(sweep.load_config(config), output=tmp_path, reporter=Stop(chunks))
+        kept, _ = rounds(checkpoint), simulated.clear()
+    assert kept >= 2
+    same_numbers(critical(sweep.load_config(config), output=tmp_path), undisturbed)
+    assert simulated[0][0] == kept
+    assert simulated[0][1] > 0
+
+
+def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_path: Path) -> None:
+    command = ["critical", config, "--set", "mu=60", "--set", "b=3", "--set", "model=averaged", "--output", tmp_path]
+    assert invoke(*command).exit_code == 0
+    assert "already complete, nothing to compute" in invoke(*command).stderr
+    wider = invoke(*command, "--width", "0.01")
+    assert wider.exit_code == 2
+    assert "- # width of the brackets: 0.001" in wider.stderr
+    assert invoke(*command, "--width", "0.01", "--fresh").exit_code == 0
+    assert xr.load_dataset(tmp_path / "standard_critical.nc").relative_width == 0.01
+    assert invoke(*command, "--set", "n0=0.3", "--width", "0.01").exit_code == 0  # no critical spin depends on it
+
+
+def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise AssertionError("computed")
+
+    monkeypatch.setattr("sweep.kernels.kernel.Kernel.advance", fail)
+    out = tmp_path / "out"
+    told = invoke("critical", config, "--dry-run", "--output", out)
+    assert told.exit_code == 0
+    assert [line.split(":")[0] for line in told.stdout.splitlines()] == ["bodies", "simulations", "time"]
+    assert "6 (mu 3 × b 2)" in told.stdout
+    told = invoke("trajectory", config, "--at", "mu=60", "--at", "mu=75", "--dry-run", "--output", out)
+    assert told.exit_code == 0
+    assert [line.split(":")[0] for line in told.stdout.splitlines()] == ["trajectories", "steps", "samples", "time"]
+    assert "2" in told.stdout.splitlines()[0]
+    assert not out.exists()
+    refused(invoke("critical", config, "--dry-run", "--set", "model=analytic"), "not simulated")
+    refused(invoke("trajectory", config, "--dry-run", "--at", "mu=-1"), "mu: -1; allowed")
+
+
+def test_progress_is_told(config: Path) -> None:
+    searching, following = Stop(10**9), Stop(10**9)
+    critical(sweep.load_config(config), reporter=searching)
+    sweep.trajectory(config, mu=[60, 75], reporter=following)
+    for seen, whole in ((searching.seen, 6), (following.seen, 24_000)):
+        done = [progress.done for progress in seen]
+        assert done == sorted(done)
+        assert done[0] < 0.2 * whole < done[-1] == whole == seen[-1].cells
+        assert len(set(done)) > 5
+
+
+def test_an_interrupted_trajectory_says_so(start: Callable[..., Any], tmp_path: Path) -> None:
+    process = start("trajectory", "--at", "mu=100", "--set", "t_end=1e6", "--set", "stop_when_settled=false")
+    began = time.monotonic()
+    assert strike(process, lambda: process.log.exists() and time.monotonic() > began + 0.5, signal.SIGINT)
+    assert process.exitcode == 130
+    assert process.log.read_text().splitlines()[-1] == "interrupted"
+    assert not (tmp_path / "out").exists()
