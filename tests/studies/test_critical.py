@@ -16,10 +16,12 @@ from support.kernels import kernel
 
 import sweep
 from sweep.cli import main
+from sweep.kernels.kernel import Kernel
 from sweep.models import MODELS, linear, stability
 from sweep.results.dataset import REASONS
 from sweep.results.memory import Memory
-from sweep.studies import growth
+from sweep.results.store import Running
+from sweep.studies import growth, rounds
 from sweep.studies.critical import critical, remarks
 from sweep.studies.growth import simulated_growth
 from sweep.studies.rounds import Rounds
@@ -78,7 +80,7 @@ def test_a_tiny_rattle_grows_at_the_rate_of_its_eigenvalue() -> None:
     constants = MODELS["slip"].constants.of(bodies)
     at_rest = linear.growth_rate(MODELS["slip"], constants, np.zeros(40))
     for share in (0, 0.5, 1, 1.25, 4):
-        simulated = simulated_growth(kernel("dopri5", "slip", ()), bodies, share * n_c1, Rounds(Memory()))
+        simulated = simulated_growth(kernel("dopri5", "slip"), bodies, share * n_c1, Rounds(Memory()))
         exact = linear.growth_rate(MODELS["slip"], constants, share * n_c1)
         assert (np.abs(simulated - exact) < 2e-5 * np.maximum(np.abs(at_rest), np.abs(exact))).all()
 
@@ -183,3 +185,32 @@ def test_critical_command(write: Write, tmp_path: Path) -> None:
     np.testing.assert_allclose(stored.n_c1_plus_simulated, stored.n_c1_plus, rtol=0.01)
     np.testing.assert_allclose(stored.n_c2_plus_simulated, 2 * stored.n_c1_plus, rtol=0.1)
     assert (tmp_path / "o" / "standard_critical.png").exists()
+
+
+def test_a_fixed_step_is_taken_by_its_own_method_alone(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With an automatic step the way outwards is simulated with the cheapest method; the ends of brackets never are."""
+    used = set[str]()
+    execute = rounds.executor.execute
+
+    def noted(kernel: Kernel, images: np.ndarray, **options: Any) -> None:
+        used.add(type(kernel).__name__)
+        execute(kernel, images, **options)
+
+    monkeypatch.setattr("sweep.studies.rounds.executor.execute", noted)
+    for step, kernels in ((0.02, {"RungeKuttaKernel"}), ("auto", {"RungeKuttaKernel", "AdamsKernel"})):
+        used.clear()
+        critical(sweep.load_config(write(STANDARD), {"mu": 20.0, "t_end": 500.0, "step": step}), width=0.1)
+        assert used == kernels
+
+
+def test_images_of_another_round_are_left_alone() -> None:
+    """As they are found after the answers to an earlier round were lost to damage."""
+    bodies, dopri5 = wide_bodies(4), kernel("dopri5", "slip")
+    shape = 4 * 6, len(dopri5.layout.names)  # each of six components is disturbed by itself
+
+    class Damaged(Memory):
+        def load_running(self) -> Running:
+            return Running([7], {"dopri5": np.zeros(shape)}, 1.0)
+
+    whole, again = (simulated_growth(dopri5, bodies, np.zeros(4), Rounds(store)) for store in (Memory(), Damaged()))
+    np.testing.assert_array_equal(again, whole)

@@ -140,6 +140,20 @@ def test_rounds_that_are_done_are_not_simulated_again(
     assert simulated[0][1] > 0
 
 
+def test_answers_that_were_damaged_are_simulated_again(
+    config: Path, tmp_path: Path, undisturbed: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.01)
+    stopped = Stop(60)
+    with pytest.raises(KeyboardInterrupt):
+        critical(sweep.load_config(config), output=tmp_path, reporter=stopped)
+    answers = tmp_path / "standard_critical.checkpoint" / "000001.npz"
+    answers.write_bytes(answers.read_bytes()[:-100])
+    again = Stop(10**9)
+    same_numbers(critical(sweep.load_config(config), output=tmp_path, reporter=again), undisturbed)
+    assert "000001.npz: damaged" in again.notes[0]
+
+
 def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_path: Path) -> None:
     command = ["critical", config, "--set", "mu=60", "--set", "b=3", "--set", "model=averaged", "--output", tmp_path]
     assert invoke(*command).exit_code == 0
