@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import xarray as xr
 from support import nursery
@@ -20,6 +21,7 @@ from support.cli import invoke, refused
 from support.runs import Stop, same_numbers
 
 import sweep
+from sweep.engine.reporter import Progress, Reporter
 from sweep.studies.critical import critical
 
 TEXT = """\
@@ -117,11 +119,22 @@ def test_a_stopped_search_goes_on(
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"standard_critical.nc", "standard_critical.png"}
 
 
+class Within(Reporter):
+    """Interrupts a search within a round, once its images are saved."""
+
+    def __init__(self, checkpoint: Path, number: int) -> None:
+        self.checkpoint, self.number = checkpoint, number
+
+    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
+        if (running := self.checkpoint / "running.npz").exists() and np.load(running)["tiles"][0] == self.number:
+            raise KeyboardInterrupt
+
+
 def test_rounds_that_are_done_are_not_simulated_again(
     config: Path, tmp_path: Path, undisturbed: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each resumed search begins with the round that was at work, from the images saved last."""
-    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.01)
+    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.004)
     simulated, checkpoint = list[tuple[int, float]](), tmp_path / "standard_critical.checkpoint"
     execute = sweep.studies.rounds.executor.execute
 
@@ -130,23 +143,23 @@ def test_rounds_that_are_done_are_not_simulated_again(
         execute(kernel, images, **options)
 
     monkeypatch.setattr("sweep.studies.rounds.executor.execute", noted)
-    for chunks in (20, 40, 60):
+    for number in (2, 3):  # on the way to n_c2, and inside a bracket
         with pytest.raises(KeyboardInterrupt):
-            critical(sweep.load_config(config), output=tmp_path, reporter=Stop(chunks))
-        kept, _ = rounds(checkpoint), simulated.clear()
-    assert kept >= 2
+            critical(sweep.load_config(config), output=tmp_path, reporter=Within(checkpoint, number))
+        simulated.clear()
     same_numbers(critical(sweep.load_config(config), output=tmp_path), undisturbed)
-    assert simulated[0][0] == kept
+    assert simulated[0][0] == 3
     assert simulated[0][1] > 0
 
 
 def test_answers_that_were_damaged_are_simulated_again(
     config: Path, tmp_path: Path, undisturbed: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.01)
-    stopped = Stop(60)
+    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.004)
     with pytest.raises(KeyboardInterrupt):
-        critical(sweep.load_config(config), output=tmp_path, reporter=stopped)
+        critical(
+            sweep.load_config(config), output=tmp_path, reporter=Within(tmp_path / "standard_critical.checkpoint", 3)
+        )
     answers = tmp_path / "standard_critical.checkpoint" / "000001.npz"
     answers.write_bytes(answers.read_bytes()[:-100])
     again = Stop(10**9)
