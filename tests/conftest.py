@@ -35,7 +35,6 @@ KERNELS = [
     ("dopri5", "slip", ()),
     ("dopri5", "slip", ("reversals",)),
     ("dopri5", "slip", ("reversals", "first_reversal")),
-    ("dopri5", "averaged", ()),
     ("dopri5", "averaged", ("reversals",)),
 ]
 """Method, model and measurements of the kernels that several files of tests run."""
