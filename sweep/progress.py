@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from sweep.engine.reporter import Progress as Done
 from sweep.engine.reporter import Reporter
+from sweep.jit import showing
+
+_COMPILING = "compiling for this model and machine; later runs find it in the cache"
 
 
 class Terminal(Reporter):
-    """A bar with the cells done, failures so far, trajectories per second and time left."""
+    """A bar with the cells done, failures so far, trajectories per second and time left; and what is compiled."""
 
     def __init__(self, quiet: bool = False) -> None:
         self.console = Console(stderr=True, quiet=quiet, highlight=False)
@@ -26,14 +32,24 @@ class Terminal(Reporter):
         self._task: TaskID | None = None
 
     def __enter__(self) -> Terminal:
+        self._open = ExitStack()
+        self._open.enter_context(showing(self._compiling))
         return self
 
     def __exit__(self, *exception: object) -> None:
+        self._open.close()
         if self._task is not None:
             self._bar.stop()
 
-    def compiling(self) -> None:
-        self.note("compiling the kernel for this model and machine; later runs find it in the cache")
+    @contextmanager
+    def _compiling(self) -> Iterator[None]:
+        """One line for as long as something compiles: with a spinner, where one can turn."""
+        if self._task is None and self.console.is_terminal:
+            with self.console.status(_COMPILING):
+                yield
+        else:
+            self.note(_COMPILING)
+            yield
 
     def note(self, message: str) -> None:
         self.console.print(message, soft_wrap=True, markup=False)

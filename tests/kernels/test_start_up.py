@@ -90,7 +90,7 @@ def test_bit_identical_for_each_grouping_and_thread() -> None:
     with threads(1):
         for i in range(0, len(STEPS), 9):
             np.testing.assert_array_equal(begun(cell(MIXED, i), STEPS[i : i + 1])[0], expected[i])
-    assert len(start_up._start_up.signatures) == 1  # not compiled once for a cell and again for many
+    assert len(start_up.compiled_start_up().signatures) == 1  # not compiled once for a cell and again for many
 
 
 def test_a_level_may_have_more_cells_than_lanes() -> None:

@@ -8,13 +8,12 @@ computed by itself, so it does not matter which ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
-from sweep.jit import OPTIONS, parallel
+from sweep.jit import Cached, compiled, parallel
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
     CONSTANTS,
@@ -121,7 +120,7 @@ def start_up(step: Array, constants: Array, starts: Array, levels: Array) -> Sta
     )  # fmt: skip
     # Always of the same memory layout: for another one the kernel would be compiled again, in this process.
     begins = np.ascontiguousarray(np.concatenate([starts, constants], axis=1))
-    _start_up(started, step, begins, levels, _steps(levels.max()), cells, np.concatenate(ends))
+    compiled_start_up()(started, step, begins, levels, _steps(levels.max()), cells, np.concatenate(ends))
     return started
 
 
@@ -209,7 +208,7 @@ def _make_run() -> Any:
     advance = compile_lanes("advance", "group, points, ticks", _ADVANCE, names)
     size, dopri5_steps = _POINT_SIZE, _DOPRI5_STEPS
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def run(group: Any, points: Any, steps: Any) -> None:
         for n in range(dopri5_steps + 1):
             if n:
@@ -235,7 +234,7 @@ def _make_load() -> Any:
     n_rows, n_begins = len(_GROUP.names), len(SPLIT.states) + len(CONSTANTS)
     SPACING, H = _GROUP.at("spacing"), _GROUP.at("h")
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def load(step: Any, begins: Any, cells: Any, levels: int) -> Any:
         group = np.zeros(n_rows * LANES)
         for lane in range(LANES):
@@ -256,7 +255,7 @@ def _make_store() -> Any:
     SPACING, STATUS, TICKS, WORK = map(_GROUP.at, ("spacing", "status", "ticks", "work"))
     POWER = _POINT.at("power{}")
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def store(started: Any, cells: Any, group: Any, points: Any) -> None:
         for lane in range(len(cells)):
             cell = cells[lane]
@@ -274,19 +273,22 @@ def _make_store() -> Any:
     return store
 
 
-def _make_start_up() -> Callable[..., None]:
+@cache
+def compiled_start_up() -> Cached:
+    """Compiled (started, step, begins, levels, steps, cells, ends) -> None: `start_up` for the cells of `started`.
+
+    `cells` are sorted into groups, and `ends` are the places in it at which these end; the others are as there.
+    """
+    from numba import prange
+
     load, run, store, size = _make_load(), _make_run(), _make_store(), _POINT_SIZE
 
     def run_all(started: Any, step: Any, begins: Any, levels: Any, steps: Any, cells: Any, ends: Any) -> None:
-        for g in numba.prange(len(ends)):
+        for g in prange(len(ends)):
             mine = cells[(ends[g - 1] if g else 0) : ends[g]]
             doublings = levels[mine[0]]
             group, points = load(step, begins, mine, doublings), np.zeros((HISTORY + steps.max()) * size)
             run(group, points, steps[:doublings])
             store(started, mine, group, points)
 
-    compiled: Callable[..., None] = parallel(run_all, "start-up", slip.__file__)
-    return compiled
-
-
-_start_up = _make_start_up()
+    return parallel(run_all, "start-up", slip.__file__)

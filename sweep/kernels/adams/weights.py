@@ -12,14 +12,13 @@ the nodes.  The terms are computed once, in exact fractions; a cell then costs 2
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from fractions import Fraction as F
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from sweep.jit import serial
+from sweep.jit import Cached, serial
 from sweep.kernels.codegen import compile_lanes
 from sweep.kernels.layout import LANES
 from sweep.models.model import Array
@@ -33,7 +32,7 @@ _TERMS = 30
 
 def plain_weights(nodes: tuple[int, ...]) -> Array:
     """Weights w with ∫_0^1 p(t) dt = Σ w_j p(nodes_j) for all powers below k, shape (k,)."""
-    return _tables(nodes)[0]
+    return np.array(_plain(_inverse(nodes)), dtype=float)
 
 
 def fitted_weights(nodes: tuple[int, ...], phase: Array) -> Array:
@@ -49,7 +48,7 @@ def fitted_weights(nodes: tuple[int, ...], phase: Array) -> Array:
     Weights of shape (cells, k).
     """
     weights = np.empty((len(phase), len(nodes)))
-    _fit(np.square(phase), *_tables(nodes), weights)
+    compiled_fit()(np.square(phase), *_tables(nodes), weights)
     return weights
 
 
@@ -62,8 +61,8 @@ def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
     divided difference in θ², divided by a_1.  In this form the equations become c = 0 as θ goes to zero.
     """
     k = len(nodes)
-    inverse = _invert([[F(t) ** q for t in nodes] for q in range(k)])
-    plain = [sum(row[q] / (q + 1) for q in range(k)) for row in inverse]
+    inverse = _inverse(nodes)
+    plain = _plain(inverse)
     null = [row[k - 4 :] for row in inverse]
 
     def moments(q: int) -> list[F]:
@@ -82,6 +81,16 @@ def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
             difference = a / first * sum(HARMONIC ** (2 * i) for i in range(m + 1))
             series[m, 10 + 5 * odd : 15 + 5 * odd] = [float(difference * s) for s in moments(n + 2 * m + 2)]
     return np.array(plain, dtype=float), np.array(null, dtype=float), series
+
+
+def _inverse(nodes: tuple[int, ...]) -> list[list[F]]:
+    """Inverse of the matrix of the powers t_j^q, with a row per node."""
+    return _invert([[F(t) ** q for t in nodes] for q in range(len(nodes))])
+
+
+def _plain(inverse: list[list[F]]) -> list[F]:
+    """The plain weights."""
+    return [sum((x / (q + 1) for q, x in enumerate(row)), F(0)) for row in inverse]
 
 
 def _invert(matrix: list[list[F]]) -> list[list[F]]:
@@ -110,7 +119,8 @@ def _solve_lines() -> list[str]:
     return [*lines, *(f"c[{r * LANES} + lane] = a{r}4" for r in range(4))]
 
 
-def _make_fit() -> Callable[..., None]:
+@cache
+def compiled_fit() -> Cached:
     """Compiled (θ², plain weights, N, series, weights) -> None: writes the fitted weights of all cells to `weights`."""
     terms = [f"A[{i * LANES} + lane] = A[{i * LANES} + lane] * x[lane] + terms[{i}]" for i in range(20)]
     sums = ["w[lane] = plain" + "".join(f" + null[{r}] * c[{r * LANES} + lane]" for r in range(4))]
@@ -131,8 +141,4 @@ def _make_fit() -> Callable[..., None]:
                 combine(w, c, plain[j], null[j])
                 weights[first : first + count, j] = w[:count]
 
-    compiled: Callable[..., None] = serial(fit, "fit")
-    return compiled
-
-
-_fit = _make_fit()
+    return serial(fit, "fit")
