@@ -5,15 +5,14 @@ They are imported when they are first used: an import of all would take a second
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 from sweep.api import __all__ as __all__
 
+TYPE_CHECKING = False  # True for type checkers; `typing` is not imported before Ctrl-C is taken care of
 if TYPE_CHECKING:
     from sweep.api import *  # noqa: F403
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from sweep import api

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as in `sweep`
 if TYPE_CHECKING:
     from sweep.config import Config, ConfigError, load_config
     from sweep.engine.run import run
@@ -28,7 +28,7 @@ _HOMES = {
 """The modules that define these names; each is imported when one of its names is first used."""
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)

@@ -124,18 +124,18 @@ def trajectory(config: Path, cells: tuple[str, ...], output: Path | None, settin
     normal force, energy and the work of friction.  Several trajectories are drawn over each other.
     """
     with _explained():
-        from sweep.plots import trajectories as plots
-        from sweep.progress import Terminal
-        from sweep.results.folder import RunFiles
-        from sweep.studies.trajectory import trajectory as follow
-
-        interrupt.raise_again()
         checked = _load(config, settings)
         at: dict[str, Any] = {}
         for name, value in (_parse_pair(cell, "--at") for cell in cells):
             at.setdefault(name, []).append(value)
         if unknown := [name for name in at if name not in PARAMETERS]:
             _refuse("--at", f"unknown parameter; allowed: {', '.join(PARAMETERS)}", unknown[0])
+        from sweep.plots import trajectories as plots
+        from sweep.progress import Terminal
+        from sweep.results.folder import RunFiles
+        from sweep.studies.trajectory import trajectory as follow
+
+        interrupt.raise_again()
         with Terminal():
             result = follow(checked, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
@@ -157,6 +157,7 @@ def critical(config: Path, width: float, output: Path | None, settings: tuple[st
     Writes NAME_critical.nc and .png.
     """
     with _explained():
+        checked = _load(config, settings)
         from sweep.plots import critical as critical_plot
         from sweep.progress import Terminal
         from sweep.results.folder import RunFiles
@@ -164,7 +165,6 @@ def critical(config: Path, width: float, output: Path | None, settings: tuple[st
         from sweep.studies.critical import remarks
 
         interrupt.raise_again()
-        checked = _load(config, settings)
         with Terminal(quiet) as terminal:
             result = search(checked, width, terminal.note)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_critical")

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import signal
-from types import FrameType
 
 INTERRUPTED = 130
 """The exit code of an interrupted command."""
@@ -25,6 +24,6 @@ def raise_again() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def _end(_number: int, _frame: FrameType | None) -> None:
+def _end(_number: int, _frame: object) -> None:
     os.write(2, b"interrupted\n")
     os._exit(INTERRUPTED)

@@ -159,6 +159,10 @@ class Cached:
         """Whether the first call will find machine code, in memory or on disk."""
         return bool(self._dispatcher.signatures) or (self._cache is not None and self._cache.holds())
 
+    def is_missing(self) -> bool:
+        """Whether another process could compile it into the cache on disk, which lacks it."""
+        return self._cache is not None and not self.is_compiled()
+
 
 @cache
 def _disk_cache() -> Any:

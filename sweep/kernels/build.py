@@ -38,8 +38,8 @@ _POLL = 0.05
 def build(kernels: Iterable[Kernel]) -> None:
     """Compile what the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
 
-    If a process fails, for instance because there is no folder to write to, nothing is said: what it was to compile
-    is compiled where it is first used.
+    What is missing after that, because a process failed or there is no folder for a cache, is compiled where it is
+    first used.
     """
     if pieces := list(dict.fromkeys(piece for kernel in kernels for piece in _missing(kernel))):
         with compiling():
@@ -49,11 +49,12 @@ def build(kernels: Iterable[Kernel]) -> None:
 def _missing(kernel: Kernel) -> Iterator[Piece]:
     """What the cache lacks to run `kernel`, the longest first."""
     model = kernel.model.name
-    if not kernel.is_compiled():
+    advance, filling = kernel.compiled_functions()
+    if advance.is_missing():
         yield "kernel", kernel.method, model, *(each.spec for each in kernel.measurements if each.in_kernel)
-    if not kernel.can_make_images():
+    if any(function.is_missing() for function in filling):
         yield "images", kernel.method, model
-    if not compiled_approach(MODELS[model]).is_compiled():
+    if compiled_approach(MODELS[model]).is_missing():
         yield "approach", model
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import inline, parallel, threads
+from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, call_all, make_load
 from sweep.kernels.lanes import STABLE, Look, make_advance, make_look
 from sweep.kernels.layout import Layout, Table
@@ -209,9 +209,12 @@ class Kernel:
         """Compile `advance`, or load it from disk, so that no timing of a run includes that."""
         self.advance(np.empty((0, len(self.layout.names))), np.empty(0, dtype=np.int64), 0, False)
 
-    def can_make_images(self) -> bool:
-        """Whether all compiled functions that `images` calls will find machine code, in memory or on disk."""
-        return True
+    def compiled_functions(self) -> tuple[Cached, tuple[Cached, ...]]:
+        """The function behind `advance`, and those that `images` calls."""
+        return self._advance, self._image_functions()
+
+    def _image_functions(self) -> tuple[Cached, ...]:
+        return ()
 
 
 @inline

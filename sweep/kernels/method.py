@@ -17,7 +17,7 @@ status to `PARADOX`, `LIFT_OFF` or `DIVERGED`.  Lanes that are not active comput
 states, `done` and status.
 
 A kernel has to name its `method`, and to implement `images`, which makes images at t = 0 with the help of `_start`.
-It overrides `can_make_images` if `images` calls compiled functions, `_reached` if its images do not begin at t = 0,
+It overrides `_image_functions` if `images` calls compiled functions, `_reached` if its images do not begin at t = 0,
 `model_states` if its states are not those of the model, and `carry` if it can cross stretches of small rattle without
 steps.
 """

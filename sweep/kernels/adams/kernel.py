@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import compiled, inline
+from sweep.jit import Cached, compiled, inline
 from sweep.kernels.adams import start_up, stretches, weights
 from sweep.kernels.adams.start_up import Started, count_levels, duration
 from sweep.kernels.adams.step import (
@@ -92,8 +92,8 @@ class AdamsKernel(Kernel):
         self._set_looks(table, columns)
         return images
 
-    def can_make_images(self) -> bool:
-        return start_up.compiled_start_up().is_compiled() and weights.compiled_fit().is_compiled()
+    def _image_functions(self) -> tuple[Cached, ...]:
+        return start_up.compiled_start_up(), weights.compiled_fit()
 
     def model_states(self, images: Array) -> Array:
         return slip_split.velocities(*self.unpack(images))
