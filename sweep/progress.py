@@ -30,6 +30,7 @@ class Terminal(Reporter):
             console=self.console,
         )
         self._task: TaskID | None = None
+        self._told = False
 
     def __enter__(self) -> Terminal:
         self._open = ExitStack()
@@ -48,7 +49,9 @@ class Terminal(Reporter):
             with self.console.status(_COMPILING):
                 yield
         else:
-            self.note(_COMPILING)
+            if not self._told:
+                self.note(_COMPILING)
+            self._told = True
             yield
 
     def note(self, message: str) -> None:
