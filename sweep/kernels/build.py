@@ -18,6 +18,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -60,16 +61,14 @@ def _missing(kernel: Kernel) -> Iterator[Piece]:
 
 def _compile(pieces: list[Piece]) -> None:
     waiting, running = pieces[::-1], list[subprocess.Popen[bytes]]()
-    try:
+    with ExitStack() as stack:
         while waiting or running:
             while waiting and len(running) < threads():
-                running.append(_start(waiting.pop()))
+                process = stack.enter_context(_start(waiting.pop()))
+                stack.callback(process.kill)  # if this is interrupted, and before it is waited for
+                running.append(process)
             time.sleep(_POLL)
             running = [process for process in running if process.poll() is None]
-    finally:
-        for process in running:
-            process.kill()
-            process.wait()
 
 
 def _start(piece: Piece) -> subprocess.Popen[bytes]:
