@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +100,8 @@ def threads() -> int:
 
 def fingerprint(*modules: str) -> str:
     """Hash of all sources from which a kernel can be built, and of the versions of what compiles them."""
+    from importlib import metadata  # which takes as long to import as all else here
+
     root = Path(__file__).parent
     files = [path for pattern in _NUMERIC_SOURCES for path in sorted(root.glob(pattern))]
     digest = hashlib.sha256()

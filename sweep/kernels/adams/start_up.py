@@ -126,20 +126,31 @@ def start_up(step: Array, constants: Array, starts: Array, levels: Array) -> Sta
 
 def _at(name: str) -> str:
     """The place at which the loops below keep a quantity of one lane; point 0 of the history is the oldest."""
-    for pattern in _POINT.names:
-        for slot in range(HISTORY + 1):
-            if name == pattern.format(slot):
-                return f"points[{slot * _POINT_SIZE + _POINT.at(pattern)} + lane]"
-    if name in _WEIGHTS:
-        return f"({_WEIGHTS[name]!r} * h)"
+    if name in _POINTS:
+        return f"points[{_POINTS[name]} + lane]"
+    if name.startswith(("gamma", "predict", "correct")):
+        return f"({_weights()[name]!r} * h)"
     return f"group[{_GROUP.at(name)} + lane]"
 
 
-_WEIGHTS = {
-    "gamma": BDF_GAMMA,
-    **{f"predict{j}": float(w) for j, w in enumerate(plain_weights(PREDICTOR_NODES))},
-    **{f"correct{j}": float(w) for j, w in enumerate(plain_weights(CORRECTOR_NODES))},
+_POINTS = {
+    pattern.format(slot): slot * _POINT_SIZE + _POINT.at(pattern)
+    for slot in range(HISTORY + 1)
+    for pattern in _POINT.names
 }
+"""Where the lanes of each quantity of a point begin."""
+
+
+@cache
+def _weights() -> dict[str, float]:
+    """The plain weights, in steps; they take as long as the rest of this module to make."""
+    predict, correct = plain_weights(PREDICTOR_NODES), plain_weights(CORRECTOR_NODES)
+    return {
+        "gamma": BDF_GAMMA,
+        **{f"predict{j}": float(w) for j, w in enumerate(predict)},
+        **{f"correct{j}": float(w) for j, w in enumerate(correct)},
+    }
+
 
 _BEGIN_STEP = [
     *load_lines(_at),
@@ -176,25 +187,29 @@ _RECORD = [
 
 _REPLACE = [*_TO_SPLIT, *(f"{_at(name)} = s[{i}]" for i, name in enumerate(SPLIT.states))]
 
-_SET_STEP = [
-    *load_lines(_at),
-    f"h = ticks * {_at('spacing')}",
-    f"{_at('h')} = h",
-    f"{_at('per_weight')} = 1.0 / {_at('correct0')}",
-    f"matrix = implicit({_at('correct0')}, p)",
-    *(f"{_at(name)} = matrix[{i}]" for i, name in enumerate(MATRIX)),
-]
 
-# Steps from points 0 … 7 to point 8; the work follows from the Adams-Moulton formula of order four.
-_ADVANCE = [
-    *_BEGIN_STEP,
-    *step_lines(_at, range(HISTORY)[::-1]),
-    *store_lines(_at, HISTORY),
-    f"{_at('power8')} = power",
-    f"done = h / 24.0 * (9.0 * power + 19.0 * {_at('power7')} - 5.0 * {_at('power6')} + {_at('power5')})",
-    *accept_lines(_at),
-    *_end_step("ticks"),
-]
+def _set_step() -> list[str]:
+    return [
+        *load_lines(_at),
+        f"h = ticks * {_at('spacing')}",
+        f"{_at('h')} = h",
+        f"{_at('per_weight')} = 1.0 / {_at('correct0')}",
+        f"matrix = implicit({_at('correct0')}, p)",
+        *(f"{_at(name)} = matrix[{i}]" for i, name in enumerate(MATRIX)),
+    ]
+
+
+def _advance() -> list[str]:
+    """Steps from points 0 … 7 to point 8; the work follows from the Adams-Moulton formula of order four."""
+    return [
+        *_BEGIN_STEP,
+        *step_lines(_at, range(HISTORY)[::-1]),
+        *store_lines(_at, HISTORY),
+        f"{_at('power8')} = power",
+        f"done = h / 24.0 * (9.0 * power + 19.0 * {_at('power7')} - 5.0 * {_at('power6')} + {_at('power5')})",
+        *accept_lines(_at),
+        *_end_step("ticks"),
+    ]
 
 
 def _make_run() -> Any:
@@ -204,8 +219,8 @@ def _make_run() -> Any:
     record = compile_lanes("record", "group, points", _RECORD, names)
     replace = compile_lanes("replace", "group", _REPLACE, names)
     dopri5 = compile_lanes("dopri5", "group", _DOPRI5, names)
-    set_step = compile_lanes("set_step", "group, ticks", _SET_STEP, names)
-    advance = compile_lanes("advance", "group, points, ticks", _ADVANCE, names)
+    set_step = compile_lanes("set_step", "group, ticks", _set_step(), names)
+    advance = compile_lanes("advance", "group, points, ticks", _advance(), names)
     size, dopri5_steps = _POINT_SIZE, _DOPRI5_STEPS
 
     @compiled
