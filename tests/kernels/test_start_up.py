@@ -127,7 +127,7 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
 
 
 def test_the_loop_over_lanes_is_vector_instructions() -> None:
-    advance = compile_lanes("advance", "group, points, ticks", start_up._ADVANCE, NAMES)
+    advance = compile_lanes("advance", "group, points, ticks", start_up._advance(), NAMES)
     group, points = np.zeros(len(start_up._GROUP.names) * LANES), np.zeros((HISTORY + 1) * start_up._POINT_SIZE)
     advance(group, points, 1.0)
     assembly = next(iter(advance.inspect_asm().values()))
