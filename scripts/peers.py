@@ -37,17 +37,19 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from tracing import traced_rhs
 
 from sweep.engine.executor import execute
+from sweep.jit import load_numba
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import make_kernel
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models.model import Array, stack
 from sweep.models.slip import MODEL
+
+numba = load_numba()
 
 THREADS = 2
 T_END = 400.0

@@ -1,4 +1,24 @@
-"""Parameter sweeps for the reversals of a rattleback.  The public names stand in `sweep.api`."""
+"""Parameter sweeps for the reversals of a rattleback.  The public names stand in `sweep.api`.
 
-from sweep.api import *  # noqa: F403
+They are imported when they are first used: an import of all would take a second, even where only help is asked for.
+"""
+
+from __future__ import annotations
+
 from sweep.api import __all__ as __all__
+
+TYPE_CHECKING = False  # True for type checkers; `typing` is not imported before Ctrl-C is taken care of
+if TYPE_CHECKING:
+    from sweep.api import *  # noqa: F403
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from sweep import api
+
+    return getattr(api, name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

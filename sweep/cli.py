@@ -10,17 +10,18 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from sweep.config.faults import ConfigError, Fault, brief, printable
+from sweep import interrupt
+from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
     from sweep.config import Config
 
-DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
 
 _PATH = click.Path(path_type=Path)
 
@@ -85,12 +86,13 @@ def run(
             click.echo(estimate(checked))
             return
         if workers and scheduler:
-            raise ConfigError([Fault("--workers", None, None, (), "given with --scheduler; allowed: one of the two")])
+            _refuse("--workers", "given with --scheduler; allowed: one of the two")
         from sweep.engine.cluster import connected
         from sweep.engine.run import run as run_sweep
         from sweep.progress import Terminal
         from sweep.results.summary import failed_fraction, summarize
 
+        interrupt.raise_again()
         with Terminal(quiet) as terminal:
             try:
                 with connected(workers, scheduler) as cluster:
@@ -126,16 +128,15 @@ def trajectory(
     normal force, energy and the work of friction.  Several trajectories are drawn over each other.
     """
     with _explained():
-        from sweep.studies.trajectory import estimate
-
         checked = _load(config, settings)
         at: dict[str, Any] = {}
         for name, value in (_parse_pair(cell, "--at") for cell in cells):
             at.setdefault(name, []).append(value)
         if unknown := [name for name in at if name not in PARAMETERS]:
-            message = f"unknown parameter; allowed: {', '.join(PARAMETERS)}"
-            raise ConfigError([Fault("--at", None, None, (unknown[0],), message)])
+            _refuse("--at", f"unknown parameter; allowed: {', '.join(PARAMETERS)}", unknown[0])
         if dry_run:
+            from sweep.studies.trajectory import estimate
+
             click.echo(estimate(checked, at))
             return
         from sweep.plots import trajectories as plots
@@ -143,6 +144,7 @@ def trajectory(
         from sweep.results.folder import RunFiles
         from sweep.studies.trajectory import trajectory as follow
 
+        interrupt.raise_again()
         with Terminal(quiet, "sqrt(c/g)") as terminal:
             result = follow(checked, reporter=terminal, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
@@ -181,6 +183,7 @@ def critical(
         from sweep.studies.critical import remarks
 
         folder = output or Path("runs") / checked.name
+        interrupt.raise_again()
         with Terminal(quiet, "bodies") as terminal:
             try:
                 result = search(checked, width, folder, fresh=fresh, reporter=terminal)
@@ -202,9 +205,12 @@ def reproduce(output: Path) -> None:
     Exit code 0 only if every row holds, 1 otherwise.
     """
     with _explained():
+        from sweep.progress import Terminal
         from sweep.reproduce import reproduce as compare
 
-        failed = compare(output, click.echo)
+        interrupt.raise_again()
+        with Terminal():
+            failed = compare(output, click.echo)
         click.echo(f"\nwrote {output / 'reproduce.html'}; {len(failed)} rows do not hold")
         sys.exit(ROWS_FAILED if failed else DONE)
 
@@ -220,8 +226,11 @@ def bench(output: Path) -> None:
     """
     with _explained():
         from sweep.bench import bench as measure
+        from sweep.progress import Terminal
 
-        failed = measure(output, click.echo)
+        interrupt.raise_again()
+        with Terminal():
+            failed = measure(output, click.echo)
         click.echo(f"\nwrote {output / 'bench.html'}, .png and .csv; {len(failed)} hard cases do not hold")
         sys.exit(ROWS_FAILED if failed else DONE)
 
@@ -237,6 +246,7 @@ def plot(file: Path, variable: str | None, output: Path | None) -> None:
         from sweep.results.netcdf import open_dataset
         from sweep.results.writing import replacing
 
+        interrupt.raise_again()
         dataset = open_dataset(file)
         with _about(file):
             figure = picture.draw(dataset, variable)
@@ -267,27 +277,38 @@ def _load(config: Path, settings: tuple[str, ...]) -> Config:
     """The configuration of a command, with the values of `--set`."""
     from sweep.config import load_config
     from sweep.config.document import parse_value
+    from sweep.config.faults import brief
 
     parsed = {}
     for setting in settings:
         path, equals, value = setting.partition("=")
         if not (equals and path):
-            raise ConfigError([Fault(f"--set {brief(setting)}", None, None, (), "not a setting; allowed: PATH=VALUE")])
+            _refuse(f"--set {brief(setting)}", "not a setting; allowed: PATH=VALUE")
         parsed[path] = parse_value(value, f"--set {brief(path)}")
     return load_config(config, parsed)
 
 
 def _parse_pair(text: str, option: str) -> tuple[str, float]:
     from sweep.config.document import number
+    from sweep.config.faults import brief
 
     name, _, value = text.partition("=")
     if (parsed := number(value)) is None:
-        raise ConfigError([Fault(f"{option} {brief(text)}", None, None, (), "allowed: NAME=NUMBER")])
+        _refuse(f"{option} {brief(text)}", "allowed: NAME=NUMBER")
     return name, parsed
+
+
+def _refuse(option: str, message: str, *path: str) -> NoReturn:
+    """Raise the fault of an option."""
+    from sweep.config.faults import ConfigError, Fault
+
+    raise ConfigError([Fault(option, None, None, path, message)])
 
 
 def _say(text: str, *, err: bool = False) -> None:
     """Print lines that may quote files and their names."""
+    from sweep.config.faults import printable
+
     click.echo("\n".join(map(printable, text.split("\n"))), err=err)
 
 
@@ -315,6 +336,10 @@ class _explained:
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         if error is None:
             return
+        if isinstance(error, KeyboardInterrupt):
+            click.echo("interrupted", err=True)
+            sys.exit(INTERRUPTED)
+        from sweep.config.faults import ConfigError
         from sweep.results.store import StoreError
 
         if isinstance(error, ConfigError | StoreError):
@@ -323,6 +348,3 @@ class _explained:
         if isinstance(error, OSError):
             _say(f"{error.filename or 'a file'}: {error.strerror or error}", err=True)
             sys.exit(WRONG_INPUT)
-        if isinstance(error, KeyboardInterrupt):
-            click.echo("interrupted", err=True)
-            sys.exit(INTERRUPTED)

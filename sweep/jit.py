@@ -1,4 +1,7 @@
-"""All Numba options of the project, and the on-disk cache that makes compiled kernels safe to reuse."""
+"""All Numba options of the project, and the on-disk cache that makes compiled kernels safe to reuse.
+
+Numba takes half a second to import, so it is imported when the first function is to be compiled.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,14 @@ import hashlib
 import itertools
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextvars import ContextVar
+from functools import cache
 from pathlib import Path
+from threading import RLock
 from typing import Any
-
-import llvmlite
-import numba
-import numpy as np
-from numba.core.bytecode import FunctionIdentity
-from numba.core.caching import FunctionCache
-from numba.core.registry import cpu_target
-from numba.extending import register_jitable
 
 # contract: fuse a*b + c into one FMA.  nsz, arcp: harmless on the values met here.
 # Not nnan or ninf: these let the compiler assume that no NaN or infinity occurs, so tests such as `x > 0`
@@ -28,13 +28,32 @@ FASTMATH = {"contract", "nsz", "arcp"}
 # error_model="python" would put a branch in front of each division, which prevents vectorisation.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FASTMATH}
 
-# Numba numbers the functions of each process from 1, and only that number distinguishes the symbols of two
-# closures with the same name.  When one process loaded two kernels that two others had compiled, these shared
-# symbols, and one called the loop of the other, made for another layout: wrong numbers, or a crash.  So each
-# process starts from a random number.
-FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(5), "little"))
-
 _NUMERIC_SOURCES = ("jit.py", "models/**/*.py", "kernels/**/*.py")
+
+_waiting: list[tuple[Callable[..., Any], bool]] = []
+"""Functions that Numba does not know yet, because it is not imported, and whether they are inlined."""
+
+
+@cache
+def load_numba() -> Any:
+    """The module `numba`, which from now on knows the inline functions: others that compile them take it from here."""
+    import numba
+    from numba.core.bytecode import FunctionIdentity
+
+    # Numba numbers the functions of each process from 1, and only that number distinguishes the symbols of two
+    # closures with the same name.  When one process loaded two kernels that two others had compiled, these shared
+    # symbols, and one called the loop of the other, made for another layout: wrong numbers, or a crash.  So each
+    # process starts from a random number.
+    FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(5), "little"))
+    while _waiting:
+        _register(*_waiting.pop(0))
+    return numba
+
+
+def _register(function: Callable[..., Any], inlined: bool) -> None:
+    from numba.extending import register_jitable
+
+    register_jitable(forceinline=inlined, **OPTIONS)(function)
 
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -43,61 +62,164 @@ def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     Called from Python, it remains plain Python, and so do the inline functions that it calls: it takes arrays,
     real or complex, and nothing is compiled.
     """
-    jitable: Callable[..., Any] = register_jitable(forceinline=True, **OPTIONS)(function)
-    return jitable
+    return _marked(function, inlined=True)
 
 
-def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -> Any:
-    """Compile `function` with prange; cache the result on disk under `specialisation` and a hash of all sources.
+def called(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `inline`, but a function of its own in the compiled code too: for one that is called from several places."""
+    return _marked(function, inlined=False)
 
-    Numba's own cache depends on the file that defines a function and on the function's closure.  Here the
-    closure holds compiled functions from other files.  Numba takes these for new ones in every process, so its
-    cache would never hit, and it does not notice when those files are edited.  The key used instead consists of
-    the specialisation and of a hash: of every numeric source, of the `modules` (files of models from outside
-    the package), and of the versions of the libraries that compile them.
+
+def _marked(function: Callable[..., Any], inlined: bool) -> Callable[..., Any]:
+    if load_numba.cache_info().currsize:
+        _register(function, inlined)
+    else:
+        _waiting.append((function, inlined))
+    return function
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """`function`, to be compiled when it is first called, or as part of the compiled function that calls it."""
+    return load_numba().njit(function, **OPTIONS)
+
+
+def exactly_compiled(function: Callable[..., Any]) -> Any:
+    """As `compiled`, but operations are carried out as they are written: without `FASTMATH`."""
+    return load_numba().njit(function, error_model=OPTIONS["error_model"])
+
+
+def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -> Cached:
+    """`function`, with prange, from the cache on disk, or compiled when it is first called.
+
+    Parameters
+    ----------
+    specialisation : tells apart what is made from the same function; one of them has one signature only
+    modules : files of models from outside the package
     """
-    return _cached(numba.njit(function, parallel=True, **OPTIONS), specialisation, *modules)
+    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), specialisation, fingerprint(*modules))
 
 
-def serial(function: Callable[..., Any], specialisation: str) -> Any:
+def serial(function: Callable[..., Any], specialisation: str) -> Cached:
     """As `parallel`, but on the thread that calls it, while other threads go on."""
-    return _cached(numba.njit(function, nogil=True, **OPTIONS), specialisation)
+    return Cached(load_numba().njit(function, nogil=True, **OPTIONS), specialisation, fingerprint())
 
 
-def _cached(dispatcher: Any, specialisation: str, *modules: str) -> Any:
-    dispatcher._cache = _SpecialisedCache(dispatcher.py_func, (specialisation, fingerprint(*modules)))
-    return dispatcher
+def threads() -> int:
+    """Number of threads on which parallel functions run."""
+    return int(load_numba().get_num_threads())
 
 
-def is_cached(dispatcher: Any, signature: tuple[Any, ...]) -> bool:
-    """Whether `dispatcher` can load `signature` from disk instead of compiling it."""
-    return bool(dispatcher._cache.holds(signature))
+def on_all_threads(function: Callable[[Any], None], items: Sequence[Any]) -> None:
+    """Call `function` for each of `items`; it has to spend its time in functions of `serial`."""
+    if items:
+        shares = [items[i :: 4 * threads()] for i in range(min(len(items), 4 * threads()))]
+        with ThreadPoolExecutor(threads()) as pool:
+            for future in [pool.submit(lambda share: [*map(function, share)], share) for share in shares]:
+                future.result()
 
 
 def fingerprint(*modules: str) -> str:
     """Hash of all sources from which a kernel can be built, and of the versions of what compiles them."""
+    from importlib import metadata  # which takes as long to import as all else here
+
     root = Path(__file__).parent
     files = [path for pattern in _NUMERIC_SOURCES for path in sorted(root.glob(pattern))]
     digest = hashlib.sha256()
     for path in [*files, *map(Path, modules)]:
         name = path.relative_to(root) if path.is_relative_to(root) else Path(path.name)
         digest.update(name.as_posix().encode() + b"\0" + path.read_bytes())
-    for version in (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__):
+    for version in (platform.python_version(), *map(metadata.version, ("numba", "llvmlite", "numpy"))):
         digest.update(version.encode())
     return digest.hexdigest()[:16]
 
 
-class _SpecialisedCache(FunctionCache):
-    """Numba's cache, in which `key` (the specialisation and the hash of the sources) replaces the closure."""
+_LOADING = RLock()
 
-    def __init__(self, function: Callable[..., Any], key: tuple[str, str]) -> None:
-        super().__init__(function)  # type: ignore[no-untyped-call]
-        self._key = key
+_shown: ContextVar[Callable[[], AbstractContextManager[Any]]] = ContextVar("shown", default=nullcontext)
 
-    def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
-        return (sig, codegen.magic_tuple(), self._key)
 
-    def holds(self, sig: tuple[Any, ...]) -> bool:
-        context = cpu_target.target_context
-        context.refresh()
-        return self._index_key(sig, context.codegen()) in self._cache_file._load_index()  # type: ignore[no-untyped-call]
+@contextmanager
+def showing(show: Callable[[], AbstractContextManager[Any]]) -> Iterator[None]:
+    """Enter `show()` whenever something begins to be compiled, and leave it when that is done."""
+    token = _shown.set(show)
+    try:
+        yield
+    finally:
+        _shown.reset(token)
+
+
+def compiling() -> AbstractContextManager[Any]:
+    """To be entered while something is compiled: shows this where `showing` says how."""
+    return _shown.get()()
+
+
+class Cached:
+    """A compiled function whose machine code is kept on disk.
+
+    Numba's own cache depends on the file that defines a function and on the function's closure.  Here the closure
+    holds compiled functions from other files.  Numba takes these for new ones in every process, so its cache would
+    never hit, and it does not notice when those files are edited.  The key used instead consists of the
+    specialisation and of the hash of all numeric sources and of the libraries that compile them.
+    """
+
+    def __init__(self, dispatcher: Any, specialisation: str, sources: str) -> None:
+        self._dispatcher, self._cache = dispatcher, None
+        with suppress(RuntimeError):  # Numba finds no folder to write to: each process compiles for itself
+            self._cache = dispatcher._cache = _disk_cache()(dispatcher.py_func, specialisation, sources)
+
+    def __call__(self, *arguments: Any) -> None:
+        if not self._dispatcher.signatures:
+            self._load(arguments)
+        self._dispatcher(*arguments)
+
+    def _load(self, arguments: tuple[Any, ...]) -> None:
+        # Numba compiles on one thread at a time, but while it loads from disk another thread finds it half ready.
+        with _LOADING:
+            if not self._dispatcher.signatures:
+                with nullcontext() if self.is_compiled() else compiling():
+                    self._dispatcher.compile(tuple(map(load_numba().typeof, arguments)))
+
+    @property
+    def signatures(self) -> list[Any]:
+        """The types of arguments for which there is machine code in memory."""
+        return list(self._dispatcher.signatures)
+
+    def is_compiled(self) -> bool:
+        """Whether the first call will find machine code, in memory or on disk."""
+        return bool(self._dispatcher.signatures) or (self._cache is not None and self._cache.holds())
+
+    def is_missing(self) -> bool:
+        """Whether another process could compile it into the cache on disk, which lacks it."""
+        return self._cache is not None and not self.is_compiled()
+
+
+@cache
+def _disk_cache() -> Any:
+    """The class of the caches of `Cached` functions, derived from Numba's."""
+    from numba.core.caching import FunctionCache, IndexDataCacheFile
+    from numba.core.registry import cpu_target
+
+    class DiskCache(FunctionCache):
+        def __init__(self, function: Callable[..., Any], specialisation: str, sources: str) -> None:
+            super().__init__(function)  # type: ignore[no-untyped-call]
+            # Each specialisation has files of its own: processes that compile two of them at the same time would
+            # otherwise write to one index, and could give the code of one the name of the other.  Another hash of
+            # the sources makes what the files hold obsolete.
+            name = f"{self._impl.filename_base}-{hashlib.sha256(specialisation.encode()).hexdigest()[:16]}"
+            self._cache_file = IndexDataCacheFile(self.cache_path, name, sources)
+
+        def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+            return (sig, codegen.magic_tuple())
+
+        def holds(self) -> bool:
+            context = cpu_target.target_context
+            context.refresh()
+            machine, files = context.codegen().magic_tuple(), self._cache_file
+            found = [name for (_, theirs), name in files._load_index().items() if theirs == machine]
+            return any(os.path.exists(files._data_path(name)) for name in found)
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            with suppress(OSError):  # such as a full disk: the code in memory runs all the same
+                super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+
+    return DiskCache

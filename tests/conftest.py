@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from pathlib import Path
 
 import numba
@@ -15,6 +15,7 @@ from support import SMALL
 from support.kernels import default_measures, kernel
 
 import sweep
+from sweep.jit import showing
 from sweep.kernels.build import build
 
 # Compiling takes longer than any deadline; the same examples on every machine.
@@ -46,11 +47,9 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and not config.option.collectonly
     if hasattr(config, "workerinput") or not whole:
         return
-    missing = [each for each in KERNELS if not kernel(*each).is_compiled()]
-    if missing:
-        config.get_terminal_writer().line(f"compiling {len(missing)} kernels", flush=True)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(lambda each: build(*each), missing))
+    writer = config.get_terminal_writer()
+    with showing(lambda: nullcontext(writer.line("compiling kernels", flush=True))):
+        build(kernel(*each) for each in KERNELS)
 
 
 @pytest.fixture(scope="session")

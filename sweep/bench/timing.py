@@ -135,7 +135,7 @@ class Work:
     def affordable(self, effort: Effort) -> Work:
         """The first of the trajectories, as many as should run in a third of the patience."""
         count = len(self)
-        seconds = nominal_seconds(self._images(), self.kernel)
+        seconds = nominal_seconds(self.t_end / self.step)
         while count > 2 * LANES and seconds > effort.patience / 3:
             count, seconds = count // 2, seconds / 2
         return Work(self.kernel, {n: v[:count] for n, v in self.columns.items()}, self.step[:count], self.t_end)

@@ -6,6 +6,7 @@ import hashlib
 import json
 import sys
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -218,6 +219,10 @@ class Config:
         }
 
     def to_yaml(self) -> str:
+        return self._yaml
+
+    @cached_property
+    def _yaml(self) -> str:
         stream = StringIO()
         yaml = YAML(typ="safe", pure=True)
         yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]

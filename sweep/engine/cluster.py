@@ -19,13 +19,19 @@ import numba
 
 from sweep.config import Config
 from sweep.engine.local import Done, run_group
+from sweep.engine.plan import kernels
 from sweep.grid import Tile
+from sweep.kernels.build import build
+from sweep.models import MODELS
 from sweep.results.identity import Identity
 from sweep.results.provenance import identify, sources
 from sweep.results.store import StoreError
 
 AHEAD = 3
 """Tiles per worker that are sent out before the first comes back."""
+
+_SAMPLE = 4096
+"""Cells by which it is judged which kernels a run needs."""
 
 PATIENCE = "10s"
 """How long to wait for a scheduler to answer."""
@@ -34,10 +40,16 @@ _LOST = "the dask scheduler is gone; finished tiles are kept, and the same comma
 
 
 class Cluster:
-    """A dask scheduler and its workers."""
+    """A dask scheduler and its workers.
 
-    def __init__(self, client: Any) -> None:
-        self.client = client
+    Parameters
+    ----------
+    client : connected to the scheduler
+    local : whether the workers find what this process compiles: then it compiles for all of them
+    """
+
+    def __init__(self, client: Any, local: bool = False) -> None:
+        self.client, self.local = client, local
 
     def run(self, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Done]:
         """Run the tiles `todo`, and yield them as they come back.
@@ -50,6 +62,8 @@ class Cluster:
         from distributed import CancelledError, KilledWorker, as_completed
         from distributed.comm import CommClosedError
 
+        if self.local and config.model in MODELS:
+            build(kernels(config))
         # A task's result rather than scattered data, which would be lost along with the workers that hold it.
         shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
         waiting, numbers = iter(todo), dict[Any, int]()
@@ -143,7 +157,7 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
             ) as cluster,
             distributed.Client(cluster, set_as_default=False) as client,
         ):
-            yield Cluster(client)
+            yield Cluster(client, local=True)
         return
     try:
         # A client that is given a wrong address waits 20 s for itself when it is collected, and prints a traceback.

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from sweep.config import Config
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import GROUP
-from sweep.engine.plan import plan
+from sweep.engine.plan import choose
 from sweep.grid import Grid
+from sweep.kernels.stability import uncompiled
 from sweep.models import MODELS
 
 _SAMPLE = 4096
-"""Cells that are planned to judge all the others by."""
+"""Cells whose steps are chosen to judge all the others by."""
 
 _BYTES_A_CELL = 130
 """What the results of a cell take on disk."""
@@ -23,16 +26,18 @@ def estimate(config: Config) -> str:
     cells = f"cells:  {grid.size} ({axes})" + (", not all of them simulated" if config.refine else "")
     if config.model not in MODELS:
         return cells
-    sample = plan(config, grid.sample(_SAMPLE))
-    share = grid.size / sample.grid.size
-    steps = sum(part.images[:, part.kernel.row("goal")].sum() for part in sample.parts) * share
-    seconds = sum(nominal_seconds(part.images, part.kernel) for part in sample.parts) * share
-    bytes_a_cell = sum(part.images.nbytes for part in sample.parts) / sample.grid.size
+    sample = grid.sample(_SAMPLE)
+    with uncompiled():
+        chosen, share = choose(config, sample), grid.size / sample.size
+    steps = [np.ceil(config.integrator.t_end / each.step) for each in chosen]
+    total, seconds = sum(each.sum() for each in steps) * share, sum(map(nominal_seconds, steps)) * share
+    numbers = sum(len(each.cells) * len(each.kernel.layout.names) for each in chosen)
+    bytes_a_cell = np.dtype(float).itemsize * numbers / sample.size
     memory, disk = min(grid.size, GROUP) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
     return "\n".join(
         [
             cells,
-            f"steps:  at most {steps:.3g}, {steps / grid.size:.3g} per cell",
+            f"steps:  at most {total:.3g}, {total / grid.size:.3g} per cell",
             f"memory: {memory:.3g} MiB for running trajectories; on disk as much again, and {disk:.3g} MiB of results",
             f"time:   at most about {seconds:.3g} s, if every cell runs to t_end; cells that settle stop earlier",
         ]

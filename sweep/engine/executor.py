@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-import numba
 import numpy as np
 
 from sweep.grid import Array
+from sweep.jit import threads
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.status import RUNNING
@@ -68,10 +68,8 @@ def _rescale(blocks: int, seconds: float, wanted: float) -> int:
     return min(max(1, int(blocks * np.clip(wanted / seconds, 0.25, 8))), _MOST_BLOCKS)
 
 
-def nominal_seconds(images: Array, kernel: Kernel) -> float:
-    """Rough upper bound on the time for `images`, as if each were stepped to its time limit."""
-    goal = images[:, kernel.row("goal")] - images[:, kernel.row("done")]
-    threads = numba.get_num_threads()
-    lanes = max(threads * LANES, len(images))
-    blocks = np.ceil(goal / BLOCK)
-    return float(max(blocks.mean() * lanes / threads, blocks.max() * LANES) * BLOCK * STEP_SECONDS)
+def nominal_seconds(steps: Array) -> float:
+    """Rough upper bound on the time for trajectories of so many `steps`, shape (cells,)."""
+    lanes = max(threads() * LANES, len(steps))
+    blocks = np.ceil(steps / BLOCK)
+    return float(max(blocks.mean() * lanes / threads(), blocks.max() * LANES) * BLOCK * STEP_SECONDS)

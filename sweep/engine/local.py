@@ -42,7 +42,6 @@ def run(
     todo: Sequence[int],
     store: Store,
     *,
-    compiling: Callable[[], None],
     after_chunk: Callable[[Array], None],
 ) -> Iterator[Done]:
     """Run the tiles `todo`, group by group, and yield them as they are finished.
@@ -50,12 +49,11 @@ def run(
     Parameters
     ----------
     store : keeps the images between chunks; those it has of an earlier run are continued first
-    compiling : called before a kernel is compiled
     after_chunk : called with the statuses of the cells at work
     """
     grid = Grid.of(config)
     for group, left in _groups(grid, tiles, todo, store):
-        yield from run_group(config, tiles, group, store=store, left=left, compiling=compiling, after_chunk=after_chunk)
+        yield from run_group(config, tiles, group, store=store, left=left, after_chunk=after_chunk)
 
 
 def run_group(
@@ -65,7 +63,6 @@ def run_group(
     *,
     store: Store | None = None,
     left: Running | None = None,
-    compiling: Callable[[], None] = lambda: None,
     after_chunk: Callable[[Array], None] = lambda status: None,  # noqa: ARG005
 ) -> Iterator[Done]:
     """Run the tiles `group` together.
@@ -74,7 +71,6 @@ def run_group(
     ----------
     store : keeps the images after each chunk
     left : the images of this group that an earlier run left, to be continued
-    compiling : called before a kernel is compiled
     after_chunk : called with the statuses of the group's cells
     """
     grid, cpu = Grid.of(config), this_cpu()
@@ -82,7 +78,7 @@ def run_group(
         for i in group:
             yield Done(i, _evaluate(config, grid.part(tiles[i])), 0.0, cpu)
         return
-    plans, tables = pool(plan(config, grid.part(tiles[i]), compiling) for i in group)
+    plans, tables = pool(plan(config, grid.part(tiles[i])) for i in group)
     for kernel, _ in tables.values():
         kernel.compile()
     images, began = {method: table for method, (_, table) in tables.items()}, time.perf_counter()

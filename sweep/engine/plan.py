@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -25,8 +25,8 @@ _kernel = cache(methods.make_kernel)
 
 
 @dataclass(frozen=True)
-class Part:
-    """The cells that one method runs."""
+class Choice:
+    """The cells that one method runs, and the steps that it takes."""
 
     method: str
     cells: Array
@@ -38,6 +38,12 @@ class Part:
     """The longest step wanted, in sqrt(c/g), shape (cells,)."""
     step_rule: Array
     """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
+
+
+@dataclass(frozen=True)
+class Part(Choice):
+    """The cells that one method runs, with their images."""
+
     images: Array
     """Shape (cells, rows)."""
 
@@ -71,35 +77,53 @@ class Plan:
         return arrays | dataset.predicted(self.prediction)
 
 
-def plan(config: Config, grid: Grid | None = None, compiling: Callable[[], None] = lambda: None) -> Plan:
+def plan(config: Config, grid: Grid | None = None) -> Plan:
     """Give each cell of `grid`, by default all cells of `config`, its method, step, limits and start.
 
-    `compiling` is called before each kernel that has to be compiled because no cache holds it.
+    Kernels that no cache holds are compiled first.
     """
     grid = grid or Grid.of(config)
+    build(kernels(config))
+    return fill(config, grid, choose(config, grid))
+
+
+def kernels(config: Config) -> list[Kernel]:
+    """All kernels of which the cells of a configuration may need one."""
+    model, integrator = MODELS[config.model], config.integrator
+    names = methods.allowed(model) if integrator.method == AUTO else [integrator.method]
+    return [_kernel(name, model, config.measure, integrator.tolerance) for name in names]
+
+
+def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
+    """Give each cell of `grid` its method and step; nothing is compiled for it."""
     model, integrator = MODELS[config.model], config.integrator
     columns = grid.columns()
-    prediction = predict(model, grid)
-    assert prediction.stability is not None  # it is a model
-    stable = prediction.stability.ranges
     if integrator.method == AUTO:
         chosen = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:
         chosen = np.full(grid.size, list(METHODS).index(integrator.method))
-    parts = []
+    choices = []
     for i in np.unique(chosen):
         method, cells = list(METHODS)[i], np.flatnonzero(chosen == i)
         kernel = _kernel(method, model, config.measure, integrator.tolerance)
-        if not kernel.is_compiled():
-            compiling()
-            build(method, model.name, config.measure)
         theirs = {name: values[cells] for name, values in columns.items()}
         if integrator.step == "auto":
             step, rule = methods.automatic_step(method, model, theirs, integrator.tolerance)
         else:
             step, rule = np.full(len(cells), integrator.step), np.full(len(cells), FIXED)
-        images = kernel.images(theirs, step, integrator.t_end, stable[:, cells])
-        parts.append(Part(method, cells, kernel, theirs, step, rule, images))
+        choices.append(Choice(method, cells, kernel, theirs, step, rule))
+    return tuple(choices)
+
+
+def fill(config: Config, grid: Grid, chosen: Sequence[Choice]) -> Plan:
+    """Give each cell of `grid` its limits and start as well, in images of the kernels in `chosen`."""
+    prediction = predict(MODELS[config.model], grid)
+    assert prediction.stability is not None  # it is a model
+    stable = prediction.stability.ranges
+    parts = []
+    for each in chosen:
+        images = each.kernel.images(each.columns, each.step, config.integrator.t_end, stable[:, each.cells])
+        parts.append(Part(**vars(each), images=images))
     return Plan(config, grid, prediction, tuple(parts))
 
 

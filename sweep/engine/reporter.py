@@ -29,9 +29,6 @@ class Progress:
 class Reporter:
     """Receives what a run has to tell.  This one stays silent; override what should be shown."""
 
-    def compiling(self) -> None:
-        """The kernel is not in the cache and has to be compiled first."""
-
     def chunk(self, progress: Progress) -> None:
         """Another chunk is done."""
 

@@ -110,8 +110,7 @@ def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count
     if cluster:
         finished = cluster.run(config, tiles, todo)
     else:
-        compiling, after_chunk = count.reporter.compiling, count.chunk
-        finished = local.run(config, tiles, todo, store, compiling=compiling, after_chunk=after_chunk)
+        finished = local.run(config, tiles, todo, store, after_chunk=count.chunk)
     for done in finished:
         store.save(done.tile, done.arrays | {"seconds": np.array(done.seconds), "cpu": np.array(done.cpu)})
         count.tile(done.arrays["status"])

@@ -12,9 +12,7 @@ import linecache
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numba
-
-from sweep.jit import OPTIONS, inline
+from sweep.jit import compiled, inline
 from sweep.kernels.layout import LANES
 
 PREFIX = "<sweep "
@@ -61,7 +59,7 @@ def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[s
     lanes before inlining it, and nothing would be vectorised.
     """
     source = [f"def {name}({arguments}):", f"    for lane in range({LANES}):", *(f"        {line}" for line in lines)]
-    return numba.njit(compile_inline(name, "\n".join(source), names), **OPTIONS)
+    return compiled(compile_inline(name, "\n".join(source), names))
 
 
 def compile_inline(name: str, source: str, names: dict[str, Any]) -> Any:

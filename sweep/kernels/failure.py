@@ -12,10 +12,9 @@ from functools import cache
 from inspect import getfile
 from typing import Any
 
-import numba
 import numpy as np
 
-from sweep.jit import OPTIONS, parallel
+from sweep.jit import Cached, compiled, parallel
 from sweep.kernels.codegen import compile_inline, tuple_of
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
@@ -56,18 +55,21 @@ def approach(model: Model, states: Array, constants: Any, stretch: Array) -> tup
     """
     status, time = np.empty(len(stretch)), np.empty(len(stretch))
     rows = np.ascontiguousarray(np.concatenate([stack(tuple(states)), stack(tuple(constants))]).T)
-    _approach(model)(rows, np.ascontiguousarray(stretch, dtype=float), status, time)
+    compiled_approach(model)(rows, np.ascontiguousarray(stretch, dtype=float), status, time)
     return status, time
 
 
 def compile_approach(model: Model) -> None:
     """Compile `approach` for a model, or load it from disk."""
-    _approach(model).compile((numba.float64[:, ::1], *3 * [numba.float64[::1]]))
+    width = len(model.states) + len(model.constants._fields)
+    compiled_approach(model)(np.empty((0, width)), *3 * [np.empty(0)])
 
 
 @cache
-def _approach(model: Model) -> Any:
+def compiled_approach(model: Model) -> Cached:
     """Compiled (rows, stretch, status, time) -> None: `approach` for the cells of `rows`, states and constants."""
+    from numba import prange
+
     n, record = len(model.states), model.constants
     names = tuple_of(f"rows[i, {j}]" for j in range(n))
     load = compile_inline("load_states", f"def load_states(rows, i):\n    return {names}", {})
@@ -78,7 +80,7 @@ def _approach(model: Model) -> Any:
     follow = _make_follow(model)
 
     def run(rows: Any, stretch: Any, status: Any, time: Any) -> None:
-        for i in numba.prange(len(rows)):
+        for i in prange(len(rows)):
             status[i], time[i] = follow(load(rows, i), load_constants(rows, i), stretch[i])
 
     return parallel(run, f"approach-{model.name}", getfile(model.rhs))
@@ -88,14 +90,14 @@ def _make_follow(model: Model) -> Any:
     """Compiled (states, constants, stretch) -> (status, time): `approach` for one trajectory."""
     n, rhs, tilt = len(model.states), model.rhs, model.tilt
     # Not inlined: it would be compiled three times over.
-    step = numba.njit(make_step(DOPRI5, model.rhs, n), **OPTIONS)
+    step = compiled(make_step(DOPRI5, model.rhs, n))
     terms = [f"abs(one[{i}] - two[{i}]) / max(abs(two[{i}]), {_SMALL!r})" for i in range(n)]
     source = f"def difference(one, two):\n    return max({', '.join(terms)})"
     difference = compile_inline("difference", source, {})
     # The difference of one step from two of half the length exceeds the error of the latter by this factor.
     allowed = _TOLERANCE * (2**DOPRI5.order - 1)
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def kind(y: Any, p: Any, infinite: Any) -> Any:
         """What a step from `y` that is next to nothing has met.
 
@@ -107,7 +109,7 @@ def _make_follow(model: Model) -> Any:
         jams = (denominator <= 0.0) | (denominator < force)
         return DIVERGED if infinite else (PARADOX if jams else LIFT_OFF)
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def probe(y: Any, p: Any) -> Any:
         """What lies just ahead of `y`, where errors allow no step that is as long as the shortest.
 
@@ -121,7 +123,7 @@ def _make_follow(model: Model) -> Any:
             h = 2.0 * h
         return DIVERGED
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def follow(y: Any, p: Any, stretch: float) -> Any:
         time, h, cosine = 0.0, stretch / 8.0, np.sqrt(1.0 - tilt(y))
         for _ in range(_MOST_STEPS):

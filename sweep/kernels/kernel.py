@@ -13,10 +13,9 @@ from collections.abc import Iterable, Sequence
 from inspect import getfile
 from typing import Any
 
-import numba
 import numpy as np
 
-from sweep.jit import inline, is_cached, parallel
+from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, call_all, make_load
 from sweep.kernels.lanes import STABLE, Look, make_advance, make_look
 from sweep.kernels.layout import Layout, Table
@@ -43,6 +42,8 @@ class Kernel:
     # to 1e-6.
     energy_gain = 1e-5
 
+    method: str
+    """Its name in `METHODS`."""
     model: Model
     layout: Layout
     measurements: tuple[Measurement, ...]
@@ -99,8 +100,11 @@ class Kernel:
 
         return steady
 
-    def _compile_with(self, run_block: Any, method: str) -> None:
-        """Set up `advance` around `run_block`, compiled (group) -> None; `method` names the method in the cache."""
+    def _compile_with(self, run_block: Any, variant: str = "") -> None:
+        """Set up `advance` around `run_block`, compiled (group) -> None.
+
+        `variant` tells apart, in the cache, kernels of one method, model and measurements.
+        """
         settles = [f for each in self.measurements if (f := each.make_may_settle(self.layout))]
         looks = [f for each in self.measurements if (f := each.make_look(self.layout))]
         look = Look(
@@ -109,7 +113,8 @@ class Kernel:
             energy_gain=self.energy_gain,
         )
         advance = make_advance(run_block, make_look(self.model, self.constants, self.layout, look), self.layout)
-        name = f"{self.model.name}-{method}-{'+'.join(self.measure)}"
+        measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
+        name = f"{self.model.name}-{self.method}{variant}-{measured}"
         self._advance = parallel(advance, name, getfile(self.model.rhs))
 
     def row(self, name: str) -> int:
@@ -161,7 +166,7 @@ class Kernel:
 
         Returns after `blocks` blocks of steps in every lane, or earlier when all cells have ended.
         """
-        self._advance(images, cells, blocks, stop_when_settled, numba.get_num_threads())
+        self._advance(images, cells, blocks, stop_when_settled, threads())
 
     def carry(self, images: Array) -> None:
         """Carry the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""
@@ -198,22 +203,20 @@ class Kernel:
 
     def is_compiled(self) -> bool:
         """Whether the first call of `advance` will find machine code, in memory or on disk."""
-        return bool(self._advance.signatures) or is_cached(self._advance, _SIGNATURE)
+        return self._advance.is_compiled()
 
     def compile(self) -> None:
         """Compile `advance`, or load it from disk, so that no timing of a run includes that."""
-        self._advance.compile(_SIGNATURE)
+        self.advance(np.empty((0, len(self.layout.names))), np.empty(0, dtype=np.int64), 0, False)
+
+    def compiled_functions(self) -> tuple[Cached, tuple[Cached, ...]]:
+        """The function behind `advance`, and those that `images` calls."""
+        return self._advance, self._image_functions()
+
+    def _image_functions(self) -> tuple[Cached, ...]:
+        return ()
 
 
 @inline
 def _as_it_is(group: Any, lane: int, y: Any, p: Any, spin: Any) -> Any:  # noqa: ARG001
     return spin
-
-
-_SIGNATURE = (
-    numba.float64[:, ::1],
-    numba.int64[::1],
-    numba.int64,
-    numba.boolean,
-    numba.int64,
-)

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 
-from sweep.jit import inline
+from sweep.jit import exactly_compiled, inline
 from sweep.kernels.codegen import make_load, make_rest, make_store
 from sweep.kernels.layout import LANES, Layout
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
@@ -43,9 +42,11 @@ def make_advance(run_block: Any, look: Any, layout: Layout) -> Any:
 
     `run_block`, (group) -> None, and `look`, (group, stop_when_settled) -> None, are compiled functions.
     """
+    from numba import prange
+
     n_rows, lanes, status = len(layout.names), LANES, layout.at("status")
 
-    @numba.njit
+    @exactly_compiled
     def take(images: Any, cells: Any, position: int, group: Any, lane: int, held: Any) -> int:
         """Fill a lane with the next cell of this group's share, or leave it idle if there is none."""
         if position < len(cells):
@@ -57,12 +58,12 @@ def make_advance(run_block: Any, look: Any, layout: Layout) -> Any:
             group[status + lane] = SETTLED
         return position + 1
 
-    @numba.njit
+    @exactly_compiled
     def release(images: Any, group: Any, lane: int, held: Any) -> None:
         for row in range(n_rows):
             images[held[lane], row] = group[row * lanes + lane]
 
-    @numba.njit
+    @exactly_compiled
     def run_group(images: Any, cells: Any, blocks: int, stop_when_settled: bool) -> None:
         # An idle lane computes on zeros.  What comes out is meaningless but harmless: its status keeps it from
         # being stored.
@@ -88,7 +89,7 @@ def make_advance(run_block: Any, look: Any, layout: Layout) -> Any:
                 release(images, group, lane, held)
 
     def advance(images: Any, cells: Any, blocks: int, stop_when_settled: bool, groups: int) -> None:
-        for g in numba.prange(groups):
+        for g in prange(groups):
             run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
 
     return advance
@@ -117,7 +118,7 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
     pauses = "quiet_energy" in layout
     QUIET_ENERGY, QUIET_AFTER = (layout.at(f"quiet_{name}") if pauses else 0 for name in ("energy", "after"))
 
-    @numba.njit(error_model="numpy")
+    @exactly_compiled
     def look(group: Any, stop_when_settled: bool) -> None:
         for lane in range(lanes):
             y = load_states(group, lane)
@@ -159,10 +160,10 @@ def _make_will_settle(layout: Layout, may_settle: Any) -> Any:
 
     By the averaged equations (ndotab, abdot), a mode of energy I3 e/2 moves the spin on a circle about the critical
     spin n_c of the mode: (n - n_c)² + e is constant.  While the mode decays the spin changes by sqrt(d² + e) - d with
-    d = |n - n_c|, which is sqrt(e) at most.  So a trajectory has settled if a change of sqrt(e) carries the spin neither
-    out of a stable range nor through zero, where another reversal would have to be counted.  With d from the n_c1 of
-    the eigenvalues, nearly round bodies settled before a last reversal (3 of 500 cells, b = 8.3 to 8.9), because their
-    growth rates are far from linear in n.
+    d = |n - n_c|, which is sqrt(e) at most.  So a trajectory has settled if a change of sqrt(e) carries the spin
+    neither out of a stable range nor through zero, where another reversal would have to be counted.  With d from the
+    n_c1 of the eigenvalues, nearly round bodies settled before a last reversal (3 of 500 cells, b = 8.3 to 8.9),
+    because their growth rates are far from linear in n.
 
     Beyond n_c1 the mode grows and turns the spin back, to n_c - sqrt(d² + e) at the farthest.  That is still on the
     same side of zero, as long as n < n_c2 = 2 n_c1 (nrk0); `BEYOND` leaves half of this as a margin.  Such spins

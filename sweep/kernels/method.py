@@ -16,9 +16,10 @@ an active lane writes the states and adds one to `done`.  A step that fails leav
 status to `PARADOX`, `LIFT_OFF` or `DIVERGED`.  Lanes that are not active compute as well, but have to keep their
 states, `done` and status.
 
-A kernel has to implement `images`, which makes images at t = 0 with the help of `_start`.  It overrides `_reached` if
-its images do not begin at t = 0, `model_states` if its states are not those of the model, and `carry` if it can cross
-stretches of small rattle without steps.
+A kernel has to name its `method`, and to implement `images`, which makes images at t = 0 with the help of `_start`.
+It overrides `_image_functions` if `images` calls compiled functions, `_reached` if its images do not begin at t = 0,
+`model_states` if its states are not those of the model, and `carry` if it can cross stretches of small rattle without
+steps.
 """
 
 from __future__ import annotations

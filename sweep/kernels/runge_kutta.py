@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numba
 import numpy as np
 
+from sweep.jit import exactly_compiled
 from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
@@ -28,9 +28,9 @@ class RungeKuttaKernel(Kernel):
     """The `Kernel` of a tableau, for any model."""
 
     def __init__(self, model: Model, tableau: Tableau, measurements: Sequence[Measurement], block: int = BLOCK) -> None:
-        self.tableau = tableau
+        self.method, self.tableau = tableau.name, tableau
         self._lay_out(model, measurements)
-        self._compile_with(self._make_run_block(block), f"{tableau.name}-{block}")
+        self._compile_with(self._make_run_block(block), f"-{block}")
 
     def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
         """As `Kernel.images`; the steps taken are no longer than `step` and divide `t_end` evenly."""
@@ -52,7 +52,7 @@ class RungeKuttaKernel(Kernel):
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         lanes = LANES
 
-        @numba.njit(error_model="numpy")
+        @exactly_compiled
         def run_block(group: Any) -> None:
             for _ in range(block):
                 for lane in range(lanes):

@@ -18,15 +18,15 @@ or two changes may lie close together.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 
-from sweep.jit import OPTIONS, serial
+from sweep.jit import Cached, called, compiled, on_all_threads, serial
 from sweep.kernels.codegen import compile_inline, tuple_of
 from sweep.models import analytic, linear, stability
 from sweep.models.model import Array, Columns, Model, stack
@@ -50,7 +50,7 @@ _ROUNDS = 60
 _NEAR = 0.2
 
 # Cells that a thread takes at a time.
-_PART = 256
+_PART = 128
 
 
 def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
@@ -59,13 +59,13 @@ def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
     The range about zero is always found; of the ranges beyond it, those that begin within the |spin| in the second
     array, shape (bodies,), which is infinite where the eigenvalues were asked.
     """
-    if not _has_fast_slip(model):
+    if not has_fast_slip(model):
         return stability.stable_ranges(model, columns), np.full(len(columns["a"]), np.inf)
     usual = _USUAL / np.sqrt(columns["c"])
     limits = [np.fmax(usual, _BEYOND * np.abs(n_c1)) for n_c1 in analytic.critical_spins(columns)]
     limits = np.minimum(np.stack(limits, axis=-1), stability.SPIN_LIMIT)
     ranges = np.empty((len(limits), 6))
-    search, series = _search(model), _series()
+    search, series = compiled_search(model), _series()
     _by_parts(lambda rows, limits, ranges: search(rows, limits, *series, ranges), _rows(model, columns), limits, ranges)
     covered, doubtful = limits.min(axis=1), np.flatnonzero(np.isnan(ranges[:, 0]))
     if len(doubtful):
@@ -76,17 +76,38 @@ def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
 
 def fastest_motion(model: Model, columns: Columns) -> Array:
     """As `sweep.models.linear.fastest_motion`."""
-    if not _has_fast_slip(model):
+    if not has_fast_slip(model) or _uncompiled.get():
         return linear.fastest_motion(model, columns)
     motion = np.empty(len(columns["a"]))
-    _by_parts(_fastest(model), _rows(model, columns), linear.fastest_spin(model, columns), motion)
+    _by_parts(compiled_fastest(model), _rows(model, columns), linear.fastest_spin(model, columns), motion)
     doubtful = np.flatnonzero(np.isnan(motion))
     if len(doubtful):
         motion[doubtful] = linear.fastest_motion(model, _take(columns, doubtful))
     return motion
 
 
-def _has_fast_slip(model: Model) -> bool:
+_uncompiled: ContextVar[bool] = ContextVar("uncompiled", default=False)
+
+
+@contextmanager
+def uncompiled() -> Iterator[None]:
+    """Inside, `fastest_motion` is that of the eigenvalues, to the same 1e-9, so that nothing has to be compiled."""
+    token = _uncompiled.set(True)
+    try:
+        yield
+    finally:
+        _uncompiled.reset(token)
+
+
+def compile_theory(model: Model) -> None:
+    """Compile the functions of this module for a model, or load them from disk."""
+    nothing = np.empty((0, len(model.constants._fields)))
+    compiled_search(model)(nothing, np.empty((0, 2)), *_series(), np.empty((0, 6)))
+    compiled_fastest(model)(nothing, np.empty(0), np.empty(0))
+
+
+def has_fast_slip(model: Model) -> bool:
+    """Whether the compiled theory applies to a model."""
     return len(model.states) == 7 and model.states[5:] == ("v1", "v2")
 
 
@@ -102,14 +123,13 @@ def _take(columns: Columns, cells: Array) -> Columns:
 def _by_parts(function: Callable[..., None], *arrays: Array) -> None:
     """Call a compiled function for some rows of the arrays at a time, on all threads."""
     parts = [slice(begin, begin + _PART) for begin in range(0, len(arrays[0]), _PART)]
-    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-        list(pool.map(lambda part: function(*(array[part] for array in arrays)), parts))
+    on_all_threads(lambda part: function(*(array[part] for array in arrays)), parts)
 
 
 def _make_jacobian(model: Model) -> Any:
     """Compiled (rows, i, spin, J) -> None: the Jacobian of `sweep.models.linear`, of the body in row i, to J (6, 6)."""
     rattle = [i for i in range(len(model.states)) if i != model.spin_state]
-    slopes = numba.njit(compile_inline("slopes", "def slopes(y, p):\n    return rhs(y, p)[0]", {"rhs": model.rhs}))
+    slopes = compiled(compile_inline("slopes", "def slopes(y, p):\n    return rhs(y, p)[0]", {"rhs": model.rhs}))
     constants = " ".join(f"rows[i, {j}]," for j in range(len(model.constants._fields)))
     lines = [f"p, y = Constants({constants}), upright(spin)"]
     for column, state in enumerate(rattle):
@@ -118,10 +138,10 @@ def _make_jacobian(model: Model) -> Any:
         lines += [f"J[{row}, {column}] = slope[{i}].imag * 1e30" for row, i in enumerate(rattle)]
     source = "\n    ".join(["def jacobian(rows, i, spin, J):", *lines])
     names = {"slopes": slopes, "Constants": model.constants, "upright": model.upright}
-    return numba.njit(compile_inline("jacobian", source, names), **OPTIONS)
+    return compiled(compile_inline("jacobian", source, names))
 
 
-@numba.njit(**OPTIONS)
+@called
 def _quartic(J: Any, X: Any, c: Any) -> Any:
     """Write c0 … c3 of the rocking to c, and X, of shape (2, 4), from J, of shape (6, 6).
 
@@ -159,7 +179,7 @@ def _quartic(J: Any, X: Any, c: Any) -> Any:
     return (change <= 4e-15 * size) & (trace < 0.0) & (2.0 * determinant <= trace * trace) & (determinant > 0.0)
 
 
-@numba.njit(**OPTIONS)
+@called
 def _characteristic(G: Any, c: Any) -> None:
     """Write the coefficients c0 … c3 of the characteristic polynomial of a matrix, of shape (4, 4), to c."""
     c[:] = 0.0
@@ -190,7 +210,7 @@ def _series() -> tuple[Array, Array, Array]:
     return points, powers @ chebyshev, chebyshev
 
 
-@numba.njit(**OPTIONS)
+@called
 def _functions(powers: Any, t: float, f: Any) -> None:
     """Write to f the four functions that are positive where the rattle decays; `powers` as `fit` writes them."""
     c0, c1, c2, c3 = 0.0, 0.0, 0.0, 0.0
@@ -199,7 +219,7 @@ def _functions(powers: Any, t: float, f: Any) -> None:
     f[0], f[1], f[2], f[3] = c0, c1, c3, c1 * (c2 * c3 - c1) - c3 * c3 * c0
 
 
-@numba.njit(**OPTIONS)
+@called
 def _narrow(powers: Any, near: float, far: float, at_near: float, at_far: float, which: int) -> float:
     """The t between `near` and `far` at which function `which`, of opposite signs there, vanishes (Illinois)."""
     f, t = np.empty(4), near
@@ -217,7 +237,7 @@ def _narrow(powers: Any, near: float, far: float, at_near: float, at_far: float,
     return t
 
 
-@numba.njit(**OPTIONS)
+@called
 def _may_touch(x: Any, y: Any, which: int) -> Any:
     """Whether a parabola through three values of a function, of the same sign, comes near zero between them."""
     first = (y[1, which] - y[0, which]) / (x[1] - x[0])
@@ -232,7 +252,7 @@ def _may_touch(x: Any, y: Any, which: int) -> Any:
     return lowest * y[1, which] <= _NEAR * y[1, which] * y[1, which]
 
 
-@numba.njit(**OPTIONS)
+@called
 def _changes(powers: Any, zero: float, end: float, found: Any) -> int:
     """Write the first three changes between `zero`, the t of zero spin, and `end` to `found`.
 
@@ -269,7 +289,7 @@ def _changes(powers: Any, zero: float, end: float, found: Any) -> int:
     return first
 
 
-@numba.njit(**OPTIONS)
+@called
 def _sample(polynomial: Any, spin: float, X: Any, c: Any) -> Any:
     """As `_quartic`, at a spin."""
     J = np.empty((6, 6))
@@ -279,15 +299,22 @@ def _sample(polynomial: Any, spin: float, X: Any, c: Any) -> Any:
     return _quartic(J, X, c)
 
 
-@numba.njit(**OPTIONS)
+@called
 def _fit(polynomial: Any, low: float, high: float, series: Any, powers: Any) -> Any:
     """Write c0 … c3 as polynomials in t to `powers`, where t = -1 … 1 is the spin from `low` to `high`.
 
     False if the slip is not fast or the polynomials do not fit.
     """
     points, to_powers, to_chebyshev = series
-    X, c = np.zeros((2, 4)), np.empty((_NODES, 4))
+    X, before, c = np.zeros((2, 4)), np.zeros((2, 4)), np.empty((_NODES, 4))
     for k in range(_NODES):
+        if k > 1:  # extrapolate X: that saves a third of the rounds
+            ahead = (points[k] - points[k - 1]) / (points[k - 1] - points[k - 2])
+            for i in range(2):
+                for j in range(4):
+                    X[i, j], before[i, j] = X[i, j] + ahead * (X[i, j] - before[i, j]), X[i, j]
+        elif k == 1:
+            before[:] = X
         if not _sample(polynomial, 0.5 * (low + high) + 0.5 * (high - low) * points[k], X, c[k]):
             return False
     for i in range(4):
@@ -303,7 +330,7 @@ def _fit(polynomial: Any, low: float, high: float, series: Any, powers: Any) -> 
     return True
 
 
-@numba.njit(**OPTIONS)
+@called
 def _polish(polynomial: Any, low: float, high: float, powers: Any, t: float, which: int) -> float:
     """The spin at which function `which` vanishes, from the t at which its polynomial does: two steps of Newton."""
     half = 0.5 * (high - low)
@@ -319,7 +346,7 @@ def _polish(polynomial: Any, low: float, high: float, powers: Any, t: float, whi
 
 
 @cache
-def _search(model: Model) -> Any:
+def compiled_search(model: Model) -> Cached:
     """Compiled (rows, limits, points, to_powers, to_chebyshev, ranges) -> None: NaN for a body that remains in doubt.
 
     rows : constants, shape (bodies, constants)
@@ -328,7 +355,7 @@ def _search(model: Model) -> Any:
     """
     jacobian = _make_jacobian(model)
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def expand(rows: Any, body: int, polynomial: Any) -> None:
         """Write J0, J1 and J2 of J = J0 + n J1 + n² J2."""
         for k in range(3):
@@ -371,16 +398,16 @@ def _search(model: Model) -> Any:
 
 
 @cache
-def _fastest(model: Model) -> Any:
+def compiled_fastest(model: Model) -> Cached:
     """Compiled (rows, reach, motion) -> None: the fastest motion of each cell, NaN where it remains in doubt."""
     jacobian = _make_jacobian(model)
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def moving(half_trace: float, square: float) -> float:
         """|λ| of a pair with this sum of half its λ and this |λ|², if it moves more than it decays; else 0."""
         return np.sqrt(square) if -half_trace <= np.sqrt(max(square - half_trace * half_trace, 0.0)) else 0.0
 
-    @numba.njit(**OPTIONS)
+    @compiled
     def largest(c: Any) -> Any:
         """|λ| of the faster pair that moves; NaN if the polynomial has real roots."""
         if c[2] * c[2] < 4.0 * c[0] or c[2] <= 0.0:

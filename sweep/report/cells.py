@@ -12,6 +12,7 @@ import numpy as np
 from sweep.engine.executor import execute
 from sweep.grid import Array, Grid
 from sweep.kernels import measures, methods
+from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import TOLERANCE
 from sweep.models import MODELS
@@ -52,6 +53,7 @@ def standard(**parameters: Any) -> dict[str, Array]:
 def make_kernel(method: str, model: Model, measure: tuple[str, ...]) -> Kernel:
     """The compiled kernel."""
     kernel = methods.make_kernel(method, model, measure)
+    build([kernel])
     kernel.compile()
     return kernel
 

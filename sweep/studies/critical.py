@@ -236,7 +236,7 @@ class _Group:
         """
         assert self.prediction.formulas is not None
         assert self.prediction.stability is not None
-        cells, width, compiling = self.cells, self.width, self.reporter.compiling
+        cells, width = self.cells, self.width
         bodies = {name: np.tile(values[cells], 2) for name, values in self.grid.columns().items()}
         sign = np.repeat([1.0, -1.0], len(cells))
         uncoupled = np.isnan(self.prediction.formulas.n_c1[0][np.tile(cells, 2)])
@@ -244,7 +244,7 @@ class _Group:
         stable = np.tile(self.prediction.stability.ranges[:, cells], 2)
 
         settled = self.settled.first
-        first = find_n_c1(self.config, bodies, sign, linear, width, self.rounds, settled, compiling)
+        first = find_n_c1(self.config, bodies, sign, linear, width, self.rounds, settled)
         reason = _reasons(first)
         reason[(reason == NOT_FOUND) & uncoupled] = NO_COUPLING
         reason[(first.outcome != bracket.FAILED) & ~_agrees(first, linear, width)] = DISAGREES
@@ -254,7 +254,7 @@ class _Group:
         ends, reason = np.full((2, len(sign)), np.nan), reason.copy()
         theirs, begin = {name: values[at] for name, values in bodies.items()}, (sign * first.outer)[at]
         settled = self.settled.second
-        second = find_n_c2(self.config, theirs, begin, stable[:, at], width, self.rounds, settled, compiling)
+        second = find_n_c2(self.config, theirs, begin, stable[:, at], width, self.rounds, settled)
         ends[:, at], reason[at] = sign[at] * [second.inner, second.outer], _reasons(second)
         yield ends.reshape(2, 2, -1), reason.reshape(2, -1)
 

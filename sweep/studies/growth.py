@@ -51,7 +51,6 @@ def find_n_c1(
     width: float,
     rounds: Rounds,
     settled: Callable[[Array], None] = lambda share: None,  # noqa: ARG005
-    compiling: Callable[[], None] = lambda: None,
 ) -> Bracket:
     """The first |spin|, outwards from zero, at which a tiny rattle grows.
 
@@ -63,10 +62,9 @@ def find_n_c1(
         simulated at once.  Growth is simulated below it all the same, and the bracket lies wherever that begins
     rounds : run or recall the simulations
     settled : as of `bracket.search`
-    compiling : called before a kernel is compiled
     """
     first = {name: values[:1] for name, values in bodies.items()}
-    (part,) = plan(stepwise(config), Grid({}, {}, first), compiling).parts
+    (part,) = plan(stepwise(config), Grid({}, {}, first)).parts
 
     def growth(cells: Array, spin: Array) -> Array:
         return simulated_growth(part.kernel, {name: v[cells] for name, v in bodies.items()}, spin, rounds)

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numba
 import numpy as np
 
 from sweep.config import Config
 from sweep.engine.executor import STEP_SECONDS
 from sweep.engine.plan import plan
 from sweep.grid import Array, Grid
+from sweep.jit import threads
 from sweep.kernels import methods
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import AUTO, METHODS, allowed
@@ -56,7 +56,6 @@ def find_n_c2(
     width: float,
     rounds: Rounds,
     settled: Callable[[Array], None] = lambda share: None,  # noqa: ARG005
-    compiling: Callable[[], None] = lambda: None,
 ) -> Bracket:
     """The first |spin|, outwards from `n_c1`, from which the trajectory from the start point in `bodies` reverses.
 
@@ -70,14 +69,13 @@ def find_n_c2(
     stable : ranges of spin in which the rattle decays, shape (6, cells), as `Kernel.images` takes them
     rounds : run or recall the simulations
     settled : as of `bracket.search`
-    compiling : called before a kernel is compiled
     """
 
     def trajectories(question: Question, spins: Array) -> _Trajectories:
         at, asked = question.search, config.integrator.tolerance
         columns = {name: values[at] for name, values in bodies.items()} | {"n0": spins}
         tolerance = np.where(question.exact, asked, np.maximum(asked, _COARSE * question.size))
-        return _Trajectories(config, question.exact, columns, stable[:, at], tolerance, compiling)
+        return _Trajectories(config, question.exact, columns, stable[:, at], tolerance)
 
     def ask(question: Question) -> tuple[Array, Array]:
         sign = np.sign(n_c1[question.search])
@@ -112,7 +110,7 @@ def body_seconds(config: Config, bodies: Columns) -> tuple[float, float]:
             if step == "auto":
                 step, _ = methods.automatic_step(method, model, columns, integrator.tolerance)
             costs.append(METHODS[method].step_cost * (time / step + METHODS[method].start_up_cost))
-        a_step = STEP_SECONDS / numba.get_num_threads()
+        a_step = STEP_SECONDS / threads()
         return float(2 * simulations * np.min(costs, axis=0).mean()) * a_step
 
     # n_c1 is about the decay rate at rest.
@@ -133,7 +131,6 @@ class _Trajectories:
     """Shape (6, simulations)."""
     tolerance: Any
     """Shape (simulations,); the rules for steps take one tolerance for all cells, or one for each."""
-    compiling: Callable[[], None]
 
     def cells(self) -> dict[str, Array]:
         """Indices of the simulations that each method runs."""
@@ -161,7 +158,7 @@ class _Trajectories:
         integrator = self.config.integrator.model_copy(update={"method": method})
         config = replace(self.config, integrator=integrator, measure=_measure(self.config))
         first = {name: values[:1] for name, values in self.columns.items()}
-        (part,) = plan(config, Grid({}, {}, first), self.compiling).parts
+        (part,) = plan(config, Grid({}, {}, first)).parts
         return part.kernel
 
 

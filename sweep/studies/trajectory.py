@@ -10,7 +10,6 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import xarray as xr
 
@@ -21,6 +20,7 @@ from sweep.engine.plan import plan
 from sweep.engine.repeats import cells_of, repeat_all
 from sweep.engine.reporter import Progress, Reporter
 from sweep.grid import Array, Grid, off_the_body
+from sweep.jit import threads
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import automatic_step
@@ -103,7 +103,7 @@ def trajectory(
         if the model is a formula, or `at` picks cells that cannot be run.
     """
     chosen, reporter = choose(config, at), reporter or Reporter()
-    job = plan(chosen, compiling=reporter.compiling)
+    job = plan(chosen)
     (part,) = job.parts
     t_end, began = chosen.integrator.t_end, time.perf_counter()
 
@@ -145,7 +145,7 @@ def estimate(config: Config, at: Mapping[str, float | Sequence[float]]) -> str:
     steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
     samples = (integrator.t_end / _intervals(model, columns)).sum()
     # A step of a group of lanes takes as long whether they are idle or not.
-    groups = -(-len(steps) // (LANES * numba.get_num_threads()))
+    groups = -(-len(steps) // (LANES * threads()))
     seconds = groups * steps.max() * LANES * STEP_SECONDS
     return "\n".join(
         [

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import io
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import xarray as xr
+from rich.console import Console
 from support.cli import invoke
 from support.runs import same_numbers
 
 import sweep
+from sweep.jit import Cached, compiling
+from sweep.progress import Terminal
 
 Write = Callable[..., Path]
 
@@ -75,3 +81,41 @@ def test_too_many_failures(write: Write, tmp_path: Path) -> None:
     assert (
         invoke("run", write(), "--output", tmp_path / "b", *settings, "--set", "max_failed_fraction=0.5").exit_code == 0
     )
+
+
+@pytest.fixture
+def _cold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if no cache held anything; what is compiled takes no time."""
+    monkeypatch.setattr(Cached, "is_missing", lambda _: True)
+    monkeypatch.setattr("sweep.kernels.build._start", lambda _: subprocess.Popen([sys.executable, "-c", ""]))
+
+
+@pytest.mark.usefixtures("_cold")
+@pytest.mark.parametrize(
+    ("command", "lines"),
+    [(["run"], 1), (["run", "--quiet"], 0), (["run", "--dry-run"], 0), (["trajectory"], 1), (["critical"], 1)],
+    ids=["run", "quiet", "dry-run", "trajectory", "critical"],
+)
+def test_a_command_says_once_that_it_compiles(command: list[str], lines: int, write: Write, tmp_path: Path) -> None:
+    text = "name: one\nmodel: averaged\nfriction: {mu: 60}\nintegrator: {t_end: 5}\n"
+    result = invoke(*command, write(text), "--output", tmp_path / "out")
+    assert result.exit_code == 0
+    assert result.stderr.count("compiling for this model and machine") == lines
+
+
+@pytest.mark.usefixtures("_cold")
+def test_python_compiles_without_a_word(write: Write, capfd: pytest.CaptureFixture[str]) -> None:
+    sweep.run(write("model: averaged\nfriction: {mu: 60}\nintegrator: {t_end: 5}\n"))
+    assert tuple(capfd.readouterr()) == ("", "")
+
+
+def test_a_spinner_turns_on_a_terminal_while_something_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    screen = io.StringIO()
+    with Terminal() as terminal:
+        terminal.console = Console(file=screen, force_terminal=True)
+        with compiling():
+            pass
+    text = screen.getvalue()
+    assert "compiling for this model and machine" in text
+    assert text.endswith("\x1b[2K")  # the line is wiped

@@ -100,13 +100,3 @@ def test_chunks_are_kept_short(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(chunks) > 20
     assert max(chunks) <= 1.01 * executor.CHUNK_SECONDS
     assert np.median(chunks) > 0.9 * executor.CHUNK_SECONDS
-
-
-def test_a_kernel_that_no_cache_holds_is_built_in_a_process_of_its_own(
-    write: Write, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told: list[str] = []
-    monkeypatch.setattr(Kernel, "is_compiled", lambda _: False)
-    monkeypatch.setattr("sweep.engine.plan.build", lambda *which: told.append(str(which)))
-    plan(sweep.load_config(write()), compiling=lambda: told.append("compiling"))
-    assert told == ["compiling", "('dopri5', 'slip', ('reversals', 'energy_error', 'noise_limited', 'resting_spin'))"]

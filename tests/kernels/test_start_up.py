@@ -90,7 +90,7 @@ def test_bit_identical_for_each_grouping_and_thread() -> None:
     with threads(1):
         for i in range(0, len(STEPS), 9):
             np.testing.assert_array_equal(begun(cell(MIXED, i), STEPS[i : i + 1])[0], expected[i])
-    assert len(start_up._run.signatures) == 1  # not compiled once for a cell and again for many
+    assert len(start_up.compiled_start_up().signatures) == 1  # not compiled once for a cell and again for many
 
 
 def test_a_level_may_have_more_cells_than_lanes() -> None:
@@ -127,7 +127,7 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
 
 
 def test_the_loop_over_lanes_is_vector_instructions() -> None:
-    advance = compile_lanes("advance", "group, points, ticks", start_up._ADVANCE, NAMES)
+    advance = compile_lanes("advance", "group, points, ticks", start_up._advance(), NAMES)
     group, points = np.zeros(len(start_up._GROUP.names) * LANES), np.zeros((HISTORY + 1) * start_up._POINT_SIZE)
     advance(group, points, 1.0)
     assembly = next(iter(advance.inspect_asm().values()))

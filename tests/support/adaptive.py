@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from sweep.jit import exactly_compiled
 from sweep.models import slip
 from sweep.models.model import stack, take
 
@@ -40,7 +40,7 @@ def spin(body: dict[str, np.ndarray], time: float, method: str = "DOP853") -> fl
 def _extended() -> Any:
     rhs = slip.rhs
 
-    @numba.njit(error_model="numpy")
+    @exactly_compiled
     def extended(_: float, y: np.ndarray, p: Any) -> np.ndarray:
         slopes, extras = rhs((y[0], y[1], y[2], y[3], y[4], y[5], y[6]), p)
         return np.array([slopes[0], slopes[1], slopes[2], slopes[3], slopes[4], slopes[5], slopes[6], extras[0]])

@@ -20,12 +20,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numba
 import numpy as np
 
-from sweep.jit import OPTIONS, inline
-from sweep.kernels.adams import stretches
-from sweep.kernels.adams.start_up import Started, count_levels, duration, start_up
+from sweep.jit import Cached, compiled, inline
+from sweep.kernels.adams import start_up, stretches, weights
+from sweep.kernels.adams.start_up import Started, count_levels, duration
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
     CORRECTOR_NODES,
@@ -39,7 +38,6 @@ from sweep.kernels.adams.step import (
     step_lines,
     store_lines,
 )
-from sweep.kernels.adams.weights import fitted_weights
 from sweep.kernels.codegen import compile_inline
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES, Table
@@ -63,6 +61,8 @@ class AdamsKernel(Kernel):
     carry the trajectory on, without steps (`sweep.kernels.adams.stretches`).
     """
 
+    method = "adams"
+
     # No stability limit is near, so the check may be loose; and at n = 0.05 an error in spin of 1e-4 is one of 4e-3
     # in the energy.  With 1e-5, runs with loose tolerances at μ = 10⁴ ended as `diverged`, although every spin was
     # right to the tolerance.
@@ -74,7 +74,7 @@ class AdamsKernel(Kernel):
         more = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS, "begin", "spin", *powers)
         method = ("gamma", "per_weight", *_PREDICT, *_CORRECT, *MATRIX)
         self._lay_out(SPLIT, measurements, (*more, *method, *_HISTORY))
-        self._compile_with(self._make_run_block(), "adams")
+        self._compile_with(self._make_run_block())
 
     def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
         """As `Kernel.images`, but the images are those at the end of start-up, at the time in `begin`."""
@@ -86,9 +86,12 @@ class AdamsKernel(Kernel):
         table = self.table(images)
         self._set_method(table, self.unpack(images)[1])
         constants = table.columns(self.constants)
-        self._set_started(table, start_up(step, constants, stack(slip.start(columns)).T, levels))
+        self._set_started(table, start_up.start_up(step, constants, stack(slip.start(columns)).T, levels))
         self._set_looks(table, columns)
         return images
+
+    def _image_functions(self) -> tuple[Cached, ...]:
+        return (start_up.compiled_start_up(),)
 
     def model_states(self, images: Array) -> Array:
         return slip_split.velocities(*self.unpack(images))
@@ -102,8 +105,8 @@ class AdamsKernel(Kernel):
         step = table["step"]
         _, fastest = frequencies(constants)
         phase = fastest * step
-        correct = step[:, None] * fitted_weights(CORRECTOR_NODES, phase)
-        table.set_columns(_PREDICT, step[:, None] * fitted_weights(PREDICTOR_NODES, phase))
+        correct = step[:, None] * weights.fitted_weights(CORRECTOR_NODES, phase)
+        table.set_columns(_PREDICT, step[:, None] * weights.fitted_weights(PREDICTOR_NODES, phase))
         table.set_columns(_CORRECT, correct)
         table.set_columns(MATRIX, stack(slip_split.implicit(correct[:, 0], constants)).T)
         table["per_weight"] = 1 / correct[:, 0]
@@ -159,7 +162,7 @@ class AdamsKernel(Kernel):
             f"    for i in range({HISTORY * size}):",
             f"        group[{first} + i] = history[{BLOCK * size} + i]",
         ]
-        return numba.njit(compile_inline("run_block", "\n".join(lines), names), **OPTIONS)
+        return compiled(compile_inline("run_block", "\n".join(lines), names))
 
     def _step_lines(self) -> list[str]:
         """The source of one step, from eight points of the history, of which the first is at `oldest`, to the ninth.

@@ -38,7 +38,7 @@ def accurate_step(columns: Columns, tolerance: float) -> Array:
 
 
 METHOD = Method(
-    name="adams",
+    name=AdamsKernel.method,
     summary="Adams formulas of orders eight and nine for the slow variables and BDF5 for the slip, for the slip model: "
     "friction does not limit its step",
     kernel=lambda model, measurements, tolerance: AdamsKernel(measurements, tolerance),  # noqa: ARG005

@@ -8,13 +8,12 @@ computed by itself, so it does not matter which ones.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
-from sweep.jit import serial
+from sweep.jit import Cached, on_all_threads, serial
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
     CONSTANTS,
@@ -130,11 +129,11 @@ def start_up(step: Array, constants: Array, starts: Array, levels: Array) -> Sta
         group[_GROUP.row("spacing")] = step[lanes] / 2.0 ** len(steps)
         group[_GROUP.row("h")] = 0.5 * group[_GROUP.row("spacing")]
         points = np.zeros((HISTORY + steps.max(), len(_POINT.names), LANES))
-        _run(group.ravel(), points.ravel(), steps)
+        run(group.ravel(), points.ravel(), steps)
         _store(started, cells, group[:, : len(cells)], points[:HISTORY, :, : len(cells)])
 
-    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-        list(pool.map(take, groups))
+    run = compiled_start_up()
+    on_all_threads(take, groups)
     return started
 
 
@@ -150,20 +149,31 @@ def _store(started: Started, cells: Array, group: Array, points: Array) -> None:
 
 def _at(name: str) -> str:
     """The place at which the loops below keep a quantity of one lane; point 0 of the history is the oldest."""
-    for pattern in _POINT.names:
-        for slot in range(HISTORY + 1):
-            if name == pattern.format(slot):
-                return f"points[{slot * _POINT_SIZE + _POINT.at(pattern)} + lane]"
-    if name in _WEIGHTS:
-        return f"({_WEIGHTS[name]!r} * h)"
+    if name in _POINTS:
+        return f"points[{_POINTS[name]} + lane]"
+    if name.startswith(("gamma", "predict", "correct")):
+        return f"({_weights()[name]!r} * h)"
     return f"group[{_GROUP.at(name)} + lane]"
 
 
-_WEIGHTS = {
-    "gamma": BDF_GAMMA,
-    **{f"predict{j}": float(w) for j, w in enumerate(plain_weights(PREDICTOR_NODES))},
-    **{f"correct{j}": float(w) for j, w in enumerate(plain_weights(CORRECTOR_NODES))},
+_POINTS = {
+    pattern.format(slot): slot * _POINT_SIZE + _POINT.at(pattern)
+    for slot in range(HISTORY + 1)
+    for pattern in _POINT.names
 }
+"""Where the lanes of each quantity of a point begin."""
+
+
+@cache
+def _weights() -> dict[str, float]:
+    """The plain weights, in steps; they take as long as the rest of this module to make."""
+    predict, correct = plain_weights(PREDICTOR_NODES), plain_weights(CORRECTOR_NODES)
+    return {
+        "gamma": BDF_GAMMA,
+        **{f"predict{j}": float(w) for j, w in enumerate(predict)},
+        **{f"correct{j}": float(w) for j, w in enumerate(correct)},
+    }
+
 
 _BEGIN_STEP = [
     *load_lines(_at),
@@ -200,36 +210,41 @@ _RECORD = [
 
 _REPLACE = [*_TO_SPLIT, *(f"{_at(name)} = s[{i}]" for i, name in enumerate(SPLIT.states))]
 
-_SET_STEP = [
-    *load_lines(_at),
-    f"h = ticks * {_at('spacing')}",
-    f"{_at('h')} = h",
-    f"{_at('per_weight')} = 1.0 / {_at('correct0')}",
-    f"matrix = implicit({_at('correct0')}, p)",
-    *(f"{_at(name)} = matrix[{i}]" for i, name in enumerate(MATRIX)),
-]
 
-# Steps from points 0 … 7 to point 8; the work follows from the Adams-Moulton formula of order four.
-_ADVANCE = [
-    *_BEGIN_STEP,
-    *step_lines(_at, range(HISTORY)[::-1]),
-    *store_lines(_at, HISTORY),
-    f"{_at('power8')} = power",
-    f"done = h / 24.0 * (9.0 * power + 19.0 * {_at('power7')} - 5.0 * {_at('power6')} + {_at('power5')})",
-    *accept_lines(_at),
-    *_end_step("ticks"),
-]
+def _set_step() -> list[str]:
+    return [
+        *load_lines(_at),
+        f"h = ticks * {_at('spacing')}",
+        f"{_at('h')} = h",
+        f"{_at('per_weight')} = 1.0 / {_at('correct0')}",
+        f"matrix = implicit({_at('correct0')}, p)",
+        *(f"{_at(name)} = matrix[{i}]" for i, name in enumerate(MATRIX)),
+    ]
 
 
-def _make_run() -> Any:
+def _advance() -> list[str]:
+    """Steps from points 0 … 7 to point 8; the work follows from the Adams-Moulton formula of order four."""
+    return [
+        *_BEGIN_STEP,
+        *step_lines(_at, range(HISTORY)[::-1]),
+        *store_lines(_at, HISTORY),
+        f"{_at('power8')} = power",
+        f"done = h / 24.0 * (9.0 * power + 19.0 * {_at('power7')} - 5.0 * {_at('power6')} + {_at('power5')})",
+        *accept_lines(_at),
+        *_end_step("ticks"),
+    ]
+
+
+@cache
+def compiled_start_up() -> Cached:
     """Compiled (group, points, steps) -> None: takes a group through all its levels."""
     names = NAMES | {"slow": slow, "newton": newton, "momentum": momentum, "implicit": implicit, "power": power}
     names["step"] = make_step(DOPRI5, slip.rhs, len(SPLIT.states))
     record = compile_lanes("record", "group, points", _RECORD, names)
     replace = compile_lanes("replace", "group", _REPLACE, names)
     dopri5 = compile_lanes("dopri5", "group", _DOPRI5, names)
-    set_step = compile_lanes("set_step", "group, ticks", _SET_STEP, names)
-    advance = compile_lanes("advance", "group, points, ticks", _ADVANCE, names)
+    set_step = compile_lanes("set_step", "group, ticks", _set_step(), names)
+    advance = compile_lanes("advance", "group, points, ticks", _advance(), names)
     size, dopri5_steps = _POINT_SIZE, _DOPRI5_STEPS
 
     def run(group: Any, points: Any, steps: Any) -> None:
@@ -250,6 +265,3 @@ def _make_run() -> Any:
                     points[j * size + i] = points[(steps[level] - HISTORY + 1 + 2 * j) * size + i]
 
     return serial(run, "start-up")
-
-
-_run = _make_run()

@@ -28,7 +28,7 @@ _TERMS = 30
 
 def plain_weights(nodes: tuple[int, ...]) -> Array:
     """Weights w with ∫_0^1 p(t) dt = Σ w_j p(nodes_j) for all powers below k, shape (k,)."""
-    return _tables(nodes)[0]
+    return np.array(_plain(_inverse(nodes)), dtype=float)
 
 
 def fitted_weights(nodes: tuple[int, ...], phase: Array) -> Array:
@@ -61,8 +61,8 @@ def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
     divided difference in θ², divided by a_1.  In this form the equations become c = 0 as θ goes to zero.
     """
     k = len(nodes)
-    inverse = _invert([[F(t) ** q for t in nodes] for q in range(k)])
-    plain = [sum(row[q] / (q + 1) for q in range(k)) for row in inverse]
+    inverse = _inverse(nodes)
+    plain = _plain(inverse)
     null = [row[k - 4 :] for row in inverse]
 
     def moments(q: int) -> list[F]:
@@ -81,6 +81,16 @@ def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
             difference = a / first * sum(HARMONIC ** (2 * i) for i in range(m + 1))
             series[m, 10 + 5 * odd : 15 + 5 * odd] = [float(difference * s) for s in moments(n + 2 * m + 2)]
     return np.array(plain, dtype=float), np.array(null, dtype=float), series
+
+
+def _inverse(nodes: tuple[int, ...]) -> list[list[F]]:
+    """Inverse of the matrix of the powers t_j^q, with a row per node."""
+    return _invert([[F(t) ** q for t in nodes] for q in range(len(nodes))])
+
+
+def _plain(inverse: list[list[F]]) -> list[F]:
+    """The plain weights."""
+    return [sum((x / (q + 1) for q, x in enumerate(row)), F(0)) for row in inverse]
 
 
 def _invert(matrix: list[list[F]]) -> list[list[F]]:

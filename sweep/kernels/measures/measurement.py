@@ -90,6 +90,13 @@ class Measurement:
         """How it is asked for: its name, or "name=setting" if it has a setting."""
         return self.name
 
+    @property
+    def in_kernel(self) -> bool:
+        """Whether a kernel with it differs from one without: whether it has a quantity, or a hook in the loop."""
+        hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_look")
+        own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
+        return bool(self.rows) or own or self.follows_work or self.follows_ripple
+
     def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.
 

@@ -1,0 +1,118 @@
+"""How a command starts: it loads nothing that it does not need, and Ctrl-C is one line from the beginning on."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from support import ROOT, SMALL
+
+Write = Callable[..., Path]
+
+HEAVY = {"numba", "llvmlite", "xarray", "pandas", "netCDF4", "dask", "distributed", "matplotlib", "scipy"}
+"""Each takes from a tenth of a second to a whole one."""
+
+HELP = [["--help"], ["--version"], ["run", "--help"], ["run", "--colour"], ["run"], ["colour"]]
+
+REFUSED = {
+    "not YAML": "body: {b: 3\n",
+    "unknown key": "colour: red\n",
+    "out of bounds": "friction: {mu: -1}\n",
+    "nothing where a number is needed": "body: {b: 3}\n",
+    "not measured": "friction: {mu: 60}\nmeasure: [colour]\n",
+    "another model's method": "model: noslip\nintegrator: {method: adams}\n",
+    "off the body": "friction: {mu: 60}\nstart: {x0: 50}\n",
+    "too long a step": "friction: {mu: 60}\nintegrator: {step: 5}\n",
+}
+
+_IMPORT = re.compile(r"import time:.*\| +(\S+)")
+
+
+def start(*arguments: str | Path) -> subprocess.Popen[str]:
+    """`python -m sweep ARGUMENTS`, which tells of each module on stderr as soon as it is loaded."""
+    command = [sys.executable, "-X", "importtime", "-m", "sweep", *map(str, arguments)]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def loaded(*arguments: str | Path) -> tuple[int, set[str]]:
+    """The exit code of `sweep ARGUMENTS`, and the packages that it loads."""
+    with start(*arguments) as process:
+        _, told = process.communicate()
+    return process.returncode, {name.partition(".")[0] for name in _IMPORT.findall(told)}
+
+
+@pytest.mark.parametrize("arguments", HELP, ids=" ".join)
+def test_help_loads_next_to_nothing(arguments: list[str]) -> None:
+    code, packages = loaded(*arguments)
+    assert code == (0 if {"--help", "--version"} & {*arguments} else 2)
+    assert "click" in packages
+    assert packages & (HEAVY | {"numpy", "pydantic", "ruamel", "rich"}) == set()
+
+
+@pytest.mark.parametrize("text", REFUSED.values(), ids=REFUSED)
+def test_a_configuration_is_refused_before_anything_heavy_is_loaded(text: str, write: Write) -> None:
+    code, packages = loaded("run", write(text))
+    assert code == 2
+    assert "numpy" in packages
+    assert packages & HEAVY == set()
+
+
+@pytest.mark.parametrize("arguments", [["run", "--dry-run"], ["critical"], ["trajectory"]], ids=" ".join)
+def test_every_verb_refuses_as_early(arguments: list[str], write: Write) -> None:
+    code, packages = loaded(*arguments, write("friction: {mu: -1}\n"))
+    assert code == 2
+    assert packages & HEAVY == set()
+
+
+@pytest.mark.parametrize("arguments", [["--set", "mu"], ["--at", "mu"], ["--at", "colour=1"]], ids=" ".join)
+def test_options_are_refused_as_early(arguments: list[str], write: Write) -> None:
+    code, packages = loaded("trajectory", write(), *arguments)
+    assert code == 2
+    assert packages & HEAVY == set()
+
+
+def test_the_package_loads_what_is_asked_for() -> None:
+    program = (
+        "import sys, sweep\n"
+        "assert {'run', 'critical', '__all__'} <= set(dir(sweep))\n"
+        "print('numpy' in sys.modules)\n"
+        "sweep.load_config\n"
+        "print('numpy' in sys.modules, 'xarray' in sys.modules)\n"
+        "sweep.run\n"
+        "print('xarray' in sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True", "False", "True"]
+
+
+MOMENTS = [
+    "click",
+    "sweep.cli",
+    "ruamel.yaml",
+    "numpy",
+    "pydantic",
+    "sweep.config",
+    "numba",
+    "xarray",
+    "sweep.engine.run",
+]
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_an_interrupt_during_start_is_one_line(moment: str, write: Write, tmp_path: Path) -> None:
+    with start("run", write(SMALL), "--output", tmp_path / "out") as process:
+        assert process.stderr
+        told = []
+        for line in process.stderr:
+            told.append(line)
+            if _IMPORT.fullmatch(line.rstrip()) and line.split()[-1] == moment:
+                process.send_signal(signal.SIGINT)
+                told += process.stderr.readlines()
+        assert process.wait() == 130
+    assert [line for line in told if not line.startswith("import time:")] == ["interrupted\n"]
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,155 @@
+"""Kernels are compiled in processes of their own, side by side, and only what the cache lacks."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from support import ROOT
+from support.kernels import kernel, threads
+
+import sweep
+from sweep.engine.estimate import estimate
+from sweep.jit import Cached, showing
+from sweep.kernels import build as builder
+from sweep.kernels.build import build
+
+Write = Callable[..., Path]
+AUTO = "body: {b: [2, 3]}\nfriction: {mu: [1, 1000]}\nintegrator: {method: auto, t_end: 10}\nname: auto\n"
+"""Its cells need both methods."""
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
+    """What would be compiled if there were no cache, in the order in which processes start."""
+    pieces: list[tuple[str, ...]] = []
+
+    def start(piece: tuple[str, ...]) -> subprocess.Popen[bytes]:
+        pieces.append(piece)
+        return subprocess.Popen([sys.executable, "-c", ""])
+
+    monkeypatch.setattr(Cached, "is_missing", lambda _: True)
+    monkeypatch.setattr(builder, "_start", start)
+    return pieces
+
+
+def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...]]) -> None:
+    measure = ("reversals", "sensitivity=3", "resting_spin")
+    build(kernel(method, measure=measure) for method in ("adams", "dopri5", "adams"))
+    assert started == [
+        ("kernel", "adams", "slip", "reversals"),
+        ("images", "adams", "slip"),
+        ("approach", "slip"),
+        ("kernel", "dopri5", "slip", "reversals"),
+    ]
+
+
+@pytest.mark.usefixtures("started")
+def test_no_more_processes_at_once_than_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    alive: list[subprocess.Popen[bytes]] = []
+    most = 0
+
+    def start(_: tuple[str, ...]) -> subprocess.Popen[bytes]:
+        nonlocal most
+        alive.append(subprocess.Popen([sys.executable, "-c", "import time; time.sleep(0.2)"]))
+        most = max(most, sum(process.poll() is None for process in alive))
+        return alive[-1]
+
+    monkeypatch.setattr(builder, "_start", start)
+    with threads(1):
+        build([kernel("adams"), kernel()])
+    assert (len(alive), most) == (4, 1)
+
+
+def test_what_is_compiled_is_shown(started: list[tuple[str, ...]]) -> None:
+    told: list[object] = []
+
+    @contextmanager
+    def show() -> Iterator[None]:
+        told.append("begins")
+        yield
+        told.append(len(started))
+
+    with showing(show):
+        build([kernel()])
+    build([kernel()])
+    assert told == ["begins", 2]
+
+
+def test_an_estimate_compiles_nothing(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("compiled")
+
+    monkeypatch.setattr(Cached, "__call__", refuse)
+    monkeypatch.setattr(builder, "_start", refuse)
+    told = estimate(sweep.load_config(write(AUTO)))
+    assert [line.split(":")[0] for line in told.splitlines()] == ["cells", "steps", "memory", "time"]
+
+
+def test_measurements_without_a_place_in_the_kernel_share_it() -> None:
+    def name(*measure: str) -> str:
+        return str(kernel(measure=measure)._advance._cache._cache_file._index_name)
+
+    alone = name("reversals")
+    assert name("reversals", "resting_spin", "sensitivity=2") == alone
+    for other in ("first_reversal", "energy_error", "raw_reversals", "reversal_times=3", "noise_limited"):
+        assert name("reversals", other) != alone
+
+
+def _alive(pid: int) -> bool:
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return status != "Z"
+
+
+def _children(pid: int) -> list[int]:
+    listed = Path(f"/proc/{pid}/task/{pid}/children")
+    return list(map(int, listed.read_text(encoding="utf-8").split())) if listed.exists() else []
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="asks Linux for the children of a process")
+@pytest.mark.parametrize(("with_signal", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
+def test_processes_end_with_the_one_that_started_them(
+    with_signal: signal.Signals, code: int, write: Write, tmp_path: Path
+) -> None:
+    """Only the parent gets the signal."""
+    command = [sys.executable, "-m", "sweep", "run", write(AUTO), "--output", tmp_path / "out"]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    with subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True) as process:
+        while not (children := _children(process.pid)):
+            assert process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(with_signal)
+        assert process.stderr
+        told = process.stderr.read().splitlines()
+        assert process.wait() == code
+    while any(map(_alive, children)):
+        time.sleep(0.01)
+    assert list((tmp_path / "cache").rglob("*.nbc")) == []  # they were ended, and have not come to their ends
+    assert len(told) == (2 if with_signal == signal.SIGINT else 1), told
+    assert told[0].startswith("compiling")
+    assert told[1:] == ["interrupted: no cell finished and kept; the same command resumes the run"][: len(told) - 1]
+
+
+@pytest.mark.parametrize("folder", ["a file in its place", "none at all"])
+def test_without_a_cache_a_run_compiles_for_itself(folder: str, write: Write, tmp_path: Path) -> None:
+    """The averaged model: its kernel compiles fastest."""
+    (tmp_path / "cache").write_text("", encoding="utf-8")
+    text = "model: averaged\nname: small\nfriction: {mu: 60}\nmeasure: []\nintegrator: {t_end: 5}\n"
+    program = "from sweep.__main__ import main\nmain()\n"
+    if folder == "none at all":
+        program = "from numba.core.caching import CacheImpl\nCacheImpl._locator_classes = []\n" + program
+    command = [sys.executable, "-c", program, "run", write(text), "--output", tmp_path / "out"]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "small.nc").exists()
