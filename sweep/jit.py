@@ -28,6 +28,8 @@ FASTMATH = {"contract", "nsz", "arcp"}
 # error_model="python" would put a branch in front of each division, which prevents vectorisation.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FASTMATH}
 
+_WIDEST = 512
+
 _NUMERIC_SOURCES = ("jit.py", "models/**/*.py", "kernels/**/*.py")
 
 _waiting: list[tuple[Callable[..., Any], bool]] = []
@@ -102,6 +104,40 @@ def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -
 def serial(function: Callable[..., Any], specialisation: str) -> Cached:
     """As `parallel`, but on the thread that calls it, while other threads go on."""
     return Cached(load_numba().njit(function, nogil=True, **OPTIONS), specialisation, fingerprint())
+
+
+@cache
+def full_width() -> Any:
+    """A compiled function, () -> None: loops of the function that calls it are vectorised as widely as the CPU can.
+
+    For many of Intel's CPUs with AVX-512 LLVM prefers vectors of 256 bits, because wide ones used to slow the clock
+    down.  It adds no instruction, only an attribute of the caller; what that is inlined into has to call it as well.
+    """
+    from numba.core import types
+    from numba.extending import intrinsic
+
+    load_numba()
+
+    @intrinsic
+    def prefer_full_width(typing_context: Any) -> Any:  # noqa: ARG001
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ARG001
+            # llvmlite knows only attributes without a value.
+            set.add(builder.function.attributes, f'"prefer-vector-width"="{_WIDEST}"')
+            return context.get_dummy_value()
+
+        return types.void(), generate
+
+    return prefer_full_width
+
+
+def vector_bits() -> int:
+    """Width of the vectors in which kernels compute, in bits."""
+    load_numba()
+    from numba.core.registry import cpu_target
+
+    *_, features = cpu_target.target_context.codegen().magic_tuple()
+    widths = {"+avx512f": _WIDEST, "+avx": 256}
+    return next((bits for feature, bits in widths.items() if feature in features.split(",")), 128)
 
 
 def threads() -> int:
@@ -209,13 +245,13 @@ def _disk_cache() -> Any:
             self._cache_file = IndexDataCacheFile(self.cache_path, name, sources)
 
         def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
-            return (sig, codegen.magic_tuple())
+            return (sig, codegen.magic_tuple(), vector_bits())
 
         def holds(self) -> bool:
             context = cpu_target.target_context
             context.refresh()
             machine, files = context.codegen().magic_tuple(), self._cache_file
-            found = [name for (_, theirs), name in files._load_index().items() if theirs == machine]
+            found = [name for (_, theirs, _), name in files._load_index().items() if theirs == machine]
             return any(os.path.exists(files._data_path(name)) for name in found)
 
         def save_overload(self, sig: Any, data: Any) -> None:

@@ -12,7 +12,7 @@ import linecache
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from sweep.jit import compiled, inline
+from sweep.jit import compiled, full_width, inline
 from sweep.kernels.layout import LANES
 
 PREFIX = "<sweep "
@@ -58,8 +58,9 @@ def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[s
     The lines are the body of the loop itself.  If they were a function of their own, LLVM would unroll the loop over
     lanes before inlining it, and nothing would be vectorised.
     """
-    source = [f"def {name}({arguments}):", f"    for lane in range({LANES}):", *(f"        {line}" for line in lines)]
-    return compiled(compile_inline(name, "\n".join(source), names))
+    loop = [f"    for lane in range({LANES}):", *(f"        {line}" for line in lines)]
+    source = "\n".join([f"def {name}({arguments}):", "    full_width()", *loop])
+    return compiled(compile_inline(name, source, names | {"full_width": full_width()}))
 
 
 def compile_inline(name: str, source: str, names: dict[str, Any]) -> Any:

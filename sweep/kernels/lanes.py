@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import exactly_compiled, inline
+from sweep.jit import exactly_compiled, full_width, inline
 from sweep.kernels.codegen import make_load, make_rest, make_store
 from sweep.kernels.layout import LANES, Layout
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
@@ -44,7 +44,7 @@ def make_advance(run_block: Any, look: Any, layout: Layout) -> Any:
     """
     from numba import prange
 
-    n_rows, lanes, status = len(layout.names), LANES, layout.at("status")
+    n_rows, lanes, status, wide = len(layout.names), LANES, layout.at("status"), full_width()
 
     @exactly_compiled
     def take(images: Any, cells: Any, position: int, group: Any, lane: int, held: Any) -> int:
@@ -65,6 +65,7 @@ def make_advance(run_block: Any, look: Any, layout: Layout) -> Any:
 
     @exactly_compiled
     def run_group(images: Any, cells: Any, blocks: int, stop_when_settled: bool) -> None:
+        wide()
         # An idle lane computes on zeros.  What comes out is meaningless but harmless: its status keeps it from
         # being stored.
         group = np.zeros(n_rows * lanes)
@@ -90,6 +91,7 @@ def make_advance(run_block: Any, look: Any, layout: Layout) -> Any:
 
     def advance(images: Any, cells: Any, blocks: int, stop_when_settled: bool, groups: int) -> None:
         for g in prange(groups):
+            wide()
             run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
 
     return advance
@@ -115,11 +117,13 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
     will_settle, measure = _make_will_settle(layout, given.may_settle), given.measure
     GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP = map(layout.at, ("goal", "done", "status", "energy", "stable_step"))
     lanes, allowed, conserved = LANES, 1.0 + given.energy_gain, ENERGY in model.offers
+    wide = full_width()
     pauses = "quiet_energy" in layout
     QUIET_ENERGY, QUIET_AFTER = (layout.at(f"quiet_{name}") if pauses else 0 for name in ("energy", "after"))
 
     @exactly_compiled
     def look(group: Any, stop_when_settled: bool) -> None:
+        wide()
         for lane in range(lanes):
             y = load_states(group, lane)
             spin, rattle, inertia = energy(y, load_constants(group, lane))

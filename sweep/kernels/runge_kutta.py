@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import exactly_compiled
+from sweep.jit import exactly_compiled, full_width
 from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
@@ -50,10 +50,11 @@ class RungeKuttaKernel(Kernel):
         store_states = make_store(model.states, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), self._make_watch()
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
-        lanes = LANES
+        lanes, wide = LANES, full_width()
 
         @exactly_compiled
         def run_block(group: Any) -> None:
+            wide()
             for _ in range(block):
                 for lane in range(lanes):
                     y = load_states(group, lane)

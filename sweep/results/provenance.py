@@ -15,7 +15,7 @@ import llvmlite.binding
 import numba
 
 from sweep.config import Config
-from sweep.jit import fingerprint
+from sweep.jit import fingerprint, vector_bits
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import MODELS
 from sweep.results.identity import Identity
@@ -74,6 +74,7 @@ def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] =
         **{f"{name}_version": _version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
         "python_version": platform.python_version(),
         "cpu": ", ".join(sorted(set(cpus) or {this_cpu()})),
+        "vector_bits": vector_bits(),
         "threads": numba.get_num_threads(),
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "wall_time": seconds,

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import Cached, compiled, inline
+from sweep.jit import Cached, compiled, full_width, inline
 from sweep.kernels.adams import start_up, stretches, weights
 from sweep.kernels.adams.start_up import Started, count_levels, duration
 from sweep.kernels.adams.step import (
@@ -149,10 +149,12 @@ class AdamsKernel(Kernel):
         compiled, not one for each place in a ring of eight.  The history is not part of the group: LLVM sees then that
         no step reads from one what it has written to the other.
         """
-        names: dict[str, Any] = NAMES | {"watch": self._make_watch(), "work_of": self._make_work(), "np": np}
+        names: dict[str, Any] = NAMES | {"watch": self._make_watch(), "work_of": self._make_work()}
+        names |= {"full_width": full_width(), "np": np}
         first, size = self.layout.at(_HISTORY[0]), len(POINT) * LANES
         lines = [
             "def run_block(group):",
+            "    full_width()",
             f"    history = np.empty({(HISTORY + BLOCK) * size})",
             f"    for i in range({HISTORY * size}):",
             f"        history[i] = group[{first} + i]",
