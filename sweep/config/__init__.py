@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,7 @@ def _full_path(key: str) -> tuple[str, ...]:
 def _resolve(checked: Any, source: document.Document) -> Config:
     """Fill in defaults, order the axes, and check that the values fit together."""
     model = TIERS[checked.model]
+    checked = _with_method(checked, model)
     given = {
         key: getattr(getattr(checked, section), key)
         for section, keys in source.values.items()
@@ -101,7 +103,7 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         integrator=checked.integrator,
         measure=_measures(checked.measure, model),
         max_failed_fraction=checked.max_failed_fraction,
-        verify=checked.verify,
+        verify=checked.verify or 0.0,
         refine=checked.refine,
         cases=columns,
         cases_file=checked.cases,
@@ -109,6 +111,8 @@ def _resolve(checked: Any, source: document.Document) -> Config:
     for path, check in _CHECKS:
         if reason := check(config):
             raise ConfigError([source.fault(path, reason)])
+    if checked.verify is None and config.integrator.method == methods.AUTO and not config.refine:
+        return replace(config, verify=schema.VERIFIED if Grid.of(config).size * schema.VERIFIED >= 1 else 0.0)
     return config
 
 
@@ -146,6 +150,16 @@ _CHECKS: tuple[tuple[tuple[str, ...], Callable[[Config], str]], ...] = (
     (("start", "x0"), off_the_body),
     (("integrator", "step"), _unusable_step),
 )
+
+
+def _with_method(checked: Any, model: Tier) -> Any:
+    """The default method, filled in: `auto` where there is a choice and the step is not given."""
+    integrator = checked.integrator
+    if "method" in integrator.model_fields_set:
+        return checked
+    choice = isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
+    method = methods.AUTO if choice else methods.PLAIN
+    return checked.model_copy(update={"integrator": integrator.model_copy(update={"method": method})})
 
 
 def _measures(asked: list[str] | None, model: Tier) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import sys
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +19,7 @@ from ruamel.yaml.compat import StringIO
 from sweep.config.faults import quote
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
-from sweep.kernels.methods import AUTO, METHODS, PLAIN
+from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
 
@@ -136,13 +137,25 @@ def _measure(raw: Any, i: int) -> str:
     return kind(setting).spec  # type: ignore[call-arg]
 
 
+VERIFIED = 0.002
+"""Share of the cells that are run again unasked, in runs of so many cells that it amounts to one."""
+
+FOREVER = 1e7
+"""What `t_end: .inf` stands for, in sqrt(c/g): longer than any rattleback spins.  A trajectory that has not settled by
+then has the status `time_limit` all the same."""
+
+
 class Integrator(_Strict):
-    method: Literal[(*METHODS, AUTO)] = PLAIN  # type: ignore[valid-type]
-    """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time."""
+    method: Literal[(*METHODS, AUTO)] = AUTO  # type: ignore[valid-type]
+    """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time.  With a number
+    for `step`, and for a model that only one method can integrate, that is the default."""
     step: Annotated[float | Literal["auto"], BeforeValidator(_step)] = "auto"
     tolerance: float = Field(default=TOLERANCE, ge=1e-14, lt=1)
     """Error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep."""
-    t_end: float = Field(default=30_000.0, gt=0, le=1e12)
+    t_end: Annotated[float, BeforeValidator(lambda raw: FOREVER if raw == math.inf else raw)] = Field(
+        default=30_000.0, gt=0, le=1e12
+    )
+    """Time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` stands for `FOREVER`."""
     stop_when_settled: bool = True
 
 
@@ -166,8 +179,9 @@ class _Top(_Strict):
     integrator: Integrator = Integrator()
     measure: Annotated[list[str] | None, BeforeValidator(_measures)] = None
     """By default, those measurements marked `by_default` that the model supports."""
-    verify: float = Field(default=0.0, ge=0, le=1)
-    """Share of the cells that are run again with finer steps."""
+    verify: float | None = Field(default=None, ge=0, le=1)
+    """Share of the cells that are run again with the plain method at half its step; by default `VERIFIED` where the
+    method is `auto`, nothing is inferred and the share amounts to a cell, else none."""
     refine: int = Field(default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1)
     """The largest blocks of cells whose inside is inferred from their sides have 2^refine cells a side."""
     max_failed_fraction: float = Field(default=0.01, ge=0, le=1)

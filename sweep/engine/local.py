@@ -104,8 +104,12 @@ def run_group(
     # Not saved: a run that is killed here goes on from the ends of the first runs.
     repeat_all(plans, tables, lambda: after_chunk(statuses()))
     seconds = (time.perf_counter() - began) / len(group)
-    for i, job in zip(group, plans, strict=True):
-        yield Done(i, _results(job, grid, tiles[i], lambda: after_chunk(statuses())), seconds, cpu)
+    again = _verified(config, grid, plans, [grid.first_cell(tiles[i]) for i in group], lambda: after_chunk(statuses()))
+    for i, job, verified in zip(group, plans, again, strict=True):
+        arrays = job.results() | verified
+        if runs_asked_for(job):
+            arrays |= sensitivity(job, lambda: after_chunk(statuses()))
+        yield Done(i, arrays, seconds, cpu)
 
 
 def _groups(
@@ -139,14 +143,15 @@ def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
     return arrays
 
 
-def _results(job: Plan, grid: Grid, tile: Tile, after_chunk: Callable[[], None]) -> dict[str, Array]:
-    arrays = job.results()
-    if runs_asked_for(job):
-        arrays |= sensitivity(job, after_chunk)
-    if job.config.verify:
-        first = grid.first_cell(tile)
-        drawn = verification.draw(grid.size, job.config.verify) - first
-        again = verification.verify(job, drawn[(drawn >= 0) & (drawn < job.grid.size)])
-        again["verified_cell"] = again["verified_cell"] + first
-        arrays |= again
-    return arrays
+def _verified(
+    config: Config, grid: Grid, jobs: Sequence[Plan], first: Sequence[int], after_chunk: Callable[[], None]
+) -> list[dict[str, Array]]:
+    """For each job, what its cells that are run again give; `first` are the indices of their first cells in `grid`."""
+    if not config.verify:
+        return [{} for _ in jobs]
+    drawn = [verification.draw(grid.size, config.verify) - begin for begin in first]
+    inside = [cells[(cells >= 0) & (cells < job.grid.size)] for cells, job in zip(drawn, jobs, strict=True)]
+    again = verification.verify(jobs, inside, after_chunk)
+    for begin, arrays in zip(first, again, strict=True):
+        arrays["verified_cell"] = arrays["verified_cell"] + begin
+    return again

@@ -88,10 +88,16 @@ def plan(config: Config, grid: Grid | None = None) -> Plan:
 
 
 def kernels(config: Config) -> list[Kernel]:
-    """All kernels of which the cells of a configuration may need one."""
-    model, integrator = MODELS[config.model], config.integrator
-    names = methods.allowed(model) if integrator.method == AUTO else [integrator.method]
-    return [_kernel(name, model, config.measure, integrator.tolerance) for name in names]
+    """All kernels that a run of a configuration may need."""
+    method = config.integrator.method
+    names = methods.allowed(MODELS[config.model]) if method == AUTO else (method,)
+    names += (methods.PLAIN,) if config.verify and methods.PLAIN not in names else ()
+    return [kernel_of(name, config) for name in names]
+
+
+def kernel_of(method: str, config: Config) -> Kernel:
+    """The kernel of a method for the model and the measurements of a configuration."""
+    return _kernel(method, MODELS[config.model], config.measure, config.integrator.tolerance)
 
 
 def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
@@ -105,7 +111,7 @@ def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
     choices = []
     for i in np.unique(chosen):
         method, cells = list(METHODS)[i], np.flatnonzero(chosen == i)
-        kernel = _kernel(method, model, config.measure, integrator.tolerance)
+        kernel = kernel_of(method, config)
         theirs = {name: values[cells] for name, values in columns.items()}
         if integrator.step == "auto":
             step, rule = methods.automatic_step(method, model, theirs, integrator.tolerance)

@@ -18,7 +18,9 @@ WIDE = "+avx512f,+avx512vl,+avx512dq,+avx512bw,+avx2,+fma,+avx,+prefer-256-bit"
 
 def python(code: str, cache: Path, **environment: str) -> str:
     variables = os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(ROOT)} | environment
-    return subprocess.run([sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True).stdout
+    return subprocess.run(
+        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
+    ).stdout
 
 
 @pytest.mark.parametrize(("called", "wide"), [("full_width()", True), ("pass", False)])
