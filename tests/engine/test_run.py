@@ -25,7 +25,9 @@ def test_cases(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
     rows = [(40, 2, 0.05), (60, 5, 0.02)]
     text = "mu,b,n0\n" + "\n".join(",".join(map(str, row)) for row in rows)
     (tmp_path / "cells.csv").write_text(text, encoding="utf-8")
-    dataset = sweep.run(write("cases: cells.csv\nintegrator: {t_end: 1500}\n", "table.yaml"), tmp_path / "out")
+    dataset = sweep.run(
+        write("cases: cells.csv\nintegrator: {method: dopri5, t_end: 1500}\n", "table.yaml"), tmp_path / "out"
+    )
     assert dict(dataset.sizes) == {"case": 2}
     for i, (mu, b, n0) in enumerate(rows):
         one, other = dataset.isel(case=i), small.sel(mu=mu, b=b, n0=n0)

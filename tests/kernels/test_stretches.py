@@ -10,6 +10,7 @@ from support import adaptive, columns
 from support.kernels import finish, images, kernel
 
 from sweep.kernels.adams import stretches
+from sweep.kernels.layout import BLOCK
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models import linear, slip, slip_split, stability
 from sweep.models.model import stack, take
@@ -158,11 +159,13 @@ def test_tiny_starts_end_as_stepped_ones(size: float, carried: list[float]) -> N
     )
     ours, theirs = finish(ADAMS, table.copy()), stepped(table)
     assert sum(carried) > 0.1 * theirs[:, row("done")].sum()
-    for name in ("reversals", "status", "done"):
+    for name in ("reversals", "status"):
         np.testing.assert_array_equal(ours[:, row(name)], theirs[:, row(name)])
+    # A leap may end a little after the look at which the other settles.
+    np.testing.assert_allclose(ours[:, row("done")], theirs[:, row("done")], atol=2 * BLOCK)
     # To t = 4000 to 1e-2, though the weaker mode is hidden for a while.
     np.testing.assert_allclose(ours[:, row("last_reversal")], theirs[:, row("last_reversal")], atol=0.05)
-    np.testing.assert_allclose(ours[:, row("spin")], theirs[:, row("spin")], atol=1e-6)
+    np.testing.assert_allclose(ours[:, row("spin")], theirs[:, row("spin")], atol=1e-4)
     assert ours[:, row("violation")].max() < 2 * theirs[:, row("violation")].max() + 1e-15
 
 

@@ -82,7 +82,7 @@ def test_uncoupled_amplitudes_decay_at_every_spin() -> None:
 
 def test_an_uncoupled_body_settles_only_at_a_stable_spin(write: Callable[..., Path]) -> None:
     """Taken to be stable at any spin, it had settled at the spin of its start."""
-    run = sweep.run(write("body: {delta: 0}\nfriction: {mu: 20}\nstart: {n0: [0.06, 0.1]}\n"))
+    run = sweep.run(write("body: {delta: 0}\nfriction: {mu: 20}\nstart: {n0: [0.06, 0.12]}\n"))
     assert set(run.status.values) == {SETTLED}
     assert run.spin_final[0] == pytest.approx(0.06, rel=1e-3)
     assert 0.05 < run.spin_final[1] < 0.07 < run.n_c1_plus_linear

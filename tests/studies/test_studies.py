@@ -20,7 +20,7 @@ STANDARD = "name: standard\nfriction: {mu: [60, 75]}\nintegrator: {t_end: 1500}\
 
 
 def test_sampling_does_not_touch_the_steps(write: Write) -> None:
-    swept = sweep.run(write(STANDARD))
+    swept = sweep.run(write(STANDARD), method="dopri5")
     followed = sweep.trajectory(write(STANDARD), mu=[60, 75], every=3.0)
     np.testing.assert_array_equal(followed.spin_final, swept.spin_final)
     np.testing.assert_array_equal(followed.energy_error, swept.energy_error)

@@ -17,9 +17,9 @@ name: small
 body: {a: 10.0, b: [2.0, 3.0, 5.0], delta: 0.03}
 friction: {mu: [40, 60]}
 start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
-integrator: {t_end: 1500}
+integrator: {method: dopri5, t_end: 1500}
 """
-"""A sweep of twelve cells."""
+"""A sweep of twelve cells, slow enough to be interrupted."""
 
 
 def columns(**parameters: Any) -> dict[str, np.ndarray]:

@@ -31,7 +31,9 @@ class RestingSpin(Measurement):
 
     variables = {
         "spin_rest": Variable(
-            "float64", "1", "spin when the rattle of a settled trajectory has decayed, in sqrt(g/c)",
+            "float64",
+            "1",
+            "spin when the rattle of a settled trajectory has decayed, in sqrt(g/c); missing where it still grows",
             of_sound_runs=True,
         )
     }  # fmt: skip
