@@ -1,23 +1,28 @@
-"""Speed against error of the kernel beside other tools.
+"""Whole runs beside other tools: from parameters in Python to spins, and to counts where a tool can count.
 
-The task is a small sweep: trajectories of the slip model from t = 0 to T with slightly different n0, which share
-nothing.  Compared are
+The task is a small sweep, as a user of each tool would write it: distinct bodies of the slip model (b = 2 … 8) with
+one friction and one start, from t = 0 to T.  Compared are
 
-* the kernel itself with dopri5 and adams, with and without measurements,
-* heyoka.py: Taylor series in batches of the machine's SIMD width, half of them in each of two threads,
+* `sweep.run` with dopri5 and with the method chosen for each cell, with all default measurements and with counts alone,
+* heyoka.py: Taylor series in batches of the machine's SIMD width, in its ensemble mode and shared out to two threads,
+  with the equations as a user would write them; with events that count crossings of zero; and with our algebra,
 * numbalsoda: compiled LSODA and DOP853 on the compiled right-hand side, in two threads,
-* diffrax: jitted and vmapped, adaptive and with constant steps, on XLA's own threads,
-* SciPy: DOP853 and LSODA on the compiled right-hand side, in one process, on a few trajectories.
+* diffrax: jitted and vmapped, adaptive, on XLA's own threads,
+* SciPy: DOP853 and LSODA on the compiled right-hand side, in one process.
 
-All tools integrate the same right-hand side, that of `sweep.models.slip`, in double precision and on two processors.
-Compilation is not timed, and the tools' runs take turns, so that other work on the machine affects all alike.  The
-error is that of the spin at T, the largest over the trajectories, against heyoka's Taylor series in 80-bit arithmetic,
-which is checked by SciPy's DOP853 at its tightest tolerance.  A setting's speed is given relative to heyoka's at one
-fixed tolerance, and to the fastest of heyoka's settings that are at least as accurate.
+The time of a run begins with arrays of parameters and ends with the spins at T; constants, starts and steps are part
+of it.  Compilation is not.  All tools run in double precision on two processors and take turns, so that other work on
+the machine affects all alike.  Tools that would take too long get fewer of the bodies, evenly spread, and are compared
+by the time of one trajectory.  The error is that of the spin at T, the largest over eight of the bodies (as many of
+them as a tool runs), against heyoka's Taylor series in 80-bit arithmetic, of which one is checked by SciPy's DOP853 at
+its tightest tolerance.
+
+A reversal in `sweep` is a change of sign of the ripple-free spin averaged over a period of the rattle.  heyoka's events
+see the spin itself, which may cross zero several times in one reversal: the table tells how many counts agree.
 
     pip install -e .[peers]
     pip install numbalsoda        # optional: from source, needs cmake, a C++ and a Fortran compiler
-    python scripts/peers.py [--output peers.png] [--quick]
+    python scripts/peers.py [--mu 60 200 1000] [--bodies 1024] [--repeats 5]
 """
 
 from __future__ import annotations
@@ -28,6 +33,8 @@ import math
 import os
 import statistics
 import sys
+import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -41,11 +48,8 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from tracing import traced_rhs
 
-from sweep.engine.executor import execute
+import sweep
 from sweep.jit import load_numba
-from sweep.kernels.kernel import Kernel
-from sweep.kernels.methods import make_kernel
-from sweep.kernels.status import TIME_LIMIT
 from sweep.models.model import Array, stack
 from sweep.models.slip import MODEL
 
@@ -54,51 +58,54 @@ numba = load_numba()
 THREADS = 2
 T_END = 400.0
 
-ADAMS_STEPS = (0.125, 0.1, 0.08, 0.0667, 0.05)
-
-SLOW_SECONDS, SLOW_REPEATS = 3.0, 3
+SLOW_SECONDS, SLOW_REPEATS = 2.0, 3
 """Runs that take longer than `SLOW_SECONDS` are repeated no more than `SLOW_REPEATS` times."""
 
-HEYOKA = "heyoka batch"
-BASE_TOLERANCE = 1e-5
-HEYOKA_TOLERANCES = (1e-2, 1e-3, 1e-4, BASE_TOLERANCE, 1e-6, 1e-8, 1e-10)
-STEPS = (0.04, 0.0333, 0.0286, 0.025, 0.02)
-"""For mu = 60; stronger friction shortens them, as the stability of an explicit method requires."""
+COMPARED = 8
+"""Bodies whose errors are computed."""
 
-DOP853_TOLERANCES, LSODA_TOLERANCES = (1e-3, 1e-5, 1e-7), (1e-7, 1e-9, 1e-11)
-SCIPY_TRAJECTORIES = 2
+TOLERANCE = 1e-6
+"""Of sweep's runs."""
+DOPRI5, AUTO, BATCH = "sweep, dopri5", "sweep, auto", "heyoka batch"
+HEYOKA_TOLERANCE, DOP853_TOLERANCE, LSODA_TOLERANCE, TSIT5_TOLERANCE = 1e-5, 1e-5, 1e-9, 1e-6
 RTOL_TO_ATOL = 1e-3
 """Absolute over relative tolerance: the rattle's states are of order 1e-3."""
+
+FIXED = {"a": 10.0, "c": 1.0, "delta": 0.03, "n0": 0.05, "x0": 0.01, "y0": 0.01}
+CONFIGURATION = """
+body: {a: 10.0, b: 3.0, delta: 0.03}
+friction: {mu: 60.0}
+start: {n0: 0.05, x0: 0.01, y0: 0.01}
+integrator: {stop_when_settled: false}
+"""
+
+Answer = tuple[Array, Array | None]
+"""Spins at T, and counts of reversals if the tool counts them, each of shape (bodies,)."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    columns: dict[str, Array]
-    states: Array
-    """At t = 0, shape (states, trajectories)."""
-    constants: Array
-
-    @classmethod
-    def of(cls, mu: float, trajectories: int) -> Problem:
-        fixed = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": mu, "x0": 0.01, "y0": 0.01}
-        columns = {name: np.full(trajectories, value) for name, value in fixed.items()}
-        columns["n0"] = 0.05 * (1 + 1e-3 * np.arange(trajectories) / trajectories)
-        return cls(columns, stack(MODEL.start(columns)), stack(MODEL.constants.of(columns)))
+    mu: float
+    b: Array
+    """Shape (bodies,)."""
 
     @property
     def size(self) -> int:
-        return self.states.shape[1]
+        return len(self.b)
 
-    def step(self, nominal: float) -> float:
-        return float(nominal * min(1.0, 60.0 / self.columns["mu"][0]))
+    def at(self, which: Any) -> Problem:
+        return Problem(self.mu, self.b[which])
 
-    def part(self, which: Any) -> Problem:
-        columns = {name: column[which] for name, column in self.columns.items()}
-        return Problem(columns, self.states[:, which], self.constants[:, which])
+    def start(self) -> tuple[Array, Array]:
+        """States at t = 0 and constants, shapes (states, bodies) and (constants, bodies)."""
+        columns = {name: np.full(self.size, value) for name, value in FIXED.items()}
+        columns |= {"b": self.b, "mu": np.full(self.size, self.mu)}
+        return stack(MODEL.start(columns)), stack(MODEL.constants.of(columns))
 
-    def spin(self, states: Array) -> Array:
-        """The spins of states of shape (states, trajectories)."""
-        return np.asarray(MODEL.rhs(states, MODEL.constants(*self.constants))[1][0])
+
+def spin(states: Array, constants: Array) -> Array:
+    """Spins of states of shape (states, bodies)."""
+    return np.asarray(MODEL.rhs(states, MODEL.constants(*constants))[1][0])
 
 
 @dataclass
@@ -107,16 +114,17 @@ class Entry:
 
     tool: str
     setting: str
-    solve: Callable[[], Array]
-    """Runs all trajectories and returns their states at T, shape (states, trajectories)."""
+    solve: Callable[[Problem], Answer]
     problem: Problem
     error: float = math.nan
+    counts: Array | None = None
     seconds: list[float] = field(default_factory=list)
 
-    def run(self) -> tuple[Array, float]:
+    def run(self) -> float:
+        """Seconds that a run takes."""
         began = time.perf_counter()
-        states = self.solve()
-        return states, time.perf_counter() - began
+        self.solve(self.problem)
+        return time.perf_counter() - began
 
     @property
     def milliseconds(self) -> float:
@@ -140,46 +148,39 @@ def thread_pool() -> ThreadPoolExecutor:
 # --- ours -------------------------------------------------------------------------------------
 
 
-def our_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
-    for measure in ((), ("reversals", "energy_error")):
-        kernel = make_kernel("dopri5", MODEL, measure)
-        tool = "sweep, measuring" if measure else "sweep"
-        for step in map(problem.step, STEPS[1::2] if quick else STEPS):
-            yield Entry(tool, f"dopri5 h={step:g}", our_run(problem, kernel, step), problem)
-        stiff = make_kernel("adams", MODEL, measure)
-        for step in ADAMS_STEPS[1::2] if quick else ADAMS_STEPS:
-            yield Entry(f"{tool} (adams)", f"adams h={step:g}", our_run(problem, stiff, step), problem)
+def our_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
+    for tool, method in ((DOPRI5, "dopri5"), (AUTO, "auto")):
+        yield tool, f"tol={TOLERANCE:g}", partial(our_run, method, {})
+        yield f"{tool}, counts alone", f"tol={TOLERANCE:g}", partial(our_run, method, {"measure": ["reversals"]})
 
 
-def our_run(problem: Problem, kernel: Kernel, step: float) -> Callable[[], Array]:
-    """Whole runs, including the preparation of the images, where adams has its start-up."""
-    steps = np.full(problem.size, step)
+def our_run(method: str, more: dict[str, Any], problem: Problem) -> Answer:
+    found = sweep.run(
+        configuration(), b=problem.b, mu=problem.mu, method=method, tolerance=TOLERANCE, t_end=T_END, **more
+    )
+    return found["spin_final"].values, found["reversals"].values
 
-    def run() -> Array:
-        images = kernel.images(problem.columns, steps, T_END)
-        execute(kernel, images, stop_when_settled=False)
-        finished = images[:, kernel.row("status")] == TIME_LIMIT
-        return np.where(finished, kernel.model_states(images), np.nan)
 
-    return run
+@cache
+def configuration() -> Path:
+    path = Path(tempfile.mkdtemp()) / "peers.yaml"
+    path.write_text(CONFIGURATION, encoding="utf-8")
+    return path
 
 
 # --- heyoka.py --------------------------------------------------------------------------------
 
 
-def heyoka_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
+def heyoka_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
     import heyoka
 
-    recommended = heyoka.recommended_simd_size()
-    for size in sorted({min(size, problem.size) for size in (8, recommended)}):
-        tool = HEYOKA if size == min(recommended, problem.size) else f"{HEYOKA} of {size}"
-        for tolerance in HEYOKA_TOLERANCES[::3] if quick else HEYOKA_TOLERANCES:
-            work = heyoka_run(problem, heyoka_system(), tolerance, size)
-            yield Entry(tool, f"tol={tolerance:g} batch={size}", work, problem)
-    for compact in (False, True):
-        work = heyoka_run(problem, textbook_system(), BASE_TOLERANCE, recommended, compact)
-        setting = f"tol={BASE_TOLERANCE:g}{' compact' if compact else ''}"
-        yield Entry("heyoka, equations as written", setting, work, problem)
+    size = heyoka.recommended_simd_size()
+    setting = f"tol={HEYOKA_TOLERANCE:g} batch={size}"
+    written = Batches(textbook_system(), size)
+    yield BATCH, setting, written.in_shares
+    yield "heyoka ensemble of batches", setting, written.in_ensemble
+    yield "heyoka batch, counting", setting, Batches(textbook_system(), size, counting=True).in_shares
+    yield "heyoka batch, our algebra", setting, Batches(heyoka_system(), size).in_shares
 
 
 def heyoka_system() -> list[tuple[Any, Any]]:
@@ -234,64 +235,113 @@ def textbook_system() -> list[tuple[Any, Any]]:
     return list(zip(states, [du[0], du[1], *domega, dv[0], dv[1]], strict=True))
 
 
-def heyoka_run(
-    problem: Problem, system: list[tuple[Any, Any]], tolerance: float, size: int, compact: bool = False
-) -> Callable[[], Array]:
-    """Batches of `size` trajectories; the last batch is filled up with copies of the last trajectory."""
+class Batches:
+    """Integrators of `size` bodies at a time; the last batch is filled up with copies of the last body."""
+
+    def __init__(self, system: list[tuple[Any, Any]], size: int, counting: bool = False) -> None:
+        import heyoka
+
+        self.size, self.counting = size, counting
+        # compact_mode=True takes three times as long here; force_avx512 and slp_vectorize change nothing.
+        original = heyoka.taylor_adaptive_batch(
+            system,
+            state=np.zeros((len(MODEL.states), size)),
+            pars=np.ones((count_constants(), size)),
+            tol=HEYOKA_TOLERANCE,
+            fast_math=True,
+            nt_events=[heyoka.nt_event_batch(spin_expression(), count_crossing)] if counting else [],
+        )
+        self.integrators = [original] + [copy.copy(original) for _ in range(THREADS - 1)]
+
+    def in_shares(self, problem: Problem) -> Answer:
+        """Every second batch in each of two threads."""
+        states, constants, batches = self._batches(problem)
+
+        def run_share(share: int) -> list[tuple[Array, Array]]:
+            integrator, results = self.integrators[share], []
+            for batch in batches[share::THREADS]:
+                self._set(integrator, states[:, batch], constants[:, batch])
+                crossings = COUNTING[id_of_thread()] = np.zeros(self.size, dtype=int)
+                integrator.propagate_until(T_END)
+                results.append((integrator.state.copy(), crossings))
+            return results
+
+        found: list[Any] = [None] * len(batches)
+        for share, results in enumerate(in_threads(run_share, range(THREADS))):
+            found[share::THREADS] = results
+        ends = np.concatenate([state for state, _ in found], axis=1)[:, : problem.size]
+        counts = np.concatenate([crossings for _, crossings in found])[: problem.size]
+        return spin(ends, constants), counts if self.counting else None
+
+    def in_ensemble(self, problem: Problem) -> Answer:
+        """By heyoka's own means for many runs."""
+        import heyoka
+
+        states, constants, batches = self._batches(problem)
+
+        def generate(integrator: Any, i: int) -> Any:
+            self._set(integrator, states[:, batches[i]], constants[:, batches[i]])
+            return integrator
+
+        found = heyoka.ensemble_propagate_until_batch(
+            self.integrators[0], T_END, len(batches), generate, max_workers=THREADS
+        )
+        ends = np.concatenate([integrator.state for integrator, *_ in found], axis=1)[:, : problem.size]
+        return spin(ends, constants), None
+
+    def _batches(self, problem: Problem) -> tuple[Array, Array, Array]:
+        size, states_constants = self.size, problem.start()
+        batches = np.minimum(np.arange(problem.size + -problem.size % size), problem.size - 1).reshape(-1, size)
+        return *states_constants, batches
+
+    def _set(self, integrator: Any, states: Array, constants: Array) -> None:
+        integrator.set_time(0.0)
+        integrator.state[:], integrator.pars[:] = states, constants
+
+
+COUNTING: dict[int, Array] = {}
+"""The crossings of zero so far of the batch that each thread runs: events are copied with their integrator."""
+id_of_thread = threading.get_ident
+
+
+def count_crossing(_integrator: Any, _time: float, _sign: int, member: int) -> None:
+    COUNTING[id_of_thread()][member] += 1
+
+
+def spin_expression() -> Any:
     import heyoka
 
-    batches = np.minimum(np.arange(problem.size + -problem.size % size), problem.size - 1).reshape(-1, size)
-    # compact_mode=True takes three times as long here; force_avx512 and slp_vectorize change nothing.
-    original = heyoka.taylor_adaptive_batch(
-        system,
-        state=problem.states[:, batches[0]],
-        pars=problem.constants[:, batches[0]],
-        tol=tolerance,
-        compact_mode=compact,
-        fast_math=True,
-    )
-    integrators = [original] + [copy.copy(original) for _ in range(THREADS - 1)]
-
-    def run_share(share: int) -> Array:
-        integrator, results = integrators[share], []
-        for batch in batches[share::THREADS]:
-            integrator.set_time(0.0)
-            integrator.state[:] = problem.states[:, batch]
-            integrator.pars[:] = problem.constants[:, batch]
-            integrator.propagate_until(T_END)
-            results.append(integrator.state.copy())
-        return np.array(results).reshape(-1, len(MODEL.states), size)
-
-    def run() -> Array:
-        states = np.empty((len(batches), len(MODEL.states), size))
-        for share, result in enumerate(in_threads(run_share, range(THREADS))):
-            states[share::THREADS] = result
-        return np.concatenate(states, axis=1)[:, : problem.size]
-
-    return run
+    parameters = tuple(heyoka.par[i] for i in range(count_constants()))
+    _, others = traced_rhs(MODEL, heyoka.sqrt)(tuple(heyoka.make_vars(*MODEL.states)), parameters)
+    return others[0]
 
 
 def taylor_reference(problem: Problem) -> Array:
-    """States at T from Taylor series in extended precision (80 bits on x86)."""
+    """Spins at T from Taylor series in extended precision (80 bits on x86)."""
     import heyoka
 
     real = np.longdouble
-    states = np.empty_like(problem.states)
+    states, constants = problem.start()
     integrator = heyoka.taylor_adaptive(
         heyoka_system(),
-        state=list(problem.states[:, 0].astype(real)),
-        pars=list(problem.constants[:, 0].astype(real)),
+        state=list(states[:, 0].astype(real)),
+        pars=list(constants[:, 0].astype(real)),
         fp_type=real,
-        tol=np.finfo(real).eps,
+        tol=real(1e-17),
         compact_mode=True,
     )
-    for i in range(problem.size):
-        integrator.time = real(0)
-        integrator.state[:] = problem.states[:, i]
-        integrator.pars[:] = problem.constants[:, i]
-        integrator.propagate_until(real(T_END))
-        states[:, i] = integrator.state
-    return states
+    integrators = [integrator] + [copy.copy(integrator) for _ in range(THREADS - 1)]
+
+    def run_share(share: int) -> None:
+        own = integrators[share]
+        for i in range(share, problem.size, THREADS):
+            own.time = real(0)
+            own.state[:], own.pars[:] = states[:, i], constants[:, i]
+            own.propagate_until(real(T_END))
+            states[:, i] = own.state
+
+    in_threads(run_share, range(THREADS))
+    return spin(states, constants)
 
 
 # --- SciPy ------------------------------------------------------------------------------------
@@ -309,35 +359,30 @@ def compiled_rhs() -> Any:
     return slopes
 
 
-def scipy_states(problem: Problem, method: str, rtol: float, atol: float) -> Array:
+def scipy_run(method: str, rtol: float, atol: float, problem: Problem) -> Answer:
     from scipy.integrate import solve_ivp
 
+    states, constants = problem.start()
     ends = [
         solve_ivp(compiled_rhs(), (0, T_END), y, method, t_eval=[T_END], args=(p,), rtol=rtol, atol=atol).y[:, -1]
-        for y, p in zip(problem.states.T.copy(), problem.constants.T.copy(), strict=True)
+        for y, p in zip(states.T.copy(), constants.T.copy(), strict=True)
     ]
-    return np.array(ends).T
+    return spin(np.array(ends).T, constants), None
 
 
-def scipy_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
-    few = problem.part(np.unique(np.linspace(0, problem.size - 1, SCIPY_TRAJECTORIES, dtype=int)))
-    for method, tolerances in (("DOP853", DOP853_TOLERANCES), ("LSODA", LSODA_TOLERANCES)):
-        for rtol in tolerances[1:2] if quick else tolerances:
-            run = partial(scipy_states, few, method, rtol, rtol * RTOL_TO_ATOL)
-            yield Entry("SciPy, 1 process", f"{method} rtol={rtol:g}", run, few)
+def scipy_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
+    for method, rtol in (("DOP853", DOP853_TOLERANCE), ("LSODA", LSODA_TOLERANCE)):
+        yield "SciPy, 1 process", f"{method} rtol={rtol:g}", partial(scipy_run, method, rtol, rtol * RTOL_TO_ATOL)
 
 
 # --- numbalsoda -------------------------------------------------------------------------------
 
 
-def numbalsoda_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
+def numbalsoda_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
     import numbalsoda
 
-    address = numbalsoda_rhs().address
-    for method, tolerances in ((numbalsoda.dop853, DOP853_TOLERANCES), (numbalsoda.lsoda, LSODA_TOLERANCES)):
-        for rtol in tolerances[1:2] if quick else tolerances:
-            run = numbalsoda_run(problem, method, address, rtol)
-            yield Entry(f"numbalsoda {method.__name__}", f"rtol={rtol:g}", run, problem)
+    for method, rtol in ((numbalsoda.dop853, DOP853_TOLERANCE), (numbalsoda.lsoda, LSODA_TOLERANCE)):
+        yield f"numbalsoda {method.__name__}", f"rtol={rtol:g}", numbalsoda_run(method, rtol)
 
 
 @cache
@@ -356,36 +401,33 @@ def numbalsoda_rhs() -> Any:
     return callback
 
 
-def numbalsoda_run(problem: Problem, method: Any, address: int, rtol: float) -> Callable[[], Array]:
-    times, states, constants = np.array([0.0, T_END]), problem.states.T.copy(), problem.constants.T.copy()
+def numbalsoda_run(method: Any, rtol: float) -> Callable[[Problem], Answer]:
+    times, address = np.array([0.0, T_END]), numbalsoda_rhs().address
 
     @numba.njit(nogil=True)
     def solve(y: Array, p: Array) -> Array:
         result, success = method(address, y, times, p, rtol, rtol * RTOL_TO_ATOL, 10**8)
         return result[-1] if success else np.full_like(y, np.nan)
 
-    solve(states[0], constants[0])  # Compiled before threads ask for it.
-    return lambda: np.array(in_threads(lambda i: solve(states[i], constants[i]), range(problem.size))).T
+    def run(problem: Problem) -> Answer:
+        states, constants = problem.start()
+        begins, fixed = states.T.copy(), constants.T.copy()
+        ends = in_threads(lambda i: solve(begins[i], fixed[i]), range(problem.size))
+        return spin(np.array(ends).T, constants), None
+
+    return run
 
 
 # --- diffrax ----------------------------------------------------------------------------------
 
 
-def diffrax_entries(problem: Problem, quick: bool) -> Iterator[Entry]:
+def diffrax_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
     import diffrax
 
-    for solver in (diffrax.Dopri5(), diffrax.Tsit5()):
-        name = type(solver).__name__
-        for rtol in (1e-6,) if quick else (1e-4, 1e-6, 1e-8):
-            controller = diffrax.PIDController(rtol=rtol, atol=rtol * RTOL_TO_ATOL)
-            run = diffrax_run(problem, solver, controller, 0.01)
-            yield Entry(f"diffrax {name}", f"adaptive rtol={rtol:g}", run, problem)
-        for step in map(problem.step, STEPS[3:4] if quick else (STEPS[1], *STEPS[3:])):
-            run = diffrax_run(problem, solver, diffrax.ConstantStepSize(), step)
-            yield Entry(f"diffrax {name}, constant", f"h={step:g}", run, problem)
+    yield "diffrax Tsit5", f"rtol={TSIT5_TOLERANCE:g}", diffrax_run(diffrax.Tsit5(), TSIT5_TOLERANCE)
 
 
-def diffrax_run(problem: Problem, solver: Any, controller: Any, first_step: float) -> Callable[[], Array]:
+def diffrax_run(solver: Any, rtol: float) -> Callable[[Problem], Answer]:
     import diffrax
     import jax
     import jax.numpy as jnp
@@ -393,53 +435,69 @@ def diffrax_run(problem: Problem, solver: Any, controller: Any, first_step: floa
     jax.config.update("jax_enable_x64", True)
     rhs = traced_rhs(MODEL, jnp.sqrt)
     term = diffrax.ODETerm(lambda _t, y, p: jnp.stack(rhs(tuple(y), tuple(p))[0]))
+    controller = diffrax.PIDController(rtol=rtol, atol=rtol * RTOL_TO_ATOL)
 
     def solve(y: Any, p: Any) -> Any:
         return diffrax.diffeqsolve(
-            term, solver, 0.0, T_END, first_step, y, p,
+            term, solver, 0.0, T_END, 0.01, y, p,
             stepsize_controller=controller, max_steps=None, adjoint=diffrax.ForwardMode(), throw=False,
         ).ys[0]  # fmt: skip
 
     # In one call: two Python threads with half the trajectories each are no faster.
     solve_all = jax.jit(jax.vmap(solve))
-    states, constants = jnp.asarray(problem.states.T), jnp.asarray(problem.constants.T)
-    return lambda: np.asarray(solve_all(states, constants)).T
+
+    def run(problem: Problem) -> Answer:
+        states, constants = problem.start()
+        ends = solve_all(jnp.asarray(states.T), jnp.asarray(constants.T))
+        return spin(np.asarray(ends).T, constants), None
+
+    return run
 
 
 # --- all of them ------------------------------------------------------------------------------
 
-TOOLS: dict[str, Callable[[Problem, bool], Iterator[Entry]]] = {
-    "sweep": our_entries,
-    "heyoka": heyoka_entries,
-    "numbalsoda": numbalsoda_entries,
-    "diffrax": diffrax_entries,
-    "scipy": scipy_entries,
+Tool = Callable[[], Iterator[tuple[str, str, Callable[[Problem], Answer]]]]
+
+TOOLS: dict[str, tuple[Tool, float]] = {
+    "sweep": (our_entries, math.inf),
+    "heyoka": (heyoka_entries, 1024),
+    "numbalsoda": (numbalsoda_entries, 128),
+    "diffrax": (diffrax_entries, 128),
+    "scipy": (scipy_entries, 2),
 }
-"""Functions that make the entries, by the module that each needs."""
+"""What makes a tool's entries, by the module that it needs; and the number of bodies that it gets at μ = 60."""
+
+
+def affordable(problem: Problem, most: float) -> Problem:
+    """Every n-th body: at most `most` at μ = 60, and the fewer, the more steps friction requires; at least one."""
+    wanted = max(1.0, most * 60.0 / problem.mu)
+    strides = (n for n in range(1, problem.size + 1) if problem.size % n == 0)
+    return problem.at(slice(None, None, next(n for n in strides if problem.size / n <= wanted)))
 
 
 def reference_spins(problem: Problem) -> Array:
-    """Spins at T; prints how well two independent methods agree on them."""
-    few = problem.part(slice(0, SCIPY_TRAJECTORIES))
-    by_taylor = problem.spin(taylor_reference(problem))
-    by_scipy = few.spin(scipy_states(few, "DOP853", 1e-13, 1e-16))
-    difference = np.abs(by_taylor[: few.size] - by_scipy).max()
+    """Spins at T; prints how well two independent methods agree on the first."""
+    by_taylor = taylor_reference(problem)
+    by_scipy, _ = scipy_run("DOP853", 1e-13, 1e-16, problem.at(slice(1)))
+    difference = abs(by_taylor[0] - by_scipy[0])
     print(f"reference: Taylor series in extended precision; SciPy's DOP853 at rtol=1e-13 differs by {difference:.1e}")
     return by_taylor
 
 
-def prepare(problem: Problem, quick: bool, reference: Array) -> list[Entry]:
+def prepare(problem: Problem) -> list[Entry]:
     """Entries of the installed tools, compiled by an untimed run, which also gives their errors."""
+    reference = problem.at(slice(None, None, problem.size // COMPARED))
+    exact = reference_spins(reference)
     sound = []
-    for module, make in TOOLS.items():
+    for module, (make, most) in TOOLS.items():
         if find_spec(module) is None:
             print(f"{module}: not installed")
             continue
-        for entry in make(problem, quick):
-            states, _ = entry.run()
-            spins = entry.problem.spin(states)
-            exact = reference[np.searchsorted(problem.columns["n0"], entry.problem.columns["n0"])]
-            entry.error = float(np.abs(spins - exact).max())
+        for tool, setting, solve in make():
+            entry = Entry(tool, setting, solve, affordable(problem, most))
+            spins, entry.counts = solve(entry.problem)
+            ours, theirs = np.isin(reference.b, entry.problem.b), np.isin(entry.problem.b, reference.b)
+            entry.error = float(np.abs(spins[theirs] - exact[ours]).max())
             if math.isfinite(entry.error):
                 sound.append(entry)
             else:
@@ -452,45 +510,38 @@ def measure(entries: list[Entry], repeats: int) -> None:
     for _ in range(repeats):
         for entry in entries:
             if len(entry.seconds) < SLOW_REPEATS or statistics.median(entry.seconds) < SLOW_SECONDS:
-                entry.seconds.append(entry.run()[1])
+                entry.seconds.append(entry.run())
 
 
 def print_table(entries: list[Entry]) -> None:
-    peers = [entry for entry in entries if entry.tool == HEYOKA]
-    base = next((e.milliseconds for e in peers if e.setting.startswith(f"tol={BASE_TOLERANCE:g} ")), math.nan)
+    cost = {entry.tool: entry.milliseconds for entry in entries}
+    counted = next(entry for entry in entries if entry.tool == DOPRI5)
     print(
-        f"\n{'':46s}{'seconds per run':>26s}{'ms per':>11s}{'trajectories':>14s}{'largest':>10s}"
-        f"{'speed over heyoka':>21s}\n"
-        f"{'tool':25s}{'setting':21s}{'median (min..max)':>26s}{'trajectory':>11s}{'per second':>14s}{'|error|':>10s}"
-        f"{f'tol={BASE_TOLERANCE:g}':>11s}{'as exact':>10s}"
+        f"{'':53s}{'seconds per run':>26s}{'ms per':>11s}{'largest':>9s}{'counts':>11s}{'times':>8s}\n"
+        f"{'tool':29s}{'setting':18s}{'runs':>6s}{'median (min..max)':>26s}{'trajectory':>11s}"
+        f"{'|error|':>9s}{'as dopri5':>11s}{'heyoka':>8s}"
     )
     for entry in entries:
         spread = f"{statistics.median(entry.seconds):.4f} ({min(entry.seconds):.4f}..{max(entry.seconds):.4f})"
-        as_exact = min((e.milliseconds for e in peers if e.error <= entry.error), default=math.nan)
         print(
-            f"{entry.tool:25s}{entry.setting:21s}{spread:>26s}{entry.milliseconds:11.3f}"
-            f"{1e3 / entry.milliseconds:14.1f}{entry.error:10.1e}"
-            f"{base / entry.milliseconds:11.3f}{as_exact / entry.milliseconds:10.3f}"
+            f"{entry.tool:29s}{entry.setting:18s}{entry.problem.size:6d}{spread:>26s}{entry.milliseconds:11.4g}"
+            f"{entry.error:9.1e}{agreement(entry, counted):>11s}{cost.get(BATCH, math.nan) / entry.milliseconds:8.3g}"
         )
-    print("as exact: over the fastest setting of heyoka with no larger error; nan where there is none")
+    for ours in ("", ", counts alone"):
+        ratios = {
+            "auto over dopri5": cost[DOPRI5 + ours] / cost[AUTO + ours],
+            "dopri5 over heyoka batch": cost.get(BATCH, math.nan) / cost[DOPRI5 + ours],
+            "auto over heyoka batch": cost.get(BATCH, math.nan) / cost[AUTO + ours],
+        }
+        print(f"times faster{ours}: " + "; ".join(f"{name} {ratio:.3g}" for name, ratio in ratios.items()))
 
 
-def draw(entries: list[Entry], mu: float, output: Path) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 6), layout="constrained")
-    axes = figure.add_subplot()
-    for marker, tool in enumerate(dict.fromkeys(entry.tool for entry in entries)):
-        points = sorted((entry.error, entry.milliseconds) for entry in entries if entry.tool == tool)
-        axes.loglog(*zip(*points, strict=True), marker="osD^v<>Ph*"[marker % 10], label=tool)
-    axes.set(
-        xlabel=f"largest error of the spin at t = {T_END:g}",
-        ylabel=f"milliseconds per trajectory ({THREADS} threads)",
-        title=f"Slip model, a = 10, b = 3, δ = 0.03, μ = {mu:g}, n₀ ≈ 0.05",
-    )
-    axes.grid(True, which="major", alpha=0.3)
-    axes.legend(fontsize="small")
-    figure.savefig(output, dpi=150)
+def agreement(entry: Entry, counted: Entry) -> str:
+    """How many counts agree with those of `counted`."""
+    if entry.counts is None or counted.counts is None:
+        return "—"
+    same = entry.counts == counted.counts[np.searchsorted(counted.problem.b, entry.problem.b)]
+    return f"{np.count_nonzero(same)}/{len(same)}"
 
 
 def keep_stdout() -> None:
@@ -503,25 +554,24 @@ def keep_stdout() -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--mu", type=float, default=60.0)
-    parser.add_argument("--trajectories", type=int, default=64)
-    parser.add_argument("--repeats", type=int, default=7, help="timed runs of each quick entry")
-    parser.add_argument("--output", type=Path, help="draw speed against error into this file")
-    parser.add_argument("--quick", action="store_true", help="fewer settings of each tool")
+    parser.add_argument("--mu", type=float, nargs="+", default=[60.0, 200.0, 1000.0])
+    parser.add_argument("--bodies", type=int, default=1024, help=f"a multiple of {COMPARED}")
+    parser.add_argument("--repeats", type=int, default=5, help="timed runs of each quick entry")
     options = parser.parse_args()
     if find_spec("heyoka") is None or find_spec("scipy") is None:
         parser.error("the reference needs heyoka and scipy: pip install -e .[peers]")
+    if options.bodies < COMPARED or options.bodies % COMPARED:
+        parser.error(f"--bodies {options.bodies}; allowed: multiples of {COMPARED}")
 
     if hasattr(os, "sched_setaffinity"):  # XLA cannot be limited to some of the processors otherwise.
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
     numba.set_num_threads(THREADS)
     keep_stdout()
-    problem = Problem.of(options.mu, options.trajectories)
-    entries = prepare(problem, options.quick, reference_spins(problem))
-    measure(entries, options.repeats)
-    print_table(entries)
-    if options.output:
-        draw(entries, options.mu, options.output)
+    for mu in options.mu:
+        print(f"\nμ = {mu:g}, T = {T_END:g}, {options.bodies} bodies with b = 2 … 8")
+        entries = prepare(Problem(mu, np.linspace(2.0, 8.0, options.bodies)))
+        measure(entries, options.repeats)
+        print_table(entries)
 
 
 if __name__ == "__main__":

@@ -220,7 +220,7 @@ def reproduce(output: Path) -> None:
 def bench(output: Path) -> None:
     """Measure the speed and error of each method and model, and run cases that are hard to get right.
 
-    Takes about three minutes on two cores; writes bench.html, bench.png and bench.csv.
+    Takes about four minutes on two cores; writes bench.html, bench.png and bench.csv.
 
     Exit code 1 if a hard case does not hold, else 0: speed and error are reported, not judged.
     """

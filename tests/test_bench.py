@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,9 @@ from click.testing import CliRunner
 
 from sweep.bench import hard, precision, reference, report
 from sweep.bench.reference import read_counts, read_spins, spin_errors, whole_steps
+from sweep.bench.stopwatch import stopwatch
 from sweep.bench.timing import Effort, Part, Spread, Work, in_turn
+from sweep.bench.whole import PLACES, whole
 from sweep.cli import main
 from sweep.kernels import methods
 from sweep.kernels.status import DIVERGED, LIFT_OFF, TIME_LIMIT
@@ -23,8 +26,9 @@ from sweep.report.rows import Row, Section, states
 
 TIMES = (25.0, 50.0)
 TINY = Effort(
-    trajectories=4, repeats=1, tolerances=(1e-5, 1e-6, 1e-7, 1e-8), rungs=2, sizes=(16,), ends=(50,), frictions=(10,)
-)
+    trajectories=4, repeats=1, tolerances=(1e-5, 1e-6, 1e-7, 1e-8), rungs=2, sizes=(16,), ends=(50,), frictions=(10,),
+    whole_sizes=(16,), settled_sizes=(4,), reference_frictions=1,
+)  # fmt: skip
 BODIES = [{"mu": 60.0}, {"mu": 60.0, "b": 5.0, "c": 0.7}]
 
 
@@ -119,7 +123,7 @@ def test_a_tiny_run_writes_all_files_and_sections(tmp_path: Path, monkeypatch: p
 
     with (tmp_path / "bench.csv").open(encoding="utf-8", newline="") as stream:
         lines = list(csv.DictReader(stream))
-    assert {line["section"] for line in lines} == {"precision", "tolerance", "counts", "peak", "cost"}
+    assert {line["section"] for line in lines} == {"precision", "tolerance", "counts", "peak", "cost", "whole"}
     pairs = {(line["model"], line["method"]) for line in lines if line["section"] == "precision"}
     assert pairs == {("slip", "dopri5"), ("slip", "adams")} | {(m, "dopri5") for m in MODELS if m != "slip"}
     for line in lines:
@@ -135,11 +139,56 @@ def test_a_tiny_run_writes_all_files_and_sections(tmp_path: Path, monkeypatch: p
 
     page = (tmp_path / "bench.html").read_text(encoding="utf-8")
     assert "http" not in page.replace("http-equiv", "")
-    assert page.count("<h2>") == 7
+    assert page.count("<h2>") == 8
     assert "data:image/png;base64" in page
     assert (tmp_path / "bench.png").read_bytes().startswith(b"\x89PNG")
     text = "\n".join(said)
-    assert all(title in text for title in ("Work and precision", "Wrong counts", "FMA peak", "Cost", "Hard cases"))
+    assert all(
+        title in text for title in ("Work and precision", "Wrong counts", "FMA peak", "Cost", "Whole runs", "Hard")
+    )
+
+
+def test_a_call_inside_another_counts_for_its_own_share_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([0.0, 1.0, 11.0, 100.0])
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+
+    class Calls:
+        def outer(self) -> str:
+            return self.inner()
+
+        def inner(self) -> str:
+            return "result"
+
+    with stopwatch({(Calls, "outer"): "outside", (Calls, "inner"): "inside"}) as seconds:
+        assert Calls().outer() == "result"
+    assert seconds == {"outside": 90.0, "inside": 10.0}
+    assert next(clock, None) is None
+
+
+def test_nothing_is_left_in_the_code_that_was_timed() -> None:
+    before = [vars(owner)[name] for owner, name in PLACES]
+    with stopwatch(PLACES):
+        assert all(vars(owner)[name] not in before for owner, name in PLACES)
+    assert [vars(owner)[name] for owner, name in PLACES] == before
+
+
+@pytest.mark.campaign
+def test_whole_runs_are_timed_beside_their_kernels() -> None:
+    part = whole(TINY)
+    found = {(m.method, m.case, m.quantity): m.spread.median for m in part.measurements}
+    for method in methods.METHODS:
+        assert 0 < found[method, "T = 400", "spin_error"] < 1e-7
+        for case in ("T = 400", "to the end"):
+            assert found[method, case, "ratio"] > 1
+            assert 0 < found[method, case, "kernel_seconds"] < found[method, case, "seconds"]
+    assert found["adams", "T = 400", "start_up_seconds"] > 0
+    assert found["dopri5", "T = 400", "start_up_seconds"] == 0
+    shares = {quantity: value for (_, case, quantity), value in found.items() if case == "reference sweep"}
+    assert all(value > 0 for value in shares.values())
+    assert sum(shares.values()) == pytest.approx(2 * shares["whole_seconds"])
+    (_, beside), (_, shared) = part.section.tables
+    assert [len(line) for line in beside] == [9] * 5
+    assert [len(line) for line in shared] == [8] * 3
 
 
 @pytest.mark.campaign

@@ -20,6 +20,7 @@ from sweep.bench.peak import peak
 from sweep.bench.precision import work_precision
 from sweep.bench.timing import Effort, Measurement, Part
 from sweep.bench.tolerance import tolerance
+from sweep.bench.whole import whole
 from sweep.kernels import methods
 from sweep.models import MODELS
 from sweep.report import page
@@ -27,7 +28,7 @@ from sweep.report.cells import MEASURE, simulate, standard
 from sweep.report.rows import Row, Section
 from sweep.results.writing import replacing
 
-PARTS: tuple[Callable[[Effort], Part], ...] = (work_precision, tolerance, wrong_counts, peak, cost)
+PARTS: tuple[Callable[[Effort], Part], ...] = (work_precision, tolerance, wrong_counts, peak, cost, whole)
 
 COLUMNS = 3
 """Number of panels side by side."""

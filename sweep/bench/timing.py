@@ -38,7 +38,7 @@ def runs_at(method: str, mu: float) -> bool:
 
 @dataclass(frozen=True)
 class Effort:
-    """How much to measure; the defaults take about three minutes on two cores."""
+    """How much to measure; the defaults take about four minutes on two cores."""
 
     trajectories: int = 512
     repeats: int = 5
@@ -47,9 +47,15 @@ class Effort:
     tolerances: tuple[float, ...] = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
     rungs: int = 8
     """Number of steps to try, each shorter than the last by sqrt(2)."""
-    sizes: tuple[int, ...] = (16, 64, 256, 1024, 4096, 16384)
+    sizes: tuple[int, ...] = (16, 64, 256, 1024, 4096)
     ends: tuple[float, ...] = (50, 100, 200, 400, 800, 1600, 3200)
     frictions: tuple[float, ...] = (1, 10, 100, 1e3, 1e4, 1e5)
+    whole_sizes: tuple[int, ...] = (16, 256, 1024, 4096, 16384)
+    """Numbers of cells in whole runs, all squares."""
+    settled_sizes: tuple[int, ...] = (16, 256)
+    """The same in whole runs to the end."""
+    reference_frictions: int = 8
+    """Number of frictions of the reference sweep, of 132 cells each, in the run whose time is divided."""
 
 
 @dataclass(frozen=True)
