@@ -147,11 +147,14 @@ def threads() -> int:
 
 def on_all_threads(function: Callable[[Any], None], items: Sequence[Any]) -> None:
     """Call `function` for each of `items`; it has to spend its time in functions of `serial`."""
-    if items:
-        shares = [items[i :: 4 * threads()] for i in range(min(len(items), 4 * threads()))]
-        with ThreadPoolExecutor(threads()) as pool:
-            for future in [pool.submit(lambda share: [*map(function, share)], share) for share in shares]:
-                future.result()
+    shares = [items[i :: 4 * threads()] for i in range(min(len(items), 4 * threads()))]
+    list(_pool(threads()).map(lambda share: [*map(function, share)], shares))
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    # It is kept, because threads take a millisecond to start.
+    return ThreadPoolExecutor(threads)
 
 
 def fingerprint(*modules: str) -> str:

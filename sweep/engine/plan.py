@@ -105,19 +105,18 @@ def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
     model, integrator = MODELS[config.model], config.integrator
     columns = grid.columns()
     if integrator.method == AUTO:
-        chosen = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
+        chosen, steps, rules = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:
         chosen = np.full(grid.size, list(METHODS).index(integrator.method))
+        if integrator.step == "auto":
+            steps, rules = methods.automatic_step(integrator.method, model, columns, integrator.tolerance)
+        else:
+            steps, rules = np.full(grid.size, integrator.step), np.full(grid.size, FIXED)
     choices = []
     for i in np.unique(chosen):
         method, cells = list(METHODS)[i], np.flatnonzero(chosen == i)
-        kernel = kernel_of(method, config)
         theirs = {name: values[cells] for name, values in columns.items()}
-        if integrator.step == "auto":
-            step, rule = methods.automatic_step(method, model, theirs, integrator.tolerance)
-        else:
-            step, rule = np.full(len(cells), integrator.step), np.full(len(cells), FIXED)
-        choices.append(Choice(method, cells, kernel, theirs, step, rule))
+        choices.append(Choice(method, cells, kernel_of(method, config), theirs, steps[cells], rules[cells]))
     return tuple(choices)
 
 

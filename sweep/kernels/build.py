@@ -27,7 +27,7 @@ from sweep.jit import compiling, threads
 from sweep.kernels.failure import compile_approach, compiled_approach
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import make_kernel
-from sweep.kernels.stability import compile_theory, compiled_fastest, compiled_search, has_fast_slip
+from sweep.kernels.stability import compile_theory, compiled_modes, compiled_search, has_fast_slip
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
 
@@ -60,7 +60,7 @@ def _missing(kernel: Kernel) -> Iterator[Piece]:
     if compiled_approach(MODELS[model]).is_missing():
         yield "approach", model
     if has_fast_slip(MODELS[model]) and any(
-        function(MODELS[model]).is_missing() for function in (compiled_search, compiled_fastest)
+        function(MODELS[model]).is_missing() for function in (compiled_search, compiled_modes)
     ):
         yield "theory", model
 

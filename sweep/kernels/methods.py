@@ -27,16 +27,23 @@ def allowed(model: Model) -> tuple[str, ...]:
     return tuple(name for name, method in METHODS.items() if method.runs(model))
 
 
-def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> Array:
-    """Index in `METHODS` of the method that reaches `t_end` within `tolerance` in the least time, shape (cells,)."""
-    costs = []
+def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> tuple[Array, Array, Array]:
+    """The method that reaches `t_end` within `tolerance` in the least time, with its automatic step.
+
+    Returns the index in `METHODS`, and step and rule as `automatic_step` gives them, each of shape (cells,).
+    """
+    steps, rules, costs = [], [], []
     for method in METHODS.values():
         if method.runs(model):
-            step, _ = automatic_step(method.name, model, columns, tolerance)
+            step, rule = automatic_step(method.name, model, columns, tolerance)
             costs.append(method.step_cost * (t_end / step + method.start_up_cost))
         else:
+            step = rule = np.zeros_like(columns["a"])
             costs.append(np.full_like(columns["a"], np.inf))
-    return np.asarray(np.argmin(costs, axis=0))
+        steps.append(step)
+        rules.append(rule)
+    chosen, cells = np.argmin(costs, axis=0), np.arange(len(columns["a"]))
+    return chosen, np.stack(steps)[chosen, cells], np.stack(rules)[chosen, cells]
 
 
 def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:

@@ -29,7 +29,7 @@ import numpy as np
 from sweep.jit import Cached, called, compiled, on_all_threads, serial
 from sweep.kernels.codegen import compile_inline, tuple_of
 from sweep.models import analytic, linear, stability
-from sweep.models.model import Array, Columns, Model, stack
+from sweep.models.model import Array, Columns, Model, stack, take
 
 # Samples of the coefficients, at Chebyshev points; the last two terms of their Chebyshev series must be below this
 # share of the largest.
@@ -66,7 +66,12 @@ def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
     limits = np.minimum(np.stack(limits, axis=-1), stability.SPIN_LIMIT)
     ranges = np.empty((len(limits), 6))
     search, series = compiled_search(model), _series()
-    _by_parts(lambda rows, limits, ranges: search(rows, limits, *series, ranges), _rows(model, columns), limits, ranges)
+    _by_parts(
+        lambda rows, limits, ranges: search(rows, limits, *series, ranges),
+        _rows(model.constants.of(columns)),
+        limits,
+        ranges,
+    )
     covered, doubtful = limits.min(axis=1), np.flatnonzero(np.isnan(ranges[:, 0]))
     if len(doubtful):
         ranges[doubtful] = stability.stable_ranges(model, _take(columns, doubtful)).T
@@ -78,12 +83,34 @@ def fastest_motion(model: Model, columns: Columns) -> Array:
     """As `sweep.models.linear.fastest_motion`."""
     if not has_fast_slip(model) or _uncompiled.get():
         return linear.fastest_motion(model, columns)
-    motion = np.empty(len(columns["a"]))
-    _by_parts(compiled_fastest(model), _rows(model, columns), linear.fastest_spin(model, columns), motion)
-    doubtful = np.flatnonzero(np.isnan(motion))
+    reach, rows = linear.fastest_spin(model, columns), _rows(model.constants.of(columns))
+    pairs = np.concatenate([_modes(model, rows, spin) for spin in (reach, -reach)], axis=1)
+    real, square = pairs[:, ::2], pairs[:, 1::2]
+    motion = np.sqrt(np.where(-real <= np.sqrt(square - real**2), square, 0)).max(axis=1)
+    doubtful = np.flatnonzero(np.isnan(pairs).any(axis=1))
     if len(doubtful):
         motion[doubtful] = linear.fastest_motion(model, _take(columns, doubtful))
-    return motion
+    return np.asarray(motion)
+
+
+def growth_rates(model: Model, constants: Any, spin: Array) -> Array:
+    """Re λ of the two rocking modes of a model with slip, the slower first, in sqrt(g/c), shape (2, cells)."""
+    pairs = _modes(model, _rows(constants), spin)
+    real, square = pairs[:, ::2], pairs[:, 1::2]
+    rates = np.take_along_axis(real, np.argsort(square - real**2, axis=1), axis=1).T
+    doubtful = np.flatnonzero(np.isnan(rates[0]))
+    if len(doubtful):
+        values = np.linalg.eigvals(linear.jacobian(model, take(constants, doubtful), spin[doubtful]))
+        order = np.argsort(-values.imag, axis=1)[:, 1::-1]
+        rates[:, doubtful] = np.take_along_axis(values.real, order, axis=1).T
+    return rates
+
+
+def _modes(model: Model, rows: Array, spin: Array) -> Array:
+    """Re λ and |λ|² of both modes, in any order, shape (cells, 4); NaN where they remain in doubt."""
+    pairs = np.empty((len(spin), 4))
+    _by_parts(compiled_modes(model), rows, np.ascontiguousarray(spin), pairs)
+    return pairs
 
 
 _uncompiled: ContextVar[bool] = ContextVar("uncompiled", default=False)
@@ -103,7 +130,7 @@ def compile_theory(model: Model) -> None:
     """Compile the functions of this module for a model, or load them from disk."""
     nothing = np.empty((0, len(model.constants._fields)))
     compiled_search(model)(nothing, np.empty((0, 2)), *_series(), np.empty((0, 6)))
-    compiled_fastest(model)(nothing, np.empty(0), np.empty(0))
+    compiled_modes(model)(nothing, np.empty(0), np.empty((0, 4)))
 
 
 def has_fast_slip(model: Model) -> bool:
@@ -111,9 +138,9 @@ def has_fast_slip(model: Model) -> bool:
     return len(model.states) == 7 and model.states[5:] == ("v1", "v2")
 
 
-def _rows(model: Model, columns: Columns) -> Array:
-    """The constants of the model, shape (cells, constants)."""
-    return np.ascontiguousarray(stack(tuple(model.constants.of(columns))).T)
+def _rows(constants: Any) -> Array:
+    """Constants of a model, shape (cells, constants)."""
+    return np.ascontiguousarray(stack(tuple(constants)).T)
 
 
 def _take(columns: Columns, cells: Array) -> Columns:
@@ -397,39 +424,45 @@ def compiled_search(model: Model) -> Cached:
     return serial(search, f"stability-{model.name}")
 
 
+@called
+def _pairs(c: Any, pairs: Any) -> None:
+    """Write Re λ and |λ|² of both pairs of complex roots of a quartic to `pairs`.
+
+    NaN if there are real roots.
+    One pair by Newton's method; the other from the sum and the product of the roots.
+    """
+    pairs[:] = np.nan
+    if c[2] * c[2] < 4.0 * c[0] or c[2] <= 0.0:
+        return
+    root = 1j * np.sqrt(0.5 * (c[2] + np.sqrt(c[2] * c[2] - 4.0 * c[0])))
+    for _ in range(20):
+        value = (((root + c[3]) * root + c[2]) * root + c[1]) * root + c[0]
+        change = value / (((4.0 * root + 3.0 * c[3]) * root + 2.0 * c[2]) * root + c[1])
+        root = root - change
+        if abs(change) <= 1e-12 * abs(root):
+            square = root.real * root.real + root.imag * root.imag
+            real, other = -0.5 * c[3] - root.real, c[0] / square
+            if other > real * real and root.imag != 0.0:
+                pairs[0], pairs[1], pairs[2], pairs[3] = root.real, square, real, other
+            return
+
+
 @cache
-def compiled_fastest(model: Model) -> Cached:
-    """Compiled (rows, reach, motion) -> None: the fastest motion of each cell, NaN where it remains in doubt."""
+def compiled_modes(model: Model) -> Cached:
+    """Compiled (rows, spin, pairs) -> None: the roots of the rocking of each cell, as `_pairs` writes them.
+
+    NaN for a cell that remains in doubt.
+    """
     jacobian = _make_jacobian(model)
 
-    @compiled
-    def moving(half_trace: float, square: float) -> float:
-        """|λ| of a pair with this sum of half its λ and this |λ|², if it moves more than it decays; else 0."""
-        return np.sqrt(square) if -half_trace <= np.sqrt(max(square - half_trace * half_trace, 0.0)) else 0.0
-
-    @compiled
-    def largest(c: Any) -> Any:
-        """|λ| of the faster pair that moves; NaN if the polynomial has real roots."""
-        if c[2] * c[2] < 4.0 * c[0] or c[2] <= 0.0:
-            return np.nan
-        root = 1j * np.sqrt(0.5 * (c[2] + np.sqrt(c[2] * c[2] - 4.0 * c[0])))
-        for _ in range(20):
-            value = (((root + c[3]) * root + c[2]) * root + c[1]) * root + c[0]
-            change = value / (((4.0 * root + 3.0 * c[3]) * root + 2.0 * c[2]) * root + c[1])
-            root = root - change
-            if abs(change) <= 1e-12 * abs(root):
-                square = root.real * root.real + root.imag * root.imag
-                return max(moving(root.real, square), moving(-0.5 * c[3] - root.real, c[0] / square))
-        return np.nan
-
-    def fastest(rows: Any, reach: Any, motion: Any) -> None:
+    def modes(rows: Any, spin: Any, pairs: Any) -> None:
         J, X, c = np.empty((6, 6)), np.zeros((2, 4)), np.empty(4)
         for cell in range(len(rows)):
-            motion[cell] = 0.0
-            for sign in (1.0, -1.0):
-                X[:] = 0.0
-                jacobian(rows, cell, sign * reach[cell], J)
-                sound = _quartic(J, X, c)
-                motion[cell] = max(motion[cell], largest(c)) if sound else np.nan
+            X[:] = 0.0
+            jacobian(rows, cell, spin[cell], J)
+            sound = _quartic(J, X, c)
+            _pairs(c, pairs[cell])
+            if not sound:
+                pairs[cell] = np.nan
 
-    return serial(fastest, f"fastest-motion-{model.name}")
+    return serial(modes, f"modes-{model.name}")

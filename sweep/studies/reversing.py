@@ -135,7 +135,7 @@ class _Trajectories:
     def cells(self) -> dict[str, Array]:
         """Indices of the simulations that each method runs."""
         model, integrator = MODELS[self.config.model], self.config.integrator
-        chosen = methods.cheapest(model, self.columns, self.tolerance, integrator.t_end)
+        chosen, *_ = methods.cheapest(model, self.columns, self.tolerance, integrator.t_end)
         if integrator.method != AUTO:
             named = self.exact | (integrator.step != "auto")
             chosen = np.where(named, list(METHODS).index(integrator.method), chosen)

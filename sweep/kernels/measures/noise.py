@@ -21,6 +21,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
+from sweep.kernels.stability import growth_rates
 from sweep.models import friction, linear, slip
 from sweep.models.coefficients import coefficients, normal_coordinates
 from sweep.models.model import MODES, Array, Columns, stack
@@ -140,17 +141,10 @@ def growth_coefficients(columns: Columns) -> Array:
     reach = np.exp2(np.ceil(8 * np.log2(np.maximum(linear.fastest_spin(slip.MODEL, columns), 1e-6))) / 8)
     bodies, which = np.unique(stack((*(columns[name] for name in _BODY), reach)), axis=1, return_inverse=True)
     constants = slip.Constants.of(dict(zip(_BODY, bodies, strict=False)))
-    rates = np.stack([_growth(constants, node * bodies[-1]) for node in _NODES], axis=1)
+    rates = np.stack([growth_rates(slip.MODEL, constants, node * bodies[-1]) for node in _NODES], axis=1)
     # Not a matrix product: how BLAS rounds a column depends on how many other columns there are.
     fit = [sum(w * rates[:, j] for j, w in enumerate(row)) / bodies[-1] ** i for i, row in enumerate(_FIT)]
     return np.stack(fit, axis=1)[:, :, which.reshape(-1)]
-
-
-def _growth(constants: slip.Constants, spin: Array) -> Array:
-    """Re λ of the two rocking modes, the one of lower frequency first, shape (2, bodies)."""
-    values = np.linalg.eigvals(linear.jacobian(slip.MODEL, constants, spin))
-    order = np.argsort(-values.imag, axis=1)[:, 1::-1]
-    return np.asarray(np.take_along_axis(values.real, order, axis=1).T)
 
 
 def _shares(columns: Columns) -> Array:
