@@ -27,7 +27,8 @@ from sweep.jit import compiling, threads
 from sweep.kernels.failure import compile_approach, compiled_approach
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import make_kernel
-from sweep.kernels.stability import compile_theory, compiled_modes, compiled_search, has_fast_slip
+from sweep.kernels.quartic import compiled_modes, has_fast_slip
+from sweep.kernels.stability import compile_theory, compiled_search
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
 

@@ -100,11 +100,8 @@ class Kernel:
 
         return steady
 
-    def _compile_with(self, run_block: Any, variant: str = "") -> None:
-        """Set up `advance` around `run_block`, compiled (group) -> None.
-
-        `variant` tells apart, in the cache, kernels of one method, model and measurements.
-        """
+    def _compile_with(self, run_block: Any) -> None:
+        """Set up `advance` around `run_block`, compiled (group) -> None."""
         settles = [f for each in self.measurements if (f := each.make_may_settle(self.layout))]
         looks = [f for each in self.measurements if (f := each.make_look(self.layout))]
         look = Look(
@@ -114,7 +111,7 @@ class Kernel:
         )
         advance = make_advance(run_block, make_look(self.model, self.constants, self.layout, look), self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
-        name = f"{self.model.name}-{self.method}{variant}-{measured}"
+        name = f"{self.model.name}-{self.method}-{measured}"
         self._advance = parallel(advance, name, getfile(self.model.rhs))
 
     def row(self, name: str) -> int:

@@ -27,10 +27,10 @@ from sweep.models.model import Array, Columns, Model
 class RungeKuttaKernel(Kernel):
     """The `Kernel` of a tableau, for any model."""
 
-    def __init__(self, model: Model, tableau: Tableau, measurements: Sequence[Measurement], block: int = BLOCK) -> None:
+    def __init__(self, model: Model, tableau: Tableau, measurements: Sequence[Measurement]) -> None:
         self.method, self.tableau = tableau.name, tableau
         self._lay_out(model, measurements)
-        self._compile_with(self._make_run_block(block), f"-{block}")
+        self._compile_with(self._make_run_block())
 
     def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
         """As `Kernel.images`; the steps taken are no longer than `step` and divide `t_end` evenly."""
@@ -38,19 +38,15 @@ class RungeKuttaKernel(Kernel):
         stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
         return self._start(columns, t_end / goal, goal, stable_step, stable)
 
-    def stepwise(self) -> RungeKuttaKernel:
-        """The same kernel with blocks of one step, and so with a look after every step."""
-        return RungeKuttaKernel(self.model, self.tableau, self.measurements, block=1)
-
-    def _make_run_block(self, block: int) -> Any:
-        """Compiled (group) -> None: takes `block` steps of all lanes, and calls the measurements after each."""
+    def _make_run_block(self) -> Any:
+        """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and calls the measurements after each."""
         model, layout = self.model, self.layout
         load_states = make_load(model.states, layout)
         load_constants = make_load(self.constants, layout, model.constants)
         store_states = make_store(model.states, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), self._make_watch()
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
-        lanes, wide = LANES, full_width()
+        block, lanes, wide = BLOCK, LANES, full_width()
 
         @exactly_compiled
         def run_block(group: Any) -> None:
