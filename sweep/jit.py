@@ -157,6 +157,10 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads)
 
 
+# A process that was forked has none of the threads of its parent, and would wait for them for ever.
+os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def fingerprint(*modules: str) -> str:
     """Hash of all sources from which a kernel can be built, and of the versions of what compiles them."""
     from importlib import metadata  # which takes as long to import as all else here
