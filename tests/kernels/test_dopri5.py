@@ -294,7 +294,7 @@ def test_automatic_step_keeps_the_spin_to_2e_8(parameters: dict[str, float]) -> 
 
 def test_the_loop_over_lanes_is_vector_instructions() -> None:
     """Twelve square roots and divisions a step, all packed."""
-    block = DOPRI._make_run_block(BLOCK)
+    block = DOPRI._make_run_block()
     block(np.zeros(len(DOPRI.layout.names) * LANES))
     assembly = next(iter(block.inspect_asm().values()))
     assert assembly.count("divpd") >= 12
