@@ -133,12 +133,13 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
             running = status == RUNNING
 
             energy_ratio = 2.0 * rattle / inertia
-            bounded, settled = will_settle(group, lane, spin, energy_ratio)
+            bounded, settled, followed = will_settle(group, lane, spin, energy_ratio)
             ends = SETTLED if settled & stop_when_settled else RUNNING
             if pauses:
                 small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])
-                # A rattle that can only decay needs no leap: it settles.
-                ends = QUIET if small & (not ((bounded | settled) & stop_when_settled)) else ends
+                # A rattle that can only decay needs no leap: it settles.  And no leap begins while a measurement has yet
+                # to follow the spin: a reversal just before it would go uncounted.
+                ends = QUIET if small & followed & (not ((bounded | settled) & stop_when_settled)) else ends
             ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends != SETTLED) else ends
             status = ends if running else status
             failed = (status == LIFT_OFF) | (status == PARADOX)
@@ -158,10 +159,10 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
 
 
 def _make_will_settle(layout: Layout, may_settle: Any) -> Any:
-    """Inline (group, lane, spin, 2 E / I3) -> (bounded, settled).
+    """Inline (group, lane, spin, 2 E / I3) -> (bounded, settled, followed).
 
     `bounded` says whether upright spin is stable at this spin; `settled`, whether in addition the spin can reverse no
-    more, and the measurements agree.
+    more, and the measurements agree; `followed`, whether these do.
 
     By the averaged equations (ndotab, abdot), a mode of energy I3 e/2 moves the spin on a circle about the critical
     spin n_c of the mode: (n - n_c)² + e is constant.  While the mode decays the spin changes by sqrt(d² + e) - d with
@@ -191,6 +192,7 @@ def _make_will_settle(layout: Layout, may_settle: Any) -> Any:
         inside = inside | ((lowest > BEYOND * group[FROM + lane]) & (highest < BEYOND * group[TO + lane]))
         at_rest = (spin == 0.0) & (e == 0.0)
         signed = (lowest > 0.0) | (highest < 0.0) | at_rest
-        return bounded, inside & signed & may_settle(group, lane, spin, at_rest)
+        followed = may_settle(group, lane, spin, at_rest)
+        return bounded, inside & signed & followed, followed
 
     return will_settle

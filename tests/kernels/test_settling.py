@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import wide_bodies
 
 import sweep
 from sweep.bench.reference import COUNTS
+from sweep.kernels.status import SETTLED
+from sweep.models import MODELS, stability
 
 
 @pytest.mark.parametrize("method", ["dopri5", "adams"])
@@ -24,3 +27,25 @@ def test_nearly_round_bodies_do_not_settle_ahead_of_a_reversal(method: str, tmp_
     ours = sweep.run(tmp_path / "c.yaml", method=method)
     np.testing.assert_array_equal(ours["reversals"], 2)
     np.testing.assert_allclose(ours["t_last_reversal"], table["t_last_reversal"][rows], rtol=1e-3)
+
+
+def test_what_has_settled_beyond_n_c1_reverses_no_more(tmp_path: Path) -> None:
+    """Far beyond the paper's bodies, from 1 to 3.5 n_c1: the counts are those of runs that go on."""
+    bodies, random = wide_bodies(400), np.random.default_rng(2)
+    below, above = stability.stable_ranges(MODELS["slip"], bodies)[:2]
+    spin = np.where(random.random(400) < 0.5, below, above) * random.uniform(1, 3.5, 400)
+    cells = {name: bodies[name] for name in ("a", "b", "c", "delta", "mu")} | {"n0": spin}
+    kept = np.isfinite(spin) & (np.abs(spin) < 0.5) & (np.abs(spin) > 1e-3) & (bodies["mu"] > 1)
+    table = np.column_stack(list(cells.values()))[kept]
+    np.savetxt(tmp_path / "cells.csv", table, delimiter=",", header=",".join(cells), comments="", fmt="%.17g")
+    (tmp_path / "c.yaml").write_text(
+        "cases: cells.csv\nstart: {x0: 0.003, y0: 0.003}\n"
+        "integrator: {method: adams, tolerance: 1.0e-7, t_end: 10000}\n"
+        "max_failed_fraction: 1\n"
+    )
+    ended, gone_on = (sweep.run(tmp_path / "c.yaml", stop_when_settled=stops) for stops in (True, False))
+    settled = ended.status.values == SETTLED
+    spins = ended.spin_final.values
+    beyond = settled & (np.abs(spins) > np.abs(np.where(spins > 0, ended.n_c1_plus_linear, ended.n_c1_minus_linear)))
+    assert beyond.sum() > 20
+    np.testing.assert_array_equal(ended.reversals.values[settled], gone_on.reversals.values[settled])
