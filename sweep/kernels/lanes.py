@@ -137,8 +137,8 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
             ends = SETTLED if settled & stop_when_settled else RUNNING
             if pauses:
                 small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])
-                # A rattle that can only decay needs no leap: it settles.  And no leap begins while a measurement has yet
-                # to follow the spin: a reversal just before it would go uncounted.
+                # A rattle that can only decay needs no leap: it settles.  And no leap begins while a measurement has
+                # yet to follow the spin: a reversal just before it would go uncounted.
                 ends = QUIET if small & followed & (not ((bounded | settled) & stop_when_settled)) else ends
             ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends != SETTLED) else ends
             status = ends if running else status
