@@ -30,9 +30,6 @@ from sweep.results.store import StoreError
 AHEAD = 3
 """Tiles per worker that are sent out before the first comes back."""
 
-_SAMPLE = 4096
-"""Cells by which it is judged which kernels a run needs."""
-
 PATIENCE = "10s"
 """How long to wait for a scheduler to answer."""
 

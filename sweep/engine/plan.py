@@ -101,7 +101,7 @@ def kernel_of(method: str, config: Config) -> Kernel:
 
 
 def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
-    """Give each cell of `grid` its method and step; nothing is compiled for it."""
+    """Give each cell of `grid` its method and step; no kernel is compiled for it."""
     model, integrator = MODELS[config.model], config.integrator
     columns = grid.columns()
     if integrator.method == AUTO:

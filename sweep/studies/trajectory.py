@@ -31,6 +31,7 @@ from sweep.models.model import Columns, Model
 from sweep.parameters import PARAMETERS
 from sweep.results import dataset
 from sweep.results.provenance import provenance
+from sweep.studies.rounds import Simulations
 from sweep.studies.stepwise import stepwise
 
 SAMPLES_A_RADIAN = 3
@@ -80,7 +81,7 @@ def trajectory(
     """Follow the cells of `config` picked by their parameters, such as ``mu=60, n0=[0.02, 0.05]``.
 
     The method is always dopri5, whatever the configuration names.  A sample is a state between two steps, and adams
-    can stop only after every eighth step, a rattle period apart at times, and leaps over stretches of small rattle.
+    can go on only from the end of a block of steps, and leaps over stretches of small rattle.
 
     Parameters
     ----------
@@ -108,8 +109,7 @@ def trajectory(
     t_end, began = chosen.integrator.t_end, time.perf_counter()
 
     def report() -> None:
-        table = part.kernel.table(part.images)
-        covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
+        covered = Simulations(part.kernel, part.images).advanced.sum() * t_end
         seconds = time.perf_counter() - began
         reporter.chunk(Progress(len(part.images) * t_end, float(covered), 0, 0, seconds))
 
