@@ -206,7 +206,7 @@ class Cached:
     """
 
     def __init__(self, dispatcher: Any, specialisation: str, sources: str) -> None:
-        self._dispatcher, self._cache = dispatcher, None
+        self._dispatcher, self._cache, self._found = dispatcher, None, False
         with suppress(RuntimeError):  # Numba finds no folder to write to: each process compiles for itself
             self._cache = dispatcher._cache = _disk_cache()(dispatcher.py_func, specialisation, sources)
 
@@ -229,7 +229,9 @@ class Cached:
 
     def is_compiled(self) -> bool:
         """Whether the first call will find machine code, in memory or on disk."""
-        return bool(self._dispatcher.signatures) or (self._cache is not None and self._cache.holds())
+        # To look it up on disk takes a millisecond.
+        self._found |= bool(self._dispatcher.signatures) or (self._cache is not None and self._cache.holds())
+        return self._found
 
     def is_missing(self) -> bool:
         """Whether another process could compile it into the cache on disk, which lacks it."""

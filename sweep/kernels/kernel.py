@@ -204,6 +204,8 @@ class Kernel:
 
     def compile(self) -> None:
         """Compile `advance`, or load it from disk, so that no timing of a run includes that."""
+        if self._advance.signatures:
+            return  # a parallel call wakes all threads, which takes some milliseconds
         self.advance(np.empty((0, len(self.layout.names))), np.empty(0, dtype=np.int64), 0, False)
 
     def compiled_functions(self) -> tuple[Cached, tuple[Cached, ...]]:

@@ -50,9 +50,9 @@ class Method:
     """One line for the documentation."""
     kernel: Callable[[Model, Sequence[Measurement], float], Kernel]
     """(model, measurements, tolerance) -> the kernel, not compiled yet."""
-    accurate_step: Callable[[Model, Columns, float], Array]
-    """(model, columns, tolerance) -> the step that keeps the error in spin at t = 400 within the tolerance,
-    shape (cells,), in sqrt(c/g)."""
+    accurate_step: Callable[[Model, Columns, Array, float], Array]
+    """(model, columns, motion, tolerance) -> the step that keeps the error in spin at t = 400 within the tolerance,
+    shape (cells,), in sqrt(c/g), where `motion` is the `fastest_motion`."""
     stable_step: Callable[[Model, Columns], Array] | None = None
     """(model, columns) -> the longest stable step, shape (cells,), in sqrt(c/g); None if no limit is near."""
     step_words: str = ""

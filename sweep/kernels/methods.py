@@ -10,6 +10,7 @@ from sweep.kernels import measures, runge_kutta
 from sweep.kernels.adams import method as adams
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method
+from sweep.kernels.stability import fastest_motion
 from sweep.models.model import Array, Columns, Model
 from sweep.models.rocking import slower_period
 
@@ -32,10 +33,11 @@ def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> 
 
     Returns the index in `METHODS`, and step and rule as `automatic_step` gives them, each of shape (cells,).
     """
+    motion = fastest_motion(model, columns)
     steps, rules, costs = [], [], []
     for method in METHODS.values():
         if method.runs(model):
-            step, rule = automatic_step(method.name, model, columns, tolerance)
+            step, rule = _step(method, model, columns, motion, tolerance)
             costs.append(method.step_cost * (t_end / step + method.start_up_cost))
         else:
             step = rule = np.zeros_like(columns["a"])
@@ -53,12 +55,15 @@ def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: fl
 
 def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:
     """Step of each trajectory, in sqrt(c/g), and the rule that determined it; both of shape (cells,)."""
-    record, longest = METHODS[method], longest_step(columns)
+    return _step(METHODS[method], model, columns, fastest_motion(model, columns), tolerance)
+
+
+def _step(method: Method, model: Model, columns: Columns, motion: Array, tolerance: float) -> tuple[Array, Array]:
     with np.errstate(divide="ignore"):
-        step = np.minimum(record.accurate_step(model, columns, tolerance), longest)
-        if record.stable_step is None:
+        step = np.minimum(method.accurate_step(model, columns, motion, tolerance), longest_step(columns))
+        if method.stable_step is None:
             return step, np.full(len(step), ACCURACY)
-        stable = record.stable_step(model, columns)
+        stable = method.stable_step(model, columns)
     return np.minimum(step, stable), np.where(stable < step, STABILITY, ACCURACY)
 
 

@@ -18,7 +18,6 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.method import TOLERANCE, Method
-from sweep.kernels.stability import fastest_motion
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5, Tableau
 from sweep.models.model import Array, Columns, Model
@@ -117,8 +116,7 @@ _STABILITY_SHARE = 0.9
 _LAYER_ERROR, _UNRESOLVED = 0.02, 3.0
 
 
-def _accurate_step(model: Model, columns: Columns, tolerance: float) -> Array:
-    motion = fastest_motion(model, columns)
+def _accurate_step(model: Model, columns: Columns, motion: Array, tolerance: float) -> Array:
     step = model.radians_a_step * (tolerance / TOLERANCE) ** (1 / DOPRI5.order) / motion
     decay = model.fastest_decay(columns)
     if not decay.any():

@@ -14,12 +14,12 @@ from support.kernels import finish, images, kernel, run, spin, threads
 
 import sweep
 from sweep import ConfigError
-from sweep.kernels.adams.method import accurate_step
 from sweep.kernels.adams.step import BDF, BDF_GAMMA, CORRECTOR_NODES, EXTRAPOLATE, PREDICTOR_NODES
 from sweep.kernels.adams.weights import fitted_weights, plain_weights
 from sweep.kernels.layout import LANES
+from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
-from sweep.models import slip, slip_split
+from sweep.models import MODELS, slip, slip_split
 from sweep.models.model import take
 from sweep.models.rocking import frequencies
 
@@ -126,13 +126,13 @@ def test_spin_against_dopri5(parameters: dict[str, float], bound: float) -> None
      {"b": 8.0, "mu": 200.0}],
 )  # fmt: skip
 def test_automatic_step_meets_the_tolerance(parameters: dict[str, float], tolerance: float) -> None:
-    step = accurate_step(columns(**parameters), tolerance)
+    step, _ = automatic_step("adams", MODELS["slip"], columns(**parameters), tolerance)
     fine = spin(ADAMS, run(ADAMS, step / 3, 400.0, **parameters))[0]
     assert abs(spin(ADAMS, run(ADAMS, step, 400.0, **parameters))[0] - fine) < tolerance
 
 
 def test_the_step_does_not_depend_on_friction() -> None:
-    step = accurate_step(columns(mu=[1e2, 1e3, 1e4, 1e5]), 1e-6)
+    step, _ = automatic_step("adams", MODELS["slip"], columns(mu=[1e2, 1e3, 1e4, 1e5]), 1e-6)
     assert step == pytest.approx(step[0], rel=1e-3)
     # Between rolling and 1e5 as little is left as 1/μ says.
     rolling = kernel(model="noslip")

@@ -13,7 +13,6 @@ from support.kernels import images, kernel, run
 import sweep
 from sweep import ConfigError
 from sweep.kernels.adams import stretches
-from sweep.kernels.adams.method import accurate_step
 from sweep.kernels.measures import noise
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import QUIET, RUNNING
@@ -31,7 +30,7 @@ FIRM = {60.0: (3, 2379.9), 130.0: (6, 7412.95)}
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-6])
 def test_late_reversals_come_at_the_reference_times(tolerance: float) -> None:
     cases = LAST | FIRM
-    step = accurate_step(columns(mu=list(cases)), tolerance)
+    step, _ = automatic_step("adams", MODELS["slip"], columns(mu=list(cases)), tolerance)
     table = run(kernel("adams", tolerance=tolerance), step, 45_000.0, settle=True, mu=list(cases))
     assert [(n, pytest.approx(t, rel=1e-3)) for n, t in cases.values()] == list(
         zip(table[:, ADAMS.row("reversals")], table[:, ADAMS.row("last_reversal")], strict=True)

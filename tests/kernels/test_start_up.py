@@ -8,14 +8,14 @@ from support import columns
 from support.kernels import finish, images_of, kernel, spin, threads
 
 from sweep.kernels.adams import start_up
-from sweep.kernels.adams.method import accurate_step
 from sweep.kernels.adams.step import HISTORY, NAMES
 from sweep.kernels.codegen import compile_lanes
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES
+from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import LIFT_OFF, RUNNING
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import slip, slip_split
+from sweep.models import MODELS, slip, slip_split
 from sweep.models.model import Columns, take
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
@@ -108,7 +108,7 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
     body = columns(
         mu=10 ** rng.uniform(0, 3, n), n0=rng.uniform(-3, 3, n), x0=rng.uniform(-5, 5, n), y0=rng.uniform(-1, 1, n)
     )
-    step = accurate_step(body, 1e-8)
+    step, _ = automatic_step("adams", MODELS["slip"], body, 1e-8)
     begin = begun(body, step, t_end=3.0)
     status, times = begin[:, ADAMS.row("status")], ADAMS.times(begin, 3.0)
     ended = status != RUNNING

@@ -6,7 +6,6 @@ import numpy as np
 
 from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.method import Method
-from sweep.kernels.stability import fastest_motion
 from sweep.models import friction, linear, slip
 from sweep.models.ellipsoid import inertia
 from sweep.models.model import Array, Columns
@@ -24,8 +23,13 @@ from sweep.models.model import Array, Columns
 _LONGEST_PHASE = 0.4
 
 
-def accurate_step(columns: Columns, tolerance: float) -> Array:
-    """Step, in sqrt(c/g), that keeps the error in spin at t = 400 within `tolerance`, shape (cells,)."""
+def accurate_step(columns: Columns, motion: Array, tolerance: float) -> Array:
+    """Step, in sqrt(c/g), that keeps the error in spin at t = 400 within `tolerance`, shape (cells,).
+
+    Parameters
+    ----------
+    motion : the `fastest_motion`, in sqrt(g/c), shape (cells,)
+    """
     I1, I2, _ = inertia(columns)
     root = np.sqrt(columns["c"])
     rise = np.maximum(slip.strongest_grip(columns) / (1 + columns["c"] ** 2 / np.minimum(I1, I2)) - 1, 1e-6)
@@ -34,7 +38,7 @@ def accurate_step(columns: Columns, tolerance: float) -> Array:
     adams = 7.6 * rise**1.54 * (1 + rise) ** 1.6 * reach**0.45
     bdf = 0.074 * rise**0.81 * reach**1.01 * np.minimum(1, 30 / np.maximum(resistance, 30)) ** 2
     phase = np.minimum((tolerance / adams) ** (1 / 7), (tolerance / bdf) ** (1 / 4))
-    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / fastest_motion(slip.MODEL, columns))
+    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / motion)
 
 
 METHOD = Method(
@@ -42,7 +46,7 @@ METHOD = Method(
     summary="Adams formulas of orders eight and nine for the slow variables and BDF5 for the slip, for the slip model: "
     "friction does not limit its step",
     kernel=lambda model, measurements, tolerance: AdamsKernel(measurements, tolerance),  # noqa: ARG005
-    accurate_step=lambda model, columns, tolerance: accurate_step(columns, tolerance),  # noqa: ARG005
+    accurate_step=lambda model, columns, motion, tolerance: accurate_step(columns, motion, tolerance),  # noqa: ARG005
     models=frozenset({slip.MODEL.name}),
     # On one thread start-up takes 4.6 to 6.4 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
