@@ -29,6 +29,17 @@ whether even this one missed the tolerance; and the time of a failure, 0 if ther
 _BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", *_DECIDED, *STABLE)
 
 
+STRETCH = 100.0
+"""The length of a step divides this evenly if t_end is a multiple of it, in sqrt(c/g).  So it does not depend on t_end:
+a run to a later time takes the same steps."""
+
+
+def steps_to(t_end: float | Array, step: Array) -> Array:
+    """The least number of equal steps that lead to `t_end`, with lengths that are at most `step`, shape (cells,)."""
+    stretch = np.where(np.mod(t_end, STRETCH) == 0, STRETCH, t_end)
+    return np.asarray(np.ceil(stretch / step) * (t_end / stretch))
+
+
 class Kernel:
     """The layout of the images, and the compiled loop around a block of steps.
 
@@ -196,7 +207,7 @@ class Kernel:
 
     def _reached(self, table: Table, t_end: float | Array) -> Array:
         """Times of the states, shape (cells,)."""
-        return np.asarray(table["done"] / table["goal"] * t_end)
+        return np.asarray(table["done"] * t_end / table["goal"])
 
     def is_compiled(self) -> bool:
         """Whether the first call of `advance` will find machine code, in memory or on disk."""

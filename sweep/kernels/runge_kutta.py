@@ -14,7 +14,7 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
-from sweep.kernels.kernel import Kernel
+from sweep.kernels.kernel import Kernel, steps_to
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.method import TOLERANCE, Method
@@ -33,7 +33,7 @@ class RungeKuttaKernel(Kernel):
 
     def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
         """As `Kernel.images`; the steps taken are no longer than `step` and divide `t_end` evenly."""
-        goal = np.ceil(t_end / step)
+        goal = steps_to(t_end, step)
         stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
         return self._start(columns, t_end / goal, goal, stable_step, stable)
 

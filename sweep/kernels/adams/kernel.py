@@ -39,7 +39,7 @@ from sweep.kernels.adams.step import (
     store_lines,
 )
 from sweep.kernels.codegen import compile_inline
-from sweep.kernels.kernel import Kernel
+from sweep.kernels.kernel import Kernel, steps_to
 from sweep.kernels.layout import BLOCK, LANES, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
 from sweep.kernels.status import DIVERGED, RUNNING
@@ -80,8 +80,8 @@ class AdamsKernel(Kernel):
         """As `Kernel.images`, but the images are those at the end of start-up, at the time in `begin`."""
         levels = count_levels(friction.strongest_resistance(columns), step)
         lead = duration(levels)
-        goal = np.maximum(np.ceil(t_end / step - lead), 1)
-        step = t_end / (goal + lead)
+        steps = np.maximum(steps_to(t_end, step), lead + 1)
+        goal, step = steps - lead, t_end / steps
         images = self._start(columns, step, goal, True, stable)
         table = self.table(images)
         self._set_method(table, self.unpack(images)[1])

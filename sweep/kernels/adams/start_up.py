@@ -86,17 +86,21 @@ def count_levels(resistance: Array, step: Array) -> Array:
 
 
 def _steps(levels: int) -> Array:
-    """Number of steps of the stiff method on each level, before the doubling at its end, shape (levels,)."""
+    """Number of steps of the stiff method on each of so many levels, before the doubling at its end, shape (levels,)."""
     steps = np.full(levels, HISTORY - 1)
     steps[:_LAYER_LEVELS] += _EXTRA_STEPS
-    return steps
+    # A level may take one step more, so that start-up ends after a whole number of final steps.
+    spacings = _DOPRI5_STEPS // 2 + int(steps @ 2 ** np.arange(levels))
+    return np.asarray(steps + (-spacings >> np.arange(levels) & 1))
+
+
+def _duration(levels: int) -> float:
+    return float((_DOPRI5_STEPS // 2 + _steps(levels) @ 2 ** np.arange(levels)) / 2**levels)
 
 
 def duration(levels: Array) -> Array:
-    """Time that start-up covers, in units of the final step, shape (cells,)."""
-    most = levels.max()
-    in_spacings = _DOPRI5_STEPS / 2 + np.cumsum(_steps(most) * 2.0 ** np.arange(most))
-    return np.asarray(in_spacings[levels - 1] / 2.0**levels)
+    """Time that start-up covers, in units of the final step: a whole number, shape (cells,)."""
+    return np.asarray(np.array([_duration(count) for count in range(1, levels.max() + 1)])[levels - 1])
 
 
 def start_up(step: Array, constants: Array, starts: Array, levels: Array) -> Started:
