@@ -65,17 +65,20 @@ def _parameter_help() -> str:
 @SETTINGS
 @click.option("--dry-run", is_flag=True, help="Print cells, steps, memory and estimated time; compute nothing.")
 @click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")
+@click.option("--rerun", type=click.Choice(["failed", "limit"]),
+              help="Simulate again just the cells that failed, or that reached the time limit.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(1, 4096), help="Run in this many processes, each with one thread.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 @QUIET
 def run(
     config: Path, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool,
-    workers: int | None, scheduler: str | None, quiet: bool,
+    rerun: str | None, workers: int | None, scheduler: str | None, quiet: bool,
 ) -> None:  # fmt: skip
     """Run the sweep that CONFIG describes.
 
     Writes NAME.nc (the dataset) and NAME.png (its maps).  If it is interrupted, finished work is
-    kept, and the same command resumes the run.
+    kept, and the same command resumes the run.  If CONFIG has grown since its dataset was written,
+    by values of axes or to a later t_end, only what is missing is simulated.
     """
     with _explained():
         checked = _load(config, settings)
@@ -96,7 +99,7 @@ def run(
         with Terminal(quiet) as terminal:
             try:
                 with connected(workers, scheduler) as cluster:
-                    result = run_sweep(checked, folder, fresh=fresh, reporter=terminal, cluster=cluster)
+                    result = run_sweep(checked, folder, fresh=fresh, rerun=rerun, reporter=terminal, cluster=cluster)
             except KeyboardInterrupt:
                 done = f"{terminal.last.done} of {terminal.last.cells} cells" if terminal.last else "no cell"
                 terminal.note(f"interrupted: {done} finished and kept; the same command resumes the run")

@@ -91,6 +91,10 @@ class Grid:
             return Grid({}, self.constants, {name: values[tile[0]] for name, values in self.cases.items()})
         return Grid({n: v[at] for (n, v), at in zip(self.axes.items(), tile, strict=True)}, self.constants)
 
+    def take(self, cells: Array) -> Grid:
+        """The cells with these indices, as a list of cases."""
+        return Grid({}, {}, {name: values[cells] for name, values in self.columns().items()})
+
     def sample(self, cells: int) -> Grid:
         """About `cells` of the cells, spread evenly over each axis with both its ends; all if there are no more."""
         if self.size <= cells:

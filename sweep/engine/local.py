@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from sweep.config import Config
 from sweep.engine import executor, verification
-from sweep.engine.plan import Plan, plan, pool
+from sweep.engine.plan import plan, pool
 from sweep.engine.repeats import repeat_all
 from sweep.engine.sensitivity import runs_asked_for, sensitivity
 from sweep.grid import Array, Grid, Tile
@@ -104,9 +104,10 @@ def run_group(
     # Not saved: a run that is killed here goes on from the ends of the first runs.
     repeat_all(plans, tables, lambda: after_chunk(statuses()))
     seconds = (time.perf_counter() - began) / len(group)
-    again = _verified(config, grid, plans, [grid.first_cell(tiles[i]) for i in group], lambda: after_chunk(statuses()))
-    for i, job, verified in zip(group, plans, again, strict=True):
-        arrays = job.results() | verified
+    results = [job.results() for job in plans]
+    again = _verified(config, grid, [tiles[i] for i in group], results, lambda: after_chunk(statuses()))
+    for i, job, first, second in zip(group, plans, results, again, strict=True):
+        arrays = first | second
         if runs_asked_for(job):
             arrays |= sensitivity(job, lambda: after_chunk(statuses()))
         yield Done(i, arrays, seconds, cpu)
@@ -144,14 +145,29 @@ def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
 
 
 def _verified(
-    config: Config, grid: Grid, jobs: Sequence[Plan], first: Sequence[int], after_chunk: Callable[[], None]
+    config: Config,
+    grid: Grid,
+    tiles: Sequence[Tile],
+    results: Sequence[Mapping[str, Array]],
+    after_chunk: Callable[[], None],
 ) -> list[dict[str, Array]]:
-    """For each job, what its cells that are run again give; `first` are the indices of their first cells in `grid`."""
+    """For each tile, whose first run has these `results`, what those of its cells give that are run again."""
     if not config.verify:
-        return [{} for _ in jobs]
-    drawn = [verification.draw(grid.size, config.verify) - begin for begin in first]
-    inside = [cells[(cells >= 0) & (cells < job.grid.size)] for cells, job in zip(drawn, jobs, strict=True)]
-    again = verification.verify(jobs, inside, after_chunk)
-    for begin, arrays in zip(first, again, strict=True):
-        arrays["verified_cell"] = arrays["verified_cell"] + begin
-    return again
+        return [{} for _ in tiles]
+    drawn, inside = verification.draw(grid.size, config.verify), []
+    for tile, first in zip(tiles, results, strict=True):
+        cells = drawn - grid.first_cell(tile)
+        inside.append(verification.sound(cells[(cells >= 0) & (cells < len(first["status"]))], first))
+
+    def pooled(arrays: Sequence[Mapping[str, Array]], names: Iterable[str]) -> dict[str, Array]:
+        return {n: np.concatenate([a[n][cells] for a, cells in zip(arrays, inside, strict=True)]) for n in names}
+
+    columns = [grid.part(tile).columns() for tile in tiles]
+    compared = [name for name in verification.COMPARED if name in results[0]]
+    again = verification.verify(config, pooled(columns, columns[0]), pooled(results, compared), after_chunk)
+    ends = np.cumsum([len(cells) for cells in inside])
+    return [
+        {"verified_cell": cells + grid.first_cell(tile)}
+        | {name: values[end - len(cells) : end] for name, values in again.items()}
+        for tile, cells, end in zip(tiles, inside, ends, strict=True)
+    ]

@@ -4,7 +4,7 @@ The configuration says which grid of cells to run, and the grid is cut into tile
 `engine.plan` chooses model, kernel and steps, and `engine.executor` advances its trajectories to
 their ends: in this process (`engine.local`) or in others (`engine.cluster`).  A store keeps the
 finished tiles.  `engine.whole` or, where only some cells are simulated, `engine.refined` makes the
-dataset of them, and `plots` draws its maps.
+dataset of them, and `plots` draws its maps.  `engine.enlarged` takes over what an earlier run has left.
 """
 
 from __future__ import annotations
@@ -19,16 +19,19 @@ import xarray as xr
 from sweep.config import Config, as_config
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
+from sweep.engine.earlier import RERUN, Earlier, reason_against, taken_over
+from sweep.engine.enlarged import Enlarged
 from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
+from sweep.results.identity import Identity, not_replaced
 from sweep.results.memory import Memory
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
-from sweep.results.store import Store
+from sweep.results.store import Store, StoreError
 
 LARGE = 2_000_000
 """Cells of the largest dataset that is loaded into memory unasked."""
@@ -44,11 +47,15 @@ def run(
     output: str | Path | None = None,
     *,
     fresh: bool = False,
+    rerun: str | None = None,
     reporter: Reporter | None = None,
     cluster: Cluster | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Run a sweep.
+
+    If `output` holds the dataset of a smaller run, of fewer cells or to an earlier `t_end`, only what it lacks is
+    simulated.  The dataset is the same, bit for bit, as that of a run of all cells at once.
 
     Parameters
     ----------
@@ -56,6 +63,8 @@ def run(
     output : folder for the dataset and its maps; until they are finished it holds a checkpoint, from
         which the same call resumes.  By default nothing is written
     fresh : discard what an earlier run left in `output`
+    rerun : "failed" or "limit": simulate again just those cells of the dataset in `output` that failed, or that
+        reached the time limit, with the settings of the integrator as they are now; the others stay as they are
     reporter : receives progress and messages; by default there are none
     cluster : processes to run the cells in; by default the threads of this one
     overrides : values that replace those of the file, such as ``mu=60`` or ``t_end=1000``
@@ -72,30 +81,60 @@ def run(
         if the configuration, or what `output` holds, cannot be used.
     """
     config = as_config(config, overrides)
+    if rerun not in (None, *RERUN):
+        raise ValueError(f"rerun {rerun!r}; allowed: {', '.join(RERUN)}")
     reporter = reporter or Reporter()
     if output is None:
         return _compute(config, Memory(), reporter, cluster).dataset()
-    files = RunFiles(Path(output), config.name)
+    files, identity = RunFiles(Path(output), config.name), identify(config).again(rerun)
     with files.locked():
         if fresh:
             files.discard()
-        if files.has_dataset(identify(config)):
+        found = files.identity()
+        if found and not found.difference(identity):
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
+            earlier = _earlier(config, identity, files, rerun)
             files.picture.unlink(missing_ok=True)  # of a dataset that is gone
-            store = Checkpoint(files.checkpoint, identify(config), reporter.note)
-            _compute(config, store, reporter, cluster).save(files.dataset)
+            store = Checkpoint(files.checkpoint, identity, reporter.note)
+            _compute(config, store, reporter, cluster, earlier).save(files.dataset)
         files.discard_checkpoint()
         result = open_dataset(files.dataset, load=Grid.of(config).size <= LARGE)
         _draw(result, files, reporter)
     return result
 
 
-def _compute(config: Config, store: Store, reporter: Reporter, cluster: Cluster | None) -> Whole | Refined:
+def _earlier(config: Config, identity: Identity, files: RunFiles, rerun: str | None) -> Earlier | None:
+    """What the dataset that is there, or that was there when an interrupted run began, has of the cells of `config`.
+
+    Raises
+    ------
+    StoreError
+        if results of that dataset would be lost.
+    """
+    if files.dataset.exists():
+        found, there = files.identity(), open_dataset(files.dataset)
+        assert found is not None
+        if reason := reason_against(config, found, identity, there, rerun):
+            raise not_replaced(files.dataset, reason)
+        files.keep_earlier()
+    elif rerun and not files.earlier.exists():
+        raise StoreError(f"{files.dataset}: no such file; --rerun needs the dataset of an earlier run")
+    return taken_over(config, open_dataset(files.earlier), rerun) if files.earlier.exists() else None
+
+
+def _compute(
+    config: Config, store: Store, reporter: Reporter, cluster: Cluster | None, earlier: Earlier | None = None
+) -> Whole | Refined | Enlarged:
     if store.done or store.load_running():
         reporter.note(f"resuming an earlier run, which finished {len(store.done)} tiles")
-    # A single cell has no neighbours from which it could be inferred.
-    result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
+    result: Whole | Refined | Enlarged
+    if earlier:
+        reporter.note(earlier.words)
+        result = Enlarged(config, store, earlier)
+    else:
+        # A single cell has no neighbours from which it could be inferred.
+        result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
     count = Count(reporter)
     while result.grow(tile_size):
         _run_tiles(result.simulated(), result.tiles, store, count, cluster)

@@ -66,6 +66,9 @@ class Method:
     balance: float = 1.0
     """How many times as large as the error in spin the error of its energy balance tends to be, both as
     `sweep.engine.repeats` compares them."""
+    foresight: float = 0.0
+    """Number of steps ahead of the time limit from which on it may decide by what is left.  A trajectory that has
+    ended before does not depend on the limit."""
     stops_anywhere: bool = False
     """Whether a run may stop after any step and go on from there towards another goal."""
 

@@ -70,20 +70,45 @@ class RunFiles:
             path.unlink(missing_ok=True)
             os.close(handle)
 
+    @property
+    def earlier(self) -> Path:
+        """The dataset of a smaller run, kept here until that of the larger one takes its place."""
+        return self.checkpoint / "earlier.nc"
+
+    def identity(self) -> Identity | None:
+        """The identity of the dataset that is there; None if there is none.
+
+        Raises
+        ------
+        StoreError
+            if the file is not a dataset.
+        """
+        if not self.dataset.exists():
+            return None
+        with netcdf.open_dataset(self.dataset, load=False) as dataset:
+            return Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
+
     def has_dataset(self, identity: Identity) -> bool:
         """Whether the finished dataset of `identity` is there.
 
         Raises
         ------
         StoreError
-            if the file is of another run, or not a dataset of this program.
+            if the file is of another run, or not a dataset.
         """
-        if not self.dataset.exists():
-            return False
-        with netcdf.open_dataset(self.dataset, load=False) as dataset:
-            found = Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
-        require_same(self.dataset, found, identity)
-        return True
+        found = self.identity()
+        if found:
+            require_same(self.dataset, found, identity)
+        return bool(found)
+
+    def keep_earlier(self) -> None:
+        """Keep the dataset that is there while the run that enlarges it goes on."""
+        self.checkpoint.mkdir(exist_ok=True)
+        with replacing(self.earlier) as temporary:
+            try:
+                os.link(self.dataset, temporary)
+            except OSError:  # a file system without links
+                shutil.copyfile(self.dataset, temporary)
 
     def save_result(self, dataset: xr.Dataset, figure: Figure) -> None:
         """Write a dataset that needed no checkpoint, and its picture."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +29,22 @@ class Identity:
             raise ValueError("not the identity of a run")
         return cls(**raw)
 
+    def again(self, rerun: str | None) -> Identity:
+        """The identity of a run that computes only the cells `rerun` again."""
+        return replace(self, config_hash=f"{self.config_hash}+{rerun}") if rerun else self
+
+    @property
+    def of_one_run(self) -> bool:
+        """Whether no cells were computed again with other settings, so that others may be added to them."""
+        return "+" not in self.config_hash
+
     def difference(self, other: Identity) -> str:
         """Why a run of `other` cannot resume files of this identity; "" if it can."""
         if self.config_hash != other.config_hash:
             old, new = (c.config.splitlines() for c in (self, other))
             changed = [f"- {printable(line.strip())}" for line in old if line not in new]
             changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
+            changed += [] if self.of_one_run else ["some cells were computed again (--rerun)"]
             return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs"])
         if self.versions != other.versions:
             return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
@@ -48,3 +58,12 @@ def require_same(path: Path, found: Identity, wanted: Identity) -> None:
             f"{path}: not resumed, it comes from {reason}\n"
             "  allowed: the same configuration, another --output, or --fresh to discard that run"
         )
+
+
+def not_replaced(path: Path, reason: str) -> StoreError:
+    """The error of a dataset at `path` that another run would replace, although results would be lost."""
+    return StoreError(
+        f"{path}: not replaced, it comes from {reason}\n"
+        "  allowed: the same configuration; more values, a later t_end or more measurements;"
+        " another --output; or --fresh to discard that run"
+    )

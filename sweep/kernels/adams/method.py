@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.kernels.adams.kernel import AdamsKernel
+from sweep.kernels.adams.stretches import WORTHWHILE
 from sweep.kernels.method import Method
 from sweep.models import friction, linear, slip
 from sweep.models.ellipsoid import inertia
@@ -51,4 +52,5 @@ METHOD = Method(
     # On one thread start-up takes 4.6 to 6.4 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
     start_up_cost=390.0,
+    foresight=WORTHWHILE,
 )

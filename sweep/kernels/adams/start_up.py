@@ -86,7 +86,7 @@ def count_levels(resistance: Array, step: Array) -> Array:
 
 
 def _steps(levels: int) -> Array:
-    """Number of steps of the stiff method on each of so many levels, before the doubling at its end, shape (levels,)."""
+    """Number of steps of the stiff method on each level, before the doubling at its end, shape (levels,)."""
     steps = np.full(levels, HISTORY - 1)
     steps[:_LAYER_LEVELS] += _EXTRA_STEPS
     # A level may take one step more, so that start-up ends after a whole number of final steps.

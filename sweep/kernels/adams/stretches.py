@@ -53,7 +53,7 @@ _LATE = 1.5
 
 # Number of steps from which on a leap is worthwhile: resolving a rattle into its modes takes as long as two thousand
 # steps, and most looks find nothing to do.
-_WORTHWHILE = 20_000
+WORTHWHILE = 20_000
 
 # Share of a mode that may be products or round-off of the other if there is no time to wait for less.
 _AT_WORST = 0.1
@@ -111,7 +111,7 @@ def _brief(rate: Array, share: Array, lowest: Array | float, time: Array, steps:
     smaller one; `share` is a logarithm too.
     """
     below = np.log(_ROUND_OFF) - share
-    return np.asarray((steps < _WORTHWHILE) & (rate * time < -2 * below + np.minimum(lowest, 0)))
+    return np.asarray((steps < WORTHWHILE) & (rate * time < -2 * below + np.minimum(lowest, 0)))
 
 
 def carry(kernel: Kernel, images: Array, tolerance: float) -> None:
@@ -174,7 +174,7 @@ def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, l
 
         small = (logs < largest[:, None]).all(axis=1) & rattle.sound
         unclear = _until_clear(seen, largest, share)
-        use = sinks | (seen.log_g > true.log_g) | (steps >= np.minimum(_WORTHWHILE, left))
+        use = sinks | (seen.log_g > true.log_g) | (steps >= np.minimum(WORTHWHILE, left))
         now = small & use & (unclear <= 0)
 
         cap = np.where(hard, _LARGEST_LIFTED[1], _LARGEST_LIFTED[0])

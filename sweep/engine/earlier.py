@@ -1,0 +1,160 @@
+"""What an earlier run has computed of the cells of this one, from the dataset that it has left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep.config import Config
+from sweep.config.document import parse_value
+from sweep.engine.plan import choose
+from sweep.grid import Array, Grid
+from sweep.kernels.kernel import steps_to
+from sweep.kernels.measures.sensitivity import Sensitivity
+from sweep.kernels.methods import METHODS
+from sweep.kernels.status import FAILURES, TIME_LIMIT
+from sweep.models import MODELS
+from sweep.results import dataset
+from sweep.results.identity import Identity
+
+RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
+"""Names of the cells that a run can be asked to compute again, with their statuses."""
+
+# What may differ between a run and the one that it enlarges, or, if it computes some cells again, completes.
+_FREE = {"name", "max_failed_fraction", "verify"}
+_FREE_AGAIN = _FREE | {"integrator"}
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """The dataset of an earlier run, and which cells of this one it has."""
+
+    dataset: xr.Dataset
+    cells: Array
+    """For each cell of this run its index in the earlier one, or -1 if it has to be simulated, shape (cells,)."""
+    rerun: str | None = None
+    """Which cells are computed again, if others are taken over although the settings differ."""
+
+    @property
+    def words(self) -> str:
+        """How many cells are taken over, and from which run."""
+        taken, created = int((self.cells >= 0).sum()), self.dataset.attrs.get("created", "an unknown date")
+        return f"{taken} of {len(self.cells)} cells are taken over from the run of {created}"
+
+    def arrays(self, grid: Grid) -> dict[str, Array]:
+        """The earlier variables over the cells of `grid`, or over its bodies; undefined where they have none."""
+        taken = np.flatnonzero(self.cells >= 0)
+        _, old_body = _grid(self.dataset).bodies()
+        _, body = grid.bodies()
+        arrays = {}
+        for name, (over, spec) in dataset.layout(grid, set(map(str, self.dataset.data_vars))).items():
+            tail = (self.dataset.sizes[spec.along],) if spec.along else ()
+            values = self.dataset[name].values.reshape(-1, *tail)
+            arrays[name] = np.zeros((over.size, *tail), spec.dtype)
+            if spec.per_body:
+                arrays[name][body[taken]] = values[old_body[self.cells[taken]]]
+            else:
+                arrays[name][taken] = values[self.cells[taken]]
+        return arrays
+
+
+def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.Dataset, rerun: str | None) -> str:
+    """Why a run of `config` may not replace the dataset `there`, of the run `found`; "" if it may.
+
+    It may if no result is lost: the same run of more cells, to a later time, or with more measurements; or, to
+    `rerun` cells, one of the same cells.
+    """
+    same_program = (found.source_hash, found.versions) == (wanted.source_hash, wanted.versions)
+    if rerun is None and not (same_program and found.of_one_run):
+        return found.difference(wanted)
+    old, new = parse_value(found.config, "dataset"), parse_value(wanted.config, "config")
+    free = _FREE_AGAIN if rerun else _FREE
+    changed = [key for key in {**old, **new} if key not in _PARAMETERS | free and _differ(key, old, new)]
+    grown = _match(Grid.of(config), _grid(there))
+    same_cells = len(grown) == there["status"].size
+    if changed or config.refine or (grown >= 0).sum() < there["status"].size or (rerun and not same_cells):
+        return found.difference(wanted)
+    return ""
+
+
+def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
+    """The cells of `config` whose results, bit for bit, are those in the dataset `there`; all but some to `rerun`."""
+    cells = _match(Grid.of(config), _grid(there))
+    status = there["status"].values.ravel()
+    if rerun:
+        return Earlier(there, np.where(np.isin(status, RERUN[rerun])[cells], -1, cells), rerun)
+    old = parse_value(str(there.attrs["config"]), "dataset")
+    if old["measure"] != config.document()["measure"] or config.model not in MODELS:
+        return Earlier(there, np.full(len(cells), -1))
+    if old["integrator"]["t_end"] != config.integrator.t_end:
+        taken = np.flatnonzero(cells >= 0)
+        depends = _depends_on_limit(
+            config, Grid.of(config).take(taken), there, cells[taken], old["integrator"]["t_end"]
+        )
+        cells[taken[depends]] = -1
+    return Earlier(there, cells)
+
+
+_PARAMETERS = {"body", "friction", "start", "cases"}
+
+
+def _differ(key: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Whether a run that changes this setting is neither the same nor a larger one."""
+    before, after = old.get(key), new.get(key)
+    if key == "measure":
+        return any(each not in after for each in before)  # type: ignore[union-attr,operator]
+    if key == "integrator":
+        longer = after["t_end"] >= before["t_end"]  # type: ignore[index]
+        return not longer or {**before, "t_end": 0} != {**after, "t_end": 0}  # type: ignore[dict-item]
+    return bool(before != after)
+
+
+def _depends_on_limit(config: Config, grid: Grid, there: xr.Dataset, cells: Array, t_end: float) -> Array:
+    """Which of the cells of `grid`, with the indices `cells` in the earlier dataset, could end otherwise than before.
+
+    These are the cells that had not ended at the earlier limit `t_end`, or so late that the method had taken it into
+    account, and those that now take other steps.
+    """
+    if any(spec.partition("=")[0] == Sensitivity.name for spec in config.measure):
+        return np.ones(len(cells), bool)  # its further runs may have met the limit
+
+    def before(name: str) -> Array:
+        return np.asarray(there[name].values.ravel()[cells])
+
+    depends: Array = before("status") == TIME_LIMIT
+    for choice in choose(config, grid):
+        at = choice.cells
+        left = (t_end - before("t_stop")[at]) / before("step")[at]
+        step = config.integrator.t_end / steps_to(config.integrator.t_end, choice.step)
+        depends[at] |= (left < METHODS[choice.method].foresight) | (step != before("step")[at])
+        if "method" in there:
+            depends[at] |= before("method")[at] != list(METHODS).index(choice.method)
+    return depends
+
+
+def _grid(there: xr.Dataset) -> Grid:
+    """The grid of a dataset."""
+    values = {str(name): coordinate.values for name, coordinate in there.coords.items()}
+    constants = {name: float(value) for name, value in values.items() if value.ndim == 0}
+    dims = [str(d) for d in there["status"].dims]
+    if dims == ["case"]:
+        cases = {n: v for n, v in values.items() if there[n].dims == ("case",) and n != "case"}
+        return Grid({}, constants, cases)
+    return Grid({name: values[name] for name in dims}, constants)
+
+
+def _match(grid: Grid, there: Grid) -> Array:
+    """For each cell of `grid` its index in the grid `there`, or -1, shape (cells,)."""
+    columns, old = grid.columns(), there.columns()
+    if set(columns) != set(old):
+        return np.full(grid.size, -1)
+    known, rows = (np.stack([some[name] + 0.0 for name in sorted(columns)], axis=1) for some in (old, columns))
+    both = np.concatenate([known, rows]).view(f"V{8 * len(columns)}").ravel()
+    _, which = np.unique(both, return_inverse=True)
+    at: Array = np.full(len(both), -1)
+    at[which[: len(known)]] = np.arange(len(known))
+    return np.asarray(at[which[len(known) :]])

@@ -1,0 +1,163 @@
+"""A run that has grown simulates only what is missing, and ends with the dataset of a run of all cells at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from support.runs import Stop, same_numbers
+
+import sweep
+from sweep import StoreError
+from sweep.engine.earlier import taken_over
+from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
+
+Write = Callable[..., Path]
+
+BODY = "name: small\nbody: {a: 10.0, b: [2.0, 3.0, 5.0], delta: 0.03}\n"
+ONE = BODY + "friction: {mu: [40, 60]}\nstart: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}\nintegrator: {t_end: 3000}\n"
+MORE = ONE.replace("[2.0, 3.0, 5.0]", "[1.5, 2.0, 3.0, 5.0]").replace("[40, 60]", "[40, 50, 60]")
+LATER = MORE.replace("3000", "6000")
+CASES = BODY.replace("b: [2.0, 3.0, 5.0], ", "") + "cases: cases.csv\nstart: {x0: 0.01, y0: 0.01}\n"
+
+
+def grown(write: Write, output: Path, *texts: str, **options: Any) -> tuple[xr.Dataset, list[str]]:
+    """The dataset after runs of these configurations in one folder, and what the last of them says."""
+    for text in texts:
+        reporter = Stop(10**6)
+        found = sweep.run(write(text), output, reporter=reporter, **options)
+    return found, reporter.notes
+
+
+@pytest.mark.parametrize("method", ["dopri5", "auto"])
+@pytest.mark.parametrize("text", [MORE, LATER, LATER + "verify: 0.3\n"], ids=["more", "later", "verified"])
+def test_a_grown_run_is_the_run_of_all_at_once(write: Write, tmp_path: Path, text: str, method: str) -> None:
+    first, text = (each.replace("{t_end", f"{{method: {method}, t_end") for each in (ONE, text))
+    found, (note,) = grown(write, tmp_path / "out", first, text)
+    taken = int(note.split()[0])
+    assert taken == (12 if "3000" in text else taken)
+    assert 3 <= taken <= 12
+    assert found.attrs["taken_over"] in note
+    same_numbers(found, sweep.run(write(text)))
+
+
+def test_a_longer_table_of_cases(write: Write, tmp_path: Path) -> None:
+    def run(rows: str) -> xr.Dataset:
+        (tmp_path / "cases.csv").write_text("mu,b,n0\n" + rows, encoding="utf-8")
+        return grown(write, tmp_path / "out", CASES)[0]
+
+    run("40,2,0.05\n60,3,0.05\n")
+    found = run("60,3,0.05\n50,2,0.05\n40,2,0.05\n60,3,0.02\n")
+    assert found.attrs["taken_over"].startswith("2 of 4 cells")
+    same_numbers(found, sweep.run(write(CASES)))
+
+
+def test_what_is_taken_over_is_not_computed_again(write: Write, tmp_path: Path) -> None:
+    grown(write, tmp_path / "out", ONE)
+    with netCDF4.Dataset(tmp_path / "out" / "small.nc", "a") as file:
+        file["reversals"][1, 2, 0] = 77
+    found, _ = grown(write, tmp_path / "out", MORE)
+    assert found["reversals"].sel(mu=60, b=5, n0=0.02) == 77
+    assert (found["reversals"] == 77).sum() == 1
+
+
+@pytest.mark.parametrize("t_end", [3050, 6000])
+def test_the_time_limit_leaves_no_trace(write: Write, t_end: int) -> None:
+    """Only those cells are taken over that do not know of the limit; another number of steps is another run."""
+    short, config = sweep.run(write(MORE)), sweep.load_config(write(MORE.replace("3000", str(t_end))))
+    cells = taken_over(config, short, None).cells
+    taken = np.flatnonzero(cells >= 0)
+    assert len(taken) == 0 if t_end == 3050 else len(taken) > 5
+    assert set(short["status"].values.ravel()[cells[taken]]) <= {SETTLED}
+    long = sweep.run(config)
+    for name in ("reversals", "t_stop", "spin_final", "spin_rest", "energy_error", "step"):
+        values, longer = short[name].values.ravel(), long[name].values.ravel()
+        np.testing.assert_array_equal(longer[taken], values[cells[taken]])
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_an_interrupted_enlargement_goes_on(write: Write, tmp_path: Path) -> None:
+    grown(write, tmp_path / "out", ONE)
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            sweep.run(write(LATER), tmp_path / "out", reporter=Stop(2))
+        # The smaller dataset stays until the larger one is complete.
+        assert xr.load_dataset(tmp_path / "out" / "small.nc", decode_times=False)["status"].size == 12
+    (tmp_path / "out" / "small.nc").unlink()  # the run has kept it
+    found, notes = grown(write, tmp_path / "out", LATER)
+    assert any("resuming" in note for note in notes)
+    same_numbers(found, sweep.run(write(LATER)))
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"small.nc", "small.png"}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("[40, 60]", "[40, 70]"), "- mu: [40.0, 60.0]"),
+        (("[40, 60]", "60"), "- mu: [40.0, 60.0]"),
+        (("3000", "1000"), "t_end: 3000.0"),
+        (("t_end", "tolerance: 1e-6, t_end"), "tolerance: 1e-08"),
+        (("delta: 0.03", "delta: 0.02"), "- delta: 0.03"),
+        (("integrator", "measure: [reversals]\nintegrator"), "- measure:"),
+        (("integrator", "refine: 1\nintegrator"), "- refine: 0"),
+    ],
+)
+def test_no_result_is_lost(write: Write, tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    grown(write, tmp_path / "out", ONE)
+    before = (tmp_path / "out" / "small.nc").read_bytes()
+    with pytest.raises(StoreError, match="not replaced") as caught:
+        grown(write, tmp_path / "out", ONE.replace(*change))
+    assert said in str(caught.value)
+    assert (tmp_path / "out" / "small.nc").read_bytes() == before
+
+
+def test_nothing_is_taken_from_other_sources(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    grown(write, tmp_path / "out", ONE)
+    monkeypatch.setattr("sweep.results.provenance.sources", lambda: ("other", "versions"))
+    with pytest.raises(StoreError, match="not replaced"):
+        grown(write, tmp_path / "out", MORE)
+
+
+def test_a_further_measurement_needs_all_cells(write: Write, tmp_path: Path) -> None:
+    fewer, more = (ONE + f"measure: [reversals{more}]\n" for more in ("", ", first_reversal"))
+    found, (note,) = grown(write, tmp_path / "out", fewer, more)
+    assert note.startswith("0 of 12 cells are taken over")
+    same_numbers(found, sweep.run(write(more)))
+
+
+def test_rerun_computes_just_those_cells(write: Write, tmp_path: Path) -> None:
+    short, _ = grown(write, tmp_path / "out", MORE)
+    limit = short["status"] == TIME_LIMIT
+    assert 0 < limit.sum() < limit.size
+    later = MORE.replace("3000", "5000, tolerance: 1e-7")
+    found, (note,) = grown(write, tmp_path / "out", later, rerun="limit")
+    assert note.startswith(f"{int((~limit).sum())} of 24 cells are taken over")
+    expected = sweep.run(write(later))
+    for name in ("reversals", "spin_final", "t_stop", "step", "status"):
+        xr.testing.assert_equal(found[name], xr.where(limit, expected[name], short[name]))
+    # Settings differ from cell to cell now: no other run may add to these.
+    with pytest.raises(StoreError, match="computed again"):
+        grown(write, tmp_path / "out", later.replace("[40, 50", "[30, 40, 50"))
+
+
+def test_rerun_of_failed_cells(write: Write, tmp_path: Path) -> None:
+    violent = ONE.replace("[0.02, 0.05]", "[0.05, 3.0]").replace("x0: 0.01", "x0: 5") + "max_failed_fraction: 1\n"
+    short, _ = grown(write, tmp_path / "out", violent)
+    failed = np.isin(short["status"], (LIFT_OFF,))
+    assert 0 < failed.sum() < failed.size
+    found, (note,) = grown(write, tmp_path / "out", violent, rerun="failed", tolerance=1e-4)
+    assert note.startswith(f"{int((~failed).sum())} of 12 cells are taken over")
+    np.testing.assert_array_equal(found["status"].values[~failed], short["status"].values[~failed])
+    assert (found["step"].values != short["step"].values)[failed].all()
+
+
+def test_rerun_needs_a_dataset(write: Write, tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="--rerun needs the dataset"):
+        grown(write, tmp_path / "out", ONE, rerun="limit")
+    with pytest.raises(ValueError, match="rerun 'all'; allowed: failed, limit"):
+        grown(write, tmp_path / "out", ONE, rerun="all")
