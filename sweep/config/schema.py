@@ -46,11 +46,21 @@ class Range(_Strict):
 
     def values(self) -> list[float]:
         if self.spacing == "linear":
-            with np.errstate(all="ignore"):  # values that overflow are refused later, as out of bounds
-                return list(map(float, np.linspace(self.start, self.stop, self.num)))
+            return _divided(self.start, self.stop, self.num)
         if np.sign(self.start) * np.sign(self.stop) <= 0:
             raise _wrong("a log range needs start and stop of one sign, both not zero", "spacing")
-        return list(map(float, np.geomspace(self.start, self.stop, self.num)))
+        logs = _divided(math.log10(abs(self.start)), math.log10(abs(self.stop)), self.num)
+        inside = [math.copysign(10.0**log, self.start) for log in logs[1:-1]]
+        return [self.start, *inside, self.stop][: self.num]
+
+
+def _divided(start: float, stop: float, num: int) -> list[float]:
+    """Equally spaced numbers, each rounded once, so that a finer division has all numbers of a coarser one."""
+    if num == 1:
+        return [start]
+    (p, q), (r, s) = start.as_integer_ratio(), stop.as_integer_ratio()
+    first, last, whole = p * s, r * q, q * s * (num - 1)
+    return [(first * (num - 1 - i) + last * i) / whole for i in range(num)]
 
 
 def _wrong(reason: str, *at: str | int) -> PydanticCustomError:

@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import assume, given
+from hypothesis import strategies as st
 from support import ROOT, SMALL
 
 from sweep import ConfigError, load_config
 from sweep.cli import main
+from sweep.config.schema import Range
 from sweep.grid import Grid
 
 Write = Callable[..., Path]
@@ -218,3 +221,23 @@ def test_an_axis_beside_cases_is_refused(write: Write, tmp_path: Path) -> None:
     (tmp_path / "cells.csv").write_text("mu\n60\n", encoding="utf-8")
     with pytest.raises(ConfigError, match=r"small\.yaml:4:11: body\.b: an axis with cases"):
         load_config(write(CASES + "body: {b: [1, 2]}\n"))
+
+
+@given(
+    start=st.floats(-1e6, 1e6),
+    stop=st.floats(-1e6, 1e6),
+    num=st.integers(2, 50),
+    finer=st.integers(1, 12),
+    spacing=st.sampled_from(["linear", "log"]),
+)
+def test_a_finer_range_has_the_values_of_a_coarser_one(
+    start: float, stop: float, num: int, finer: int, spacing: str
+) -> None:
+    assume(spacing == "linear" or start * stop > 0)
+    coarse, fine = (
+        Range(start=start, stop=stop, num=n, spacing=spacing).values() for n in (num, finer * (num - 1) + 1)
+    )
+    assert coarse == fine[::finer]
+    assert (coarse[0], coarse[-1]) == (start, stop)
+    spaced = np.linspace if spacing == "linear" else np.geomspace
+    np.testing.assert_allclose(coarse, spaced(start, stop, num), rtol=1e-11, atol=1e-9 if spacing == "linear" else 0)

@@ -46,6 +46,11 @@ def test_a_grown_run_is_the_run_of_all_at_once(write: Write, tmp_path: Path, tex
     same_numbers(found, sweep.run(write(text)))
 
 
+def test_a_finer_range(write: Write, tmp_path: Path) -> None:
+    coarse, fine = (ONE.replace("[2.0, 3.0, 5.0]", f"{{start: 1.2, stop: 9.7, num: {n}}}") for n in (4, 10))
+    assert grown(write, tmp_path / "out", coarse, fine)[1][0].startswith("16 of 40 cells are taken over")
+
+
 def test_a_longer_table_of_cases(write: Write, tmp_path: Path) -> None:
     def run(rows: str) -> xr.Dataset:
         (tmp_path / "cases.csv").write_text("mu,b,n0\n" + rows, encoding="utf-8")
