@@ -27,7 +27,7 @@ from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
-from sweep.results.identity import Identity, not_replaced
+from sweep.results.identity import Identity, not_resumed
 from sweep.results.memory import Memory
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
@@ -116,7 +116,7 @@ def _earlier(config: Config, identity: Identity, files: RunFiles, rerun: str | N
         found, there = files.identity(), open_dataset(files.dataset)
         assert found is not None
         if reason := reason_against(config, found, identity, there, rerun):
-            raise not_replaced(files.dataset, reason)
+            raise not_resumed(files.dataset, reason)
         files.keep_earlier()
     elif rerun and not files.earlier.exists():
         raise StoreError(f"{files.dataset}: no such file; --rerun needs the dataset of an earlier run")
