@@ -19,7 +19,7 @@ from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
-    from sweep.config import Config
+    from sweep.config import Config, Fault
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
 
@@ -129,15 +129,12 @@ def trajectory(
     """
     with _explained():
         checked = _load(config, settings)
-        at: dict[str, Any] = {}
-        for name, value in (_parse_pair(cell, "--at") for cell in cells):
-            at.setdefault(name, []).append(value)
-        if unknown := [name for name in at if name not in PARAMETERS]:
-            _refuse("--at", f"unknown parameter; allowed: {', '.join(PARAMETERS)}", unknown[0])
+        at = _cells(cells)
         if dry_run:
             from sweep.studies.trajectory import estimate
 
-            click.echo(estimate(checked, at))
+            with _of_option("--at"):
+                click.echo(estimate(checked, at))
             return
         from sweep.plots import trajectories as plots
         from sweep.progress import Terminal
@@ -145,7 +142,7 @@ def trajectory(
         from sweep.studies.trajectory import trajectory as follow
 
         interrupt.raise_again()
-        with Terminal(quiet, "sqrt(c/g)") as terminal:
+        with Terminal(quiet, "sqrt(c/g)") as terminal, _of_option("--at"):
             result = follow(checked, reporter=terminal, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
         files.save_result(result, plots.draw(result))
@@ -285,24 +282,50 @@ def _load(config: Path, settings: tuple[str, ...]) -> Config:
         if not (equals and path):
             _refuse(f"--set {brief(setting)}", "not a setting; allowed: PATH=VALUE")
         parsed[path] = parse_value(value, f"--set {brief(path)}")
-    return load_config(config, parsed)
+    return load_config(config, parsed, argument=lambda path: f"--set {path}")
 
 
-def _parse_pair(text: str, option: str) -> tuple[str, float]:
+def _cells(texts: tuple[str, ...]) -> dict[str, Any]:
+    """The values of `--at` by parameter."""
     from sweep.config.document import number
-    from sweep.config.faults import brief
+    from sweep.config.faults import brief, suggestion
 
-    name, _, value = text.partition("=")
-    if (parsed := number(value)) is None:
-        _refuse(f"{option} {brief(text)}", "allowed: NAME=NUMBER")
-    return name, parsed
+    given: dict[str, list[float]] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in PARAMETERS:
+            meant = suggestion(name, PARAMETERS)
+            _refuse(f"--at {brief(text)}", f"unknown parameter{meant}; allowed: {', '.join(PARAMETERS)}")
+        if (parsed := number(value)) is None:
+            _refuse(f"--at {brief(text)}", "allowed: NAME=NUMBER")
+        given.setdefault(name, []).append(parsed)
+    return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
 
 
-def _refuse(option: str, message: str, *path: str) -> NoReturn:
+@contextmanager
+def _of_option(option: str) -> Iterator[None]:
+    """Name `option` in faults of values that come from no file."""
+    from dataclasses import replace
+
+    from sweep.config.faults import ConfigError
+
+    def named(fault: Fault) -> Fault:
+        if fault.file:
+            return fault
+        first, *rest = fault.path or ("",)
+        return replace(fault, path=(f"{option} {first}".rstrip(), *rest))
+
+    try:
+        yield
+    except ConfigError as error:
+        raise ConfigError(list(map(named, error.faults))) from None
+
+
+def _refuse(option: str, message: str) -> NoReturn:
     """Raise the fault of an option."""
     from sweep.config.faults import ConfigError, Fault
 
-    raise ConfigError([Fault(option, None, None, path, message)])
+    raise ConfigError([Fault(option, None, None, (), message)])
 
 
 def _say(text: str, *, err: bool = False) -> None:

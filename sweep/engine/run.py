@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, as_config
+from sweep.config import Config, ConfigLike, load_config
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.refined import Refined
@@ -40,7 +40,7 @@ def tile_size(cells: int) -> int:
 
 
 def run(
-    config: Config | str | Path,
+    config: ConfigLike,
     output: str | Path | None = None,
     *,
     fresh: bool = False,
@@ -71,7 +71,7 @@ def run(
     ConfigError, StoreError
         if the configuration, or what `output` holds, cannot be used.
     """
-    config = as_config(config, overrides)
+    config = load_config(config, overrides)
     reporter = reporter or Reporter()
     if output is None:
         return _compute(config, Memory(), reporter, cluster).dataset()

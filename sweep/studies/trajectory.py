@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from math import prod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError, Fault, as_config
+from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
+from sweep.config.faults import suggestion
+from sweep.config.schema import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS
 from sweep.engine.plan import plan
@@ -27,7 +28,7 @@ from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import RUNNING
 from sweep.models import MODELS, TIERS
 from sweep.models.linear import fastest_motion
-from sweep.models.model import Columns, Model
+from sweep.models.model import Columns, Model, Tier
 from sweep.parameters import PARAMETERS
 from sweep.results import dataset
 from sweep.results.provenance import provenance
@@ -72,11 +73,11 @@ SERIES: dict[str, tuple[str, str]] = {
 
 
 def trajectory(
-    config: Config | str | Path,
+    config: ConfigLike,
     *,
     every: float | None = None,
     reporter: Reporter | None = None,
-    **at: float | Sequence[float],
+    **at: Any,
 ) -> xr.Dataset:
     """Follow the cells of `config` picked by their parameters, such as ``mu=60, n0=[0.02, 0.05]``.
 
@@ -85,12 +86,12 @@ def trajectory(
 
     Parameters
     ----------
-    config : a configuration or the path of one
+    config : as `sweep.config.load_config` takes it
     every : time between samples, in sqrt(c/g), rounded to whole steps; by default nearly twenty
         per period of the fastest motion
     reporter : receives progress, counted in time, and messages; by default there are none
-    at : values by parameter; each combination is one trajectory.  An axis of `config` that is not
-        named takes its first value
+    at : a number, or several as an axis of a configuration has them, by parameter; each combination is one
+        trajectory.  An axis of `config` that is not named takes its first value
 
     Returns
     -------
@@ -136,7 +137,7 @@ def trajectory(
     return flat.drop_vars("trajectory").assign(variables).assign_coords(trajectory=index)
 
 
-def estimate(config: Config, at: Mapping[str, float | Sequence[float]]) -> str:
+def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
     """Trajectories, steps, samples and time, a line each; parameters and errors as of `trajectory`."""
     chosen = choose(config, at)
     columns, integrator = Grid.of(chosen).columns(), chosen.integrator
@@ -157,44 +158,38 @@ def estimate(config: Config, at: Mapping[str, float | Sequence[float]]) -> str:
     )
 
 
-def choose(config: Config | str | Path, at: Mapping[str, float | Sequence[float]]) -> Config:
+def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
-    wanted = {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}
-    return _choose(stepwise(as_config(config)), wanted)
-
-
-def _choose(config: Config, at: dict[str, list[float]]) -> Config:
-    """`config` with the cells picked by `at` as its cases; `ConfigError` if they cannot be run."""
+    config = stepwise(load_config(config))
+    wanted = _numbers(TIERS[config.model], at)
+    if (count := prod(map(len, wanted.values()))) > MAX_TRAJECTORIES:
+        raise ConfigError([Fault("", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
         constants |= {name: column[0] for name, column in config.cases.items()}
-    faults = [
-        Fault("--at", None, None, (name,), message)
-        for name, values in at.items()
-        if (message := _wrong(config, name, values))
-    ]
-    if faults:
-        raise ConfigError(faults)
-    if (count := prod(map(len, at.values()))) > MAX_TRAJECTORIES:
-        raise ConfigError([Fault("--at", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
-    combinations = list(product(*at.values())) if at else [()]
-    cases = {
-        name: tuple(dict(zip(at, values, strict=True)).get(name, constant) for values in combinations)
-        for name, constant in constants.items()
-    }
+    cells = [dict(zip(wanted, values, strict=True)) for values in product(*wanted.values())]
+    cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)
     if beyond := off_the_body(chosen):
-        raise ConfigError([Fault("--at", None, None, (), beyond)])
+        raise ConfigError([Fault("", None, None, (), beyond)])
     return chosen
 
 
-def _wrong(config: Config, name: str, values: list[float]) -> str:
-    """What is wrong with the values asked for a parameter; "" if nothing is."""
-    model = TIERS[config.model]
-    if name not in model.parameters:
-        return f"no parameter of the {model.name} model; allowed: {', '.join(model.parameters)}"
-    wrong = [v for v in values if not (np.isfinite(v) and PARAMETERS[name].allows(v))]
-    return f"{wrong[0]:g}; allowed: {PARAMETERS[name].allowed}" if wrong else ""
+def _numbers(model: Tier, at: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
+    """The numbers asked for each parameter; `ConfigError` with a fault for each that cannot be run."""
+    numbers, faults = {}, []
+    for name, value in at.items():
+        if name not in model.parameters:
+            message = f"no parameter of the {model.name} model{suggestion(name, model.parameters)}"
+            faults.append(Fault("", None, None, (name,), f"{message}; allowed: {', '.join(model.parameters)}"))
+            continue
+        try:
+            numbers[name] = numbers_of(PARAMETERS[name], value)
+        except ConfigError as error:
+            faults += error.faults
+    if faults:
+        raise ConfigError(faults)
+    return numbers
 
 
 Marks = list[Array]

@@ -61,7 +61,7 @@ def test_trajectories_of_every_model(model: str, write: Write) -> None:
 @pytest.mark.parametrize(
     ("at", "said"),
     [
-        ({"mu": -1}, "mu: -1; allowed"),
+        ({"mu": -1}, "mu: -1 is out of bounds; allowed"),
         ({"nu": 1}, "no parameter"),
         ({"x0": 20}, "off the ellipsoid"),
         ({"n0": np.nan}, "nan"),
