@@ -6,6 +6,7 @@ at once.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
+from click.shell_completion import CompletionItem
 
 from sweep import interrupt
 from sweep.interrupt import INTERRUPTED
@@ -22,14 +24,30 @@ if TYPE_CHECKING:
     from sweep.config import Config, Fault
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
+CLOSED_PIPE = 141
+"""As the shell reports of any command that SIGPIPE ends: what read its output, such as `head`, has enough."""
 
 _PATH = click.Path(path_type=Path)
+
+
+def _keys(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """The keys of a configuration that go on from what was typed."""
+    from sweep.config.schema import PATHS
+
+    return [CompletionItem(f"{key}=", help=words) for key, words in PATHS.items() if key.startswith(begun)]
+
+
+def _parameters(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """The parameters that go on from what was typed."""
+    return [CompletionItem(f"{p.name}=", help=p.long_name) for p in PARAMETERS.values() if p.name.startswith(begun)]
+
 
 CONFIG = click.argument("config", type=_PATH)
 FILE = click.argument("file", type=_PATH)
 SETTINGS = click.option(
-    "--set", "settings", multiple=True, metavar="PATH=VALUE",
-    help="Replace a value of the configuration, e.g. friction.mu=60 (repeatable).",
+    "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=_keys,
+    help="Replace a value of the configuration, e.g. friction.mu=60, or friction.mu=20..60:41 for the range "
+    "START..STOP:NUM (repeatable).",
 )  # fmt: skip
 OUTPUT = click.option("--output", type=_PATH, help="Folder for the results [default: runs/NAME].")
 QUIET = click.option("--quiet", is_flag=True, help="Print only errors.")
@@ -46,7 +64,8 @@ def main() -> None:
     """Parameter sweeps for the reversals of a rattleback.
 
     Exit codes: 0 done; 2 a configuration or file is wrong; 3 more cells failed than the
-    configuration allows; 130 interrupted, the same command resumes the run.
+    configuration allows; 130 interrupted, the same command resumes the run; 141 what read its
+    output has closed the pipe.
     """
 
 
@@ -93,6 +112,7 @@ def run(
         from sweep.results.summary import failed_fraction, summarize
 
         interrupt.raise_again()
+        before = _stamps(folder, checked.name)
         with Terminal(quiet) as terminal:
             try:
                 with connected(workers, scheduler) as cluster:
@@ -103,7 +123,7 @@ def run(
                 sys.exit(INTERRUPTED)
         if not quiet:
             click.echo(summarize(result))
-            _say(f"wrote {folder / checked.name}.nc and .png")
+            _say(_written(folder, checked.name, before))
         failed = failed_fraction(result)
         if failed > checked.max_failed_fraction:
             allowed = f"max_failed_fraction {checked.max_failed_fraction:.2%}"
@@ -113,7 +133,7 @@ def run(
 
 @main.command()
 @CONFIG
-@click.option("--at", "cells", multiple=True, metavar="NAME=VALUE",
+@click.option("--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=_parameters,
               help="Which cell, e.g. --at mu=60 --at b=3; a parameter given again adds a trajectory.")  # fmt: skip
 @OUTPUT
 @SETTINGS
@@ -180,6 +200,8 @@ def critical(
         from sweep.studies.critical import remarks
 
         folder = output or Path("runs") / checked.name
+        name = f"{checked.name}_critical"
+        before = _stamps(folder, name)
         interrupt.raise_again()
         with Terminal(quiet, "bodies") as terminal:
             try:
@@ -191,7 +213,7 @@ def critical(
         if found := remarks(result):
             _say("\n".join(found), err=quiet)
         if not quiet:
-            _say(f"wrote {folder / checked.name}_critical.nc and .png")
+            _say(_written(folder, name, before))
 
 
 @main.command()
@@ -304,16 +326,15 @@ def _cells(texts: tuple[str, ...]) -> dict[str, Any]:
 
 @contextmanager
 def _of_option(option: str) -> Iterator[None]:
-    """Name `option` in faults of values that come from no file."""
+    """Name `option` in faults of the parameters that it gave."""
     from dataclasses import replace
 
     from sweep.config.faults import ConfigError
 
     def named(fault: Fault) -> Fault:
-        if fault.file:
-            return fault
         first, *rest = fault.path or ("",)
-        return replace(fault, path=(f"{option} {first}".rstrip(), *rest))
+        ours = not fault.file and (not first or first in PARAMETERS)
+        return replace(fault, path=(f"{option} {first}".rstrip(), *rest)) if ours else fault
 
     try:
         yield
@@ -326,6 +347,18 @@ def _refuse(option: str, message: str) -> NoReturn:
     from sweep.config.faults import ConfigError, Fault
 
     raise ConfigError([Fault(option, None, None, (), message)])
+
+
+def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:
+    """What tells by their suffixes whether the results `name` in `folder` are written anew."""
+    stats = {suffix: path.stat() for suffix in (".nc", ".png") if (path := folder / f"{name}{suffix}").exists()}
+    return {suffix: (stat.st_ino, stat.st_mtime_ns) for suffix, stat in stats.items()}
+
+
+def _written(folder: Path, name: str, before: dict[str, tuple[int, int]]) -> str:
+    """Which results were written since `_stamps` returned `before`."""
+    new = [suffix for suffix, stamp in _stamps(folder, name).items() if stamp != before.get(suffix)]
+    return f"wrote {folder / name}{' and '.join(new)}" if new else "nothing was written"
 
 
 def _say(text: str, *, err: bool = False) -> None:
@@ -362,10 +395,16 @@ class _explained:
         if isinstance(error, KeyboardInterrupt):
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
+        if isinstance(error, BrokenPipeError):
+            # What is left in the buffers when Python ends goes nowhere.
+            for stream in (sys.stdout, sys.stderr):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+            sys.exit(CLOSED_PIPE)
         from sweep.config.faults import ConfigError
+        from sweep.jit import NotCompiled
         from sweep.results.store import StoreError
 
-        if isinstance(error, ConfigError | StoreError):
+        if isinstance(error, ConfigError | StoreError | NotCompiled):
             _say(str(error), err=True)
             sys.exit(WRONG_INPUT)
         if isinstance(error, OSError):

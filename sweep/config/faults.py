@@ -30,7 +30,7 @@ def quote(value: object) -> str:
     if value is None or isinstance(value, bool):
         return "nothing" if value is None else str(value).lower()
     try:
-        return _REPR.repr(value)
+        return _REPR.repr(value).removesuffix(".0") if isinstance(value, float) else _REPR.repr(value)
     except ValueError:  # Python refuses to spell integers of more than 4300 digits
         return "a number with thousands of digits"
 

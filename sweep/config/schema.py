@@ -18,7 +18,7 @@ from ruamel.yaml.compat import StringIO
 
 from sweep.config.document import Document
 from sweep.config.faults import ConfigError, Fault, Path, quote, suggestion
-from sweep.config.messages import Allowed, describe, refusal, wrong
+from sweep.config.messages import Allowed, allowed, describe, refusal, wrong
 from sweep.config.plain import plain
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
@@ -122,10 +122,14 @@ def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
         raise wrong(f"{quote(raw)} is out of bounds; allowed: {parameter.allowed}", *at)
 
 
+_STEP = Allowed("auto, or a finite number > 0 in sqrt(c/g)")
+_MEASURE = Allowed(f"a list of {', '.join(MEASURES)}")
+
+
 def _step(raw: Any) -> Any:
     if raw == "auto" or (isinstance(raw, int | float) and not isinstance(raw, bool) and 0 < raw <= sys.float_info.max):
         return raw
-    raise wrong(refusal(raw, "auto, or a finite number > 0 in sqrt(c/g)", ["auto"]))
+    raise wrong(refusal(raw, _STEP.words, ["auto"]))
 
 
 def _measures(raw: Any) -> Any:
@@ -133,7 +137,7 @@ def _measures(raw: Any) -> Any:
     if raw is None:
         return raw
     if not isinstance(raw, list):
-        raise wrong(refusal(raw, f"a list of {', '.join(MEASURES)}"))
+        raise wrong(refusal(raw, _MEASURE.words))
     specs = [_measure(item, i) for i, item in enumerate(raw)]
     if len({spec.partition("=")[0] for spec in specs}) < len(specs):
         raise wrong("a name twice; allowed: each once")
@@ -172,7 +176,7 @@ class Integrator(_Strict):
     method: Literal[(*METHODS, AUTO)] = AUTO  # type: ignore[valid-type]
     """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time.  With a number
     for `step`, and for a model that only one method can integrate, that is the default."""
-    step: Annotated[float | Literal["auto"], BeforeValidator(_step)] = "auto"
+    step: Annotated[float | Literal["auto"], BeforeValidator(_step), _STEP] = "auto"
     tolerance: float = Field(default=TOLERANCE, ge=1e-14, lt=1)
     """Error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep."""
     t_end: Annotated[
@@ -204,7 +208,7 @@ class _Top(_Strict):
     model: Literal[tuple(TIERS)] = "slip"  # type: ignore[valid-type]
     cases: Annotated[str | None, Allowed("the name of a CSV file")] = None
     integrator: Integrator = Integrator()
-    measure: Annotated[list[str] | None, BeforeValidator(_measures)] = None
+    measure: Annotated[list[str] | None, BeforeValidator(_measures), _MEASURE] = None
     """By default, those measurements marked `by_default` that the model supports."""
     verify: float | None = Field(default=None, ge=0, le=1)
     """Share of the cells that are run again with the plain method at half its step; by default `VERIFIED` where the
@@ -216,6 +220,11 @@ class _Top(_Strict):
 
 _sections: dict[str, Any] = {name: (_section(name), Field(default_factory=dict)) for name in SECTIONS}
 Schema: Any = create_model("Configuration", __base__=_Top, **_sections)
+
+PATHS: dict[str, str] = {p.path: p.long_name for p in PARAMETERS.values()}
+PATHS |= {f"integrator.{name}": allowed(field) for name, field in Integrator.model_fields.items()}
+PATHS |= {name: allowed(field) for name, field in _Top.model_fields.items() if name != "integrator"}
+"""The path of every value of a configuration, with what it means or allows, in words."""
 
 
 @dataclass(frozen=True)

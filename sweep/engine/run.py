@@ -28,7 +28,7 @@ from sweep.results.folder import RunFiles
 from sweep.results.memory import Memory
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
-from sweep.results.store import Store
+from sweep.results.store import Running, Store
 
 LARGE = 2_000_000
 """Cells of the largest dataset that is loaded into memory unasked."""
@@ -92,14 +92,23 @@ def run(
 
 
 def _compute(config: Config, store: Store, reporter: Reporter, cluster: Cluster | None) -> Whole | Refined:
-    if store.done or store.load_running():
-        reporter.note(f"resuming an earlier run, which finished {len(store.done)} tiles")
+    running = store.load_running()
     # A single cell has no neighbours from which it could be inferred.
     result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
     count = Count(reporter)
     while result.grow(tile_size):
+        if not count.cells and (store.done or running):
+            reporter.note(_kept(result, store, running))
         _run_tiles(result.simulated(), result.tiles, store, count, cluster)
     return result
+
+
+def _kept(result: Whole | Refined, store: Store, running: Running | None) -> str:
+    """What an earlier run left."""
+    grid = Grid.of(result.simulated())
+    finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
+    more = f", {sum(map(len, running.tables.values()))} under way" if running else ""
+    return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 
 
 def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count, cluster: Cluster | None) -> None:
