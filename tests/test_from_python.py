@@ -220,14 +220,41 @@ def test_a_python_prompt_is_no_notebook(notebook: list[str], monkeypatch: pytest
     assert notebook == []
 
 
-def test_halves_of_an_axis_are_combined_without_loss(tmp_path: Path) -> None:
-    """As `docs/how-to/python.md` shows; the integers stay integers, also in files."""
-    whole = sweep.run(SAID, mu=[40, 60, 80])
-    halves = [sweep.run(SAID, tmp_path / str(i), mu=axis) for i, axis in enumerate(([40, 60], [80]))]
-    for parts in (halves, halves[::-1], [sweep.open(tmp_path / str(i) / "quick.nc") for i in range(2)]):
-        combined = xr.combine_by_coords(parts, combine_attrs="drop_conflicts")
-        same_numbers(combined, whole)
-        assert combined.attrs["Conventions"] == "CF-1.11"
+HALVES: dict[str, list[dict[str, Any]]] = {
+    "mu": [{"mu": [40, 60]}, {"mu": [80]}],
+    "n0, on which no body depends": [{"n0": [0.02]}, {"n0": [0.05, 0.1]}],
+    "mu and b": [{"mu": mu, "b": b} for mu in ([40, 60], [80]) for b in ([2], [3, 4])],
+    "mu, verified": [{"mu": [40, 60], "verify": 0.9}, {"mu": [80], "verify": 0.5}],
+}
+"""Runs that together cover a grid."""
+
+
+@pytest.mark.parametrize("parts", HALVES.values(), ids=HALVES)
+def test_parts_of_a_grid_are_combined_without_loss(parts: list[dict[str, Any]], tmp_path: Path) -> None:
+    """By the call that `docs/how-to/python.md` shows; integers stay integers, also from files."""
+    whole: dict[str, Any] = {}
+    for part in parts:
+        whole |= {name: sorted({*whole.get(name, ()), *axis}) for name, axis in part.items() if name != "verify"}
+    for i, part in enumerate(parts):
+        sweep.run(SAID, tmp_path / str(i), **part)
+    runs = [
+        sweep.open(tmp_path / str(i) / "quick.nc").drop_dims("verified", errors="ignore") for i in range(len(parts))
+    ]
+    combined = xr.combine_by_coords(runs[::-1], data_vars="minimal", compat="equals", combine_attrs="drop_conflicts")
+    assert isinstance(combined, xr.Dataset)
+    same_numbers(combined.transpose(*(wanted := sweep.run(SAID, **whole)).dims), wanted)
+    assert (combined.reversals.dtype, combined.status.dtype) == (np.int16, np.int8)
+    assert combined.attrs["Conventions"] == "CF-1.11"
+    assert "wall_time" not in combined.attrs
+
+
+@pytest.mark.filterwarnings("ignore:In a future version of xarray:FutureWarning")
+def test_variables_of_the_same_cells_are_merged_without_loss() -> None:
+    """With xarray's own defaults."""
+    counts, energy = (sweep.run(SAID, measure=["reversals", *more]) for more in ([], ["energy_error"]))
+    merged = xr.merge([counts, energy, sweep.predict(SAID)])
+    same_numbers(merged[list(energy.variables)], energy)
+    assert merged.reversals.dtype == np.int16
 
 
 NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([10**400, 1, 2.0, 1e3, 60, -1, 1e13, 1e-15]))

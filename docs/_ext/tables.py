@@ -5,14 +5,14 @@ Each directive is named after its table and takes no arguments: see `setup`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any, get_args
+from collections.abc import Callable
+from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from sweep.config import schema
+from sweep.config import messages, schema
 from sweep.kernels import measures, methods
 from sweep.kernels.status import FAILURES
 from sweep.models import TIERS
@@ -63,7 +63,7 @@ def _settings() -> tuple[Row, list[Row]]:
             fields[name] = field
     if missing := fields.keys() ^ _MEANINGS.keys():
         raise ValueError(f"settings without a meaning here, or meanings without a setting: {sorted(missing)}")
-    rows = [(f"`{name}`", _MEANINGS[name], _default(f), _allowed(f)) for name, f in fields.items()]
+    rows = [(f"`{name}`", _MEANINGS[name], _default(f), messages.allowed(f)) for name, f in fields.items()]
     return ("name", "meaning", "default", "allowed"), rows
 
 
@@ -74,27 +74,6 @@ def _default(field: Any) -> str:
     if value is None or value == "":
         return ""
     return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
-
-
-def _allowed(field: Any) -> str:
-    signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
-    bounds = [
-        f"{sign} {getattr(bound, kind):g}"
-        for bound in field.metadata
-        for kind, sign in signs.items()
-        if hasattr(bound, kind)
-    ]
-    if bounds:
-        return ", ".join(bounds)
-
-    def names(annotation: Any) -> Iterable[str]:
-        for part in get_args(annotation):
-            if isinstance(part, str):
-                yield f"`{part}`"
-            else:
-                yield from names(part)
-
-    return ", ".join(names(field.annotation))
 
 
 def _variables() -> tuple[Row, list[Row]]:
