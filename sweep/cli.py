@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
-from click.shell_completion import CompletionItem
 
 from sweep import interrupt
 from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from sweep.config import Config, Fault
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
@@ -32,6 +33,8 @@ _PATH = click.Path(path_type=Path)
 
 def _keys(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
     """The keys of a configuration that go on from what was typed."""
+    from click.shell_completion import CompletionItem
+
     from sweep.config.schema import PATHS
 
     return [CompletionItem(f"{key}=", help=words) for key, words in PATHS.items() if key.startswith(begun)]
@@ -39,6 +42,8 @@ def _keys(_context: click.Context, _parameter: click.Parameter, begun: str) -> l
 
 def _parameters(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
     """The parameters that go on from what was typed."""
+    from click.shell_completion import CompletionItem
+
     return [CompletionItem(f"{p.name}=", help=p.long_name) for p in PARAMETERS.values() if p.name.startswith(begun)]
 
 
