@@ -12,13 +12,14 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
 from sweep.config.document import Document
 from sweep.config.faults import ConfigError, Fault, Path, quote, suggestion
-from sweep.config.messages import Allowed, allowed, describe, refusal, wrong
+from sweep.config.messages import Allowed, describe, refusal, wrong
 from sweep.config.plain import plain
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
@@ -173,19 +174,29 @@ LATEST = 1e12
 
 
 class Integrator(_Strict):
-    method: Literal[(*METHODS, AUTO)] = AUTO  # type: ignore[valid-type]
+    method: Literal[(*METHODS, AUTO)] = Field(  # type: ignore[valid-type]
+        default=AUTO, description="integration method; `auto` chooses the faster one for each cell"
+    )
     """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time.  With a number
     for `step`, and for a model that only one method can integrate, that is the default."""
-    step: Annotated[float | Literal["auto"], BeforeValidator(_step), _STEP] = "auto"
-    tolerance: float = Field(default=TOLERANCE, ge=1e-14, lt=1)
-    """Error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep."""
+    step: Annotated[float | Literal["auto"], BeforeValidator(_step), _STEP] = Field(
+        default="auto", description="fixed step in sqrt(c/g), or `auto`"
+    )
+    tolerance: float = Field(
+        default=TOLERANCE, ge=1e-14, lt=1,
+        description="error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep",
+    )  # fmt: skip
     t_end: Annotated[
         float,
         BeforeValidator(lambda raw: FOREVER if isinstance(raw, float) and raw == math.inf else raw),
         Allowed(f"a number > 0 and <= {LATEST:g}, or .inf"),
-    ] = Field(default=30_000.0, gt=0, le=LATEST)
-    """Time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` stands for `FOREVER`."""
-    stop_when_settled: bool = True
+    ] = Field(
+        default=30_000.0, gt=0, le=LATEST,
+        description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}",
+    )  # fmt: skip
+    stop_when_settled: bool = Field(
+        default=True, description="whether a trajectory ends when neither spin nor count can change any more"
+    )
 
 
 def _section(name: str) -> Any:
@@ -203,28 +214,45 @@ def _section(name: str) -> Any:
 
 class _Top(_Strict):
     name: Annotated[str, Allowed("up to 100 of A-Z, a-z, 0-9, '.', '_', '-', the first a letter or digit")] = Field(
-        default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
+        default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
+        description="name of the run and of its files; by default that of the configuration file",
+    )  # fmt: skip
+    model: Literal[tuple(TIERS)] = Field(  # type: ignore[valid-type]
+        default="slip", description="which model to integrate"
     )
-    model: Literal[tuple(TIERS)] = "slip"  # type: ignore[valid-type]
-    cases: Annotated[str | None, Allowed("the name of a CSV file")] = None
+    cases: Annotated[str | None, Allowed("the name of a CSV file")] = Field(
+        default=None,
+        description="CSV table with a column for each parameter and a row for each trajectory, instead of axes",
+    )
     integrator: Integrator = Integrator()
-    measure: Annotated[list[str] | None, BeforeValidator(_measures), _MEASURE] = None
-    """By default, those measurements marked `by_default` that the model supports."""
-    verify: float | None = Field(default=None, ge=0, le=1)
-    """Share of the cells that are run again with the plain method at half its step; by default `VERIFIED` where the
-    method is `auto`, nothing is inferred and the share amounts to a cell, else none."""
-    refine: Whole = Field(default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1)
-    """The largest blocks of cells whose inside is inferred from their sides have 2^refine cells a side."""
-    max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
+    measure: Annotated[list[str] | None, BeforeValidator(_measures), _MEASURE] = Field(
+        default=None, description="what to compute; by default the measurements marked so that the model supports"
+    )
+    verify: float | None = Field(
+        default=None, ge=0, le=1,
+        description=f"share of the cells, drawn at random, to run again with the plain method at half its step; by "
+        f"default {VERIFIED:g} with `method: auto` where that is a cell or more and nothing is inferred, else 0",
+    )  # fmt: skip
+    refine: Whole = Field(
+        default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1,
+        description="the largest blocks of cells whose inside is inferred from their sides have 2^refine cells a side; "
+        "0 simulates every cell",
+    )  # fmt: skip
+    max_failed_fraction: float = Field(
+        default=0.01, ge=0, le=1, description="share of failed cells beyond which the command exits with 3"
+    )
 
 
 _sections: dict[str, Any] = {name: (_section(name), Field(default_factory=dict)) for name in SECTIONS}
 Schema: Any = create_model("Configuration", __base__=_Top, **_sections)
 
+SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fields.items() if name != "integrator"}
+SETTINGS |= {f"integrator.{name}": field for name, field in Integrator.model_fields.items()}
+"""All values of a configuration but the physical parameters, by path; the `description` of each says what it means."""
+
 PATHS: dict[str, str] = {p.path: p.long_name for p in PARAMETERS.values()}
-PATHS |= {f"integrator.{name}": allowed(field) for name, field in Integrator.model_fields.items()}
-PATHS |= {name: allowed(field) for name, field in _Top.model_fields.items() if name != "integrator"}
-"""The path of every value of a configuration, with what it means or allows, in words."""
+PATHS |= {path: str(field.description) for path, field in SETTINGS.items()}
+"""The path of every value of a configuration, and what it means."""
 
 
 @dataclass(frozen=True)
