@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from sweep.plots.panels import MAX_ROWS, heading, indices, panel_title, symbol
+from sweep.plots.labels import symbol
+from sweep.plots.panels import MAX_PANELS, heading, indices, title
 
 
 def draw(dataset: xr.Dataset) -> Figure:
@@ -14,7 +15,7 @@ def draw(dataset: xr.Dataset) -> Figure:
     dims = [str(d) for d in dataset["n_c1_plus_simulated"].dims]
     dims.sort(key=lambda d: -dataset.sizes[d])
     x = dims[0] if dims else None
-    panels = list(indices(dataset, dims[1:]))[:MAX_ROWS]
+    panels = list(indices(dataset, dims[1:]))[:MAX_PANELS]
     figure = Figure(figsize=(8, 1.2 + 3.2 * len(panels)), dpi=110, layout="constrained")
     figure.suptitle(heading(dataset), fontsize=10)
     rows = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
@@ -29,7 +30,7 @@ def draw(dataset: xr.Dataset) -> Figure:
                     label = f"{name[:4]}{'+' if name.endswith('plus') else '-'}, {source}"
                     axes.plot(at, values, style, color=f"C{colour}", linewidth=1, markersize=4, label=label)
         axes.axhline(0, color="black", linewidth=0.5)
-        axes.set_title(panel_title(dataset, panel), fontsize=9)
+        axes.set_title(title(dataset, panel), fontsize=9)
         axes.set_ylabel("n / sqrt(g/c)")
     rows[0].legend(fontsize=6, ncols=4)
     rows[-1].set_xlabel(symbol(x) if x else "")

@@ -94,9 +94,10 @@ def trajectory(
 
     Returns
     -------
-    Dataset over (trajectory, sample): `time` and the series that the model can show, NaN after the
-    end of a trajectory.  Over (trajectory): all that a sweep gives for the cell, from the very same
-    steps, which the sampling does not change.
+    Dataset over (trajectory, time): the series that the model can show, NaN after the end of a trajectory.  Over
+    (trajectory): all that a sweep gives for the cell, from the very same steps, which the sampling does not change.
+    Samples lie on steps, so trajectories of different steps have no times in common: their series are then over
+    (trajectory, sample), and so is the coordinate `time`.
 
     Raises
     ------
@@ -120,20 +121,32 @@ def trajectory(
     if halvings.any():
         marks = _run(part.kernel, cells_of([job], part.method, part.kernel, part.images).start(halvings), settles)
     labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
-    summary = labelled.reset_coords(drop=False)
     interval = np.full(job.grid.size, every) if every else _intervals(part.kernel.model, job.grid.columns())
     series = [_series(part.kernel, *found) for found in _sample(part.kernel, marks, part.images, interval)]
-    length = max(len(s["time"]) for s in series)
-    variables: dict[str, Any] = {}
+    flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
+    index = ("trajectory", np.arange(job.grid.size), {"units": "1", "long_name": "number of the trajectory"})
+    return flat.assign_coords(trajectory=index).assign(_side_by_side(series))
+
+
+def _side_by_side(series: list[dict[str, Array]]) -> xr.Dataset:
+    """The series of all trajectories, NaN after the end of each.
+
+    Over (trajectory, time) if the trajectories are sampled at the same times, else over (trajectory, sample) with
+    `time` as a coordinate over both.
+    """
+    longest = max((one["time"] for one in series), key=len)
+    together = all(np.array_equal(one["time"], longest[: len(one["time"])]) for one in series)
+    over = "time" if together else "sample"
+    found: dict[str, Any] = {}
     for name in series[0]:
         units, words = ("1", "time, in sqrt(c/g)") if name == "time" else SERIES[name]
-        padded = np.full((len(series), length), np.nan)
+        padded = np.full((len(series), len(longest)), np.nan)
         for row, one in zip(padded, series, strict=True):
             row[: len(one[name])] = one[name]
-        variables[name] = (("trajectory", "sample"), padded, {"units": units, "long_name": words})
-    flat = summary.rename({"case": "trajectory"})
-    index = ("trajectory", flat["trajectory"].values, {"units": "1", "long_name": "number of the trajectory"})
-    return flat.drop_vars("trajectory").assign(variables).assign_coords(trajectory=index)
+        found[name] = (("trajectory", over), padded, {"units": units, "long_name": words})
+    if together:
+        found["time"] = ("time", longest, found["time"][2])
+    return xr.Dataset(found).set_coords("time")
 
 
 def estimate(config: Config, at: Mapping[str, float | Sequence[float]]) -> str:
@@ -225,9 +238,8 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, intervals: Array) -> Iter
     """
     table, marked = kernel.table(ends), np.array([kernel.table(mark)["done"] for mark in marks])
     some: list[Array] = []
-    for i, (step, steps, interval) in enumerate(zip(table["step"], table["done"].astype(int), intervals, strict=True)):
-        stride = max(1, round(interval / step))
-        some.append(np.unique([*range(0, steps, stride), steps]))
+    for i, sampled in enumerate(_sampled(table["step"], table["done"].astype(int), intervals)):
+        some.append(sampled)
         if i + 1 == len(ends) or sum(map(len, some)) > _SAMPLES:
             first = i + 1 - len(some)
             # Of each sample of these trajectories: its trajectory, and the last mark before it.
@@ -237,6 +249,19 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, intervals: Array) -> Iter
             parts = np.split(images, np.cumsum([len(each) for each in some])[:-1])
             yield from zip(some, parts, strict=True)
             some = []
+
+
+def _sampled(steps: Array, done: Array, intervals: Array) -> list[Array]:
+    """For each trajectory the numbers of the steps to sample, the last one among them.
+
+    Trajectories with steps of one length are sampled at the same times, also where one of the others ends.
+    """
+    if np.ptp(steps) == 0:
+        stride = max(1, round(intervals.min() / steps[0]))
+        common = np.union1d(np.arange(0, done.max(), stride), done)
+        return [common[common <= end] for end in done]
+    strides = np.maximum(1, np.rint(intervals / steps).astype(int))
+    return [np.union1d(np.arange(0, end, stride), end) for end, stride in zip(done, strides, strict=True)]
 
 
 def _advance(kernel: Kernel, marks: Marks, which: Array, before: Array, steps: Array) -> Array:
