@@ -34,6 +34,7 @@ _OF_DIFFERENCES = ("failed", "not_run", "time_limit")
 """Kinds of cell marked on maps of differences too; the map of the simulated counts beside it has all."""
 
 _TITLES = {"reversals": "simulated", "reversals_predicted": "predicted (Takano 2011)"}
+_SMALL_TITLES = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
 
 
 def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Figure:
@@ -60,7 +61,7 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) 
             axes = figure.add_subplot(place, sharex=first, sharey=first)
             first = first or axes
             entries |= _map(axes, chosen, name, panels.across, scale, small=columns > _SMALL)
-            axes.set_title(_title(panels, name, panel), fontsize=9)
+            axes.set_title(_title(panels, name, panel, small=columns > _SMALL), fontsize=9)
             _label_axes(axes, panels, left=i == 0, lowest=k + groups >= len(panels.each))
     _legend(figure, panels, entries)
     return figure
@@ -136,11 +137,15 @@ def _flags_present(flags: xr.DataArray) -> list[int]:
     return [int(value) for value in np.unique(flags)]
 
 
-def _title(panels: Panels, name: str, panel: dict[str, int]) -> str:
-    words = _TITLES.get(name, labels.words(panels.dataset, name)) if len(panels.names) > 1 else ""
-    if not words and not panel:
-        words = labels.words(panels.dataset, name)
-    return ", ".join(filter(None, [words, title(panels.dataset, panel)]))
+def _title(panels: Panels, name: str, panel: dict[str, int], *, small: bool) -> str:
+    """What a map shows; a small one beside others leaves the values of its panel to the first of them."""
+    words = labels.words(panels.dataset, name)
+    if len(panels.names) > 1:
+        words = _SMALL_TITLES.get(name, words) if small else _TITLES.get(name, words)
+    elif panel:
+        words = ""  # it stands at the bar or in the legend
+    where = title(panels.dataset, panel) if not small or name == panels.names[0] else ""
+    return ", ".join(filter(None, [words, where]))
 
 
 def _label_axes(axes: Axes, panels: Panels, *, left: bool, lowest: bool) -> None:

@@ -53,7 +53,7 @@ def choose(
     ValueError
         if there is no such variable or axis, or there would be too many panels.
     """
-    dataset = select(dataset, sel or {})
+    dataset = dataset.isel(_nearest(dataset, sel or {}))
     names = _variables(dataset, variable)
     dims = [str(d) for d in field(dataset, names[0]).dims]
     for option, name in (("x", x), ("y", y)):
@@ -71,16 +71,22 @@ def choose(
     return Panels(dataset, names, across, list(indices(dataset, rest)))
 
 
-def select(dataset: xr.Dataset, sel: Mapping[str, float]) -> xr.Dataset:
-    """The part of a dataset at the values nearest to those of `sel`; `ValueError` where there is no such axis."""
+def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:
+    """For each axis of `sel`, its value nearest to the one asked for; `ValueError` where there is no such axis."""
+    return {name: float(dataset[name][i]) for name, i in _nearest(dataset, sel).items()}
+
+
+def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
+    """The places of these values along their axes."""
+    found = {}
     for name, wanted in sel.items():
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
             raise ValueError(f"sel: no axis {name}; allowed: {axes or 'none'}")
         if not math.isfinite(wanted):
             raise ValueError(f"sel: {name} = {wanted}; allowed: a finite number")
-        dataset = dataset.isel({name: int(np.abs(dataset[name].values - wanted).argmin())})
-    return dataset
+        found[name] = int(np.abs(dataset[name].values - wanted).argmin())
+    return found
 
 
 def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import xarray as xr
@@ -18,7 +19,9 @@ from sweep.results.writing import replacing
 FORMATS = ("png", "pdf", "svg")
 """Formats that a figure can be saved in, each named by the suffix of the file."""
 
-_NO_DATE = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
+ALLOWED = f"a file that ends in .{', .'.join(FORMATS)}"
+
+_NO_DATE: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _DPI = 110
 
 
@@ -58,8 +61,8 @@ def plot(
     StoreError
         if the file is not a dataset, or `output` cannot be written.
     """
-    if output is not None:
-        check_format(Path(output))
+    if output is not None and suffix(Path(output)) not in FORMATS:
+        raise ValueError(f"output: {output}: unknown format; allowed: {ALLOWED}")
     if not isinstance(dataset, xr.Dataset):
         dataset = open_dataset(Path(dataset))
     figure = draw(dataset, variable, x=x, y=y, sel=sel, limits=limits, cmap=cmap)
@@ -93,16 +96,14 @@ def draw(
     return maps.draw(chosen, limits, cmap) if len(chosen.across) == 2 else curves.draw(chosen, limits)
 
 
-def check_format(path: Path) -> str:
-    """The format that a file's suffix names; `ValueError` if there is none of that name."""
-    if (suffix := path.suffix.removeprefix(".").lower()) not in FORMATS:
-        raise ValueError(f"{path}: unknown format; allowed: a file that ends in .{', .'.join(FORMATS)}")
-    return suffix
+def suffix(path: Path) -> str:
+    """The format that a file's suffix names."""
+    return path.suffix.removeprefix(".").lower()
 
 
 def save(figure: Figure, path: Path) -> None:
     """Write a figure in the format that the suffix names; the same figure gives the same bytes."""
-    suffix = check_format(path)
+    form = suffix(path)
     with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": "sweep"}):
-        dpi = _DPI if suffix == "png" else 2 * _DPI
-        figure.savefig(temporary, format=suffix, dpi=dpi, metadata=_NO_DATE[suffix])
+        dpi = _DPI if form == "png" else 2 * _DPI
+        figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE[form])

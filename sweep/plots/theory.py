@@ -171,5 +171,6 @@ def _crossings(dataset: xr.Dataset, values: xr.DataArray, x: str, side: str) -> 
     at = dataset[x].values
     beyond = np.broadcast_to(dataset["n0"].values, at.shape) - np.broadcast_to(values.values, at.shape)
     beyond = beyond if side == "plus" else -beyond
-    k = np.flatnonzero(beyond[1:] * beyond[:-1] < 0)
+    known = np.isfinite(beyond)
+    k = np.flatnonzero(((beyond[1:] < 0) != (beyond[:-1] < 0)) & known[1:] & known[:-1])
     return [float(v) for v in at[k] + (at[k + 1] - at[k]) * beyond[k] / (beyond[k] - beyond[k + 1])]

@@ -35,6 +35,9 @@ _MOST_ENTRIES = 12
 _SHADES = (0.55, 1.0)
 """Opacity of the first and of the second series of a panel."""
 
+_CRITICAL = {"n_c1": ":", "n_c2": "--"}
+"""Styles of the critical spins, none of them that of a curve."""
+
 
 def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     """The spin with its reversals and critical values over time, and below it whatever else the dataset has.
@@ -55,7 +58,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and variable is None]
     rows = -(-len(panels) // 2)
     figure = Figure(figsize=(11, 4.2 + 1.9 * rows), dpi=110, layout="constrained")
-    figure.suptitle(heading(dataset), fontsize=10)
+    figure.suptitle(heading(_constants_apart(dataset)), fontsize=10)
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
@@ -94,9 +97,12 @@ def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist
 def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Artist]:
     """Draw series of all trajectories, in their colours; returns the entries of the trajectories for the legend."""
     entries: list[Artist] = []
+    # Oscillations are so dense that an opaque curve would hide those below it.
+    alone = dataset.sizes["trajectory"] == 1 or "spin" in names
+    shades = _SHADES if len(names) > 1 else (1.0 if alone else 0.7,)
     for i in range(dataset.sizes["trajectory"]):
         one = dataset.isel(trajectory=i)
-        for shade, name in zip(_SHADES[-len(names) :], names, strict=True):
+        for shade, name in zip(shades, names, strict=True):
             (line,) = axes.plot(one["time"], one[name], linewidth=0.8, color=f"C{i}", alpha=shade)
             line.set(label=_label(dataset, i), gid=name, rasterized=one.sizes[one[name].dims[0]] > 5000)
         if i < _MOST_ENTRIES:
@@ -104,8 +110,8 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
     if (more := dataset.sizes["trajectory"] - _MOST_ENTRIES) > 0:
         entries.append(Line2D([], [], linestyle="none", label=f"and {more} more"))
     if len(names) > 1:
-        shades = zip(_SHADES, names.values(), strict=True)
-        styles = [Line2D([], [], color="black", alpha=shade, label=words) for shade, words in shades]
+        named = zip(shades, names.values(), strict=True)
+        styles = [Line2D([], [], color="black", alpha=shade, label=words) for shade, words in named]
         axes.legend(
             handles=styles, fontsize=7, ncols=2, frameon=False, loc="lower right", bbox_to_anchor=(1, 0.98),
             borderaxespad=0.2,
@@ -123,7 +129,7 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
         one = dataset.isel(trajectory=i)
         found = [v for name in ("n_c1", "n_c2") for _, v, _ in theory.critical_spins(one, name)]
         bodies.setdefault(tuple(map(float, found)), i)
-    entries: dict[str, Artist] = {}
+    entries: dict[str, Line2D] = {}
     written: list[float] = []
     low, high = axes.get_ylim()
     for i in bodies.values():
@@ -132,8 +138,9 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
             for side, value, source in theory.critical_spins(dataset.isel(trajectory=i), name):
                 if not np.isfinite(at := float(value)):
                     continue
-                axes.axhline(at, color=colour, linestyle=theory.STYLES[name], linewidth=0.9, gid=name)
+                axes.axhline(at, color=colour, linestyle=_CRITICAL[name], linewidth=0.9, gid=name)
                 entries[name] = theory.entry(name, source, over_n0=True, spin="n")
+                entries[name].set(linestyle=_CRITICAL[name], linewidth=0.9)
                 if all(abs(at - other) > 0.04 * (high - low) for other in written):
                     axes.annotate(
                         theory.symbol(name, side), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
@@ -166,4 +173,10 @@ def _label(dataset: xr.Dataset, i: int) -> str:
 
 
 def _with_unit(words: str, unit: str) -> str:
-    return f"{words} ({unit})".strip() if unit else words
+    return f"{words} ({unit})" if words and unit else words or unit
+
+
+def _constants_apart(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with the parameters that all trajectories share as scalar coordinates."""
+    shared = {n: dataset[n][0] for n in PARAMETERS if n in dataset and len(set(np.ravel(dataset[n].values))) == 1}
+    return dataset.drop_vars(list(shared)).assign_coords({n: v.drop_vars("trajectory") for n, v in shared.items()})

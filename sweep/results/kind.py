@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import xarray as xr
 
+from sweep.results.dataset import VARIABLES
+
 RUN, TRAJECTORY, CRITICAL = "a run", "single trajectories", "critical spins"
 
 
 def kind(dataset: xr.Dataset) -> str | None:
     """Which of the three, told by the variables alone; None if it is of another program.
 
-    The predictions of a sweep count as a run, which they are part of.
+    Predictions count as a run, and so does a part of one.
     """
-    if {"spin", "t_stop"} <= set(dataset.data_vars) and "trajectory" in dataset.dims:
+    if {"spin", "time", "t_stop"} <= set(dataset.variables) and "trajectory" in dataset.dims:
         return TRAJECTORY
     if "critical_reason" in dataset:
         return CRITICAL
-    return RUN if {"status", "form_factor"} & set(dataset.data_vars) else None
+    return RUN if set(VARIABLES) & set(dataset.data_vars) else None
