@@ -23,7 +23,7 @@ _SOURCES = {
 }
 """Where a critical spin comes from: the full model if the dataset has it, else the formula of Takano (2011)."""
 
-_WORDS = {"n_c1": "a tiny rattle grows", "n_c2": "the spin reverses"}
+WORDS = {"n_c1": "a tiny rattle grows", "n_c2": "the spin reverses"}
 STYLES: dict[str, Any] = {"n_c1": (0, (1.5, 1.5)), "n_c2": "-", "best": (0, (6, 3))}
 
 _LINE: dict[str, Any] = {"color": "black", "linewidth": 1.2}
@@ -56,8 +56,8 @@ def draw(axes: Axes, dataset: xr.Dataset, across: tuple[str, str], *, labelled: 
 def entry(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> Line2D:
     """The entry of a legend for n_c1 or n_c2, on figures over the spin or over other parameters."""
     if over_n0:
-        return handle(name, f"n$_{{{name[2:]}}}$ ({source}): {_WORDS[name]} where |{spin}| is larger")
-    return handle(name, f"{spin} = n$_{{{name[2:]}}}$ ({source}): {_WORDS[name]} where that is smaller")
+        return handle(name, f"n$_{{{name[2:]}}}$ ({source}): {WORDS[name]} where |{spin}| is larger")
+    return handle(name, f"{spin} = n$_{{{name[2:]}}}$ ({source}): {WORDS[name]} where that is smaller")
 
 
 def symbol(name: str, side: str) -> str:

@@ -178,5 +178,6 @@ def _with_unit(words: str, unit: str) -> str:
 
 def _constants_apart(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the parameters that all trajectories share as scalar coordinates."""
-    shared = {n: dataset[n][0] for n in PARAMETERS if n in dataset and len(set(np.ravel(dataset[n].values))) == 1}
-    return dataset.drop_vars(list(shared)).assign_coords({n: v.drop_vars("trajectory") for n, v in shared.items()})
+    values = {name: set(np.ravel(dataset[name].values)) for name in PARAMETERS if name in dataset}
+    shared = {name: float(found.pop()) for name, found in values.items() if len(found) == 1}
+    return dataset.drop_vars(list(shared)).assign_coords(shared)
