@@ -136,14 +136,17 @@ def _contour(
 
 def _label(axes: Axes, points: Array, name: str, side: str, across: tuple[str, str]) -> None:
     """The symbol of a critical spin beside its line, on the side of the larger spins or on the roomier one."""
-    x, y = points[int((0.2 if name == "n_c1" else 0.6) * (len(points) - 1))]
+    place_on_map = axes.transData + axes.transAxes.inverted()
+    if name == "n_c1":  # the lines are farthest apart at the ends nearer the middle
+        x, y = min(points[[0, -1]], key=lambda point: float(np.hypot(*(place_on_map.transform(point) - 0.5))))
+    else:
+        x, y = points[int(0.6 * (len(points) - 1))]
     outwards = 1 if side == "plus" else -1
     if across[0] == "n0":
         place: dict[str, Any] = {"xytext": (0, 4 * outwards), "ha": "center", "va": "bottom" if outwards > 0 else "top"}
     else:
         if across[1] != "n0":
-            share, _ = axes.transAxes.inverted().transform(axes.transData.transform((x, y)))
-            outwards = 1 if share < 0.5 else -1
+            outwards = 1 if place_on_map.transform((x, y))[0] < 0.5 else -1
         place = {"xytext": (4 * outwards, 0), "ha": "left" if outwards > 0 else "right", "va": "center"}
     axes.annotate(symbol(name, side), (x, y), textcoords="offset points", fontsize=9, path_effects=_halo(2), **place)
 
