@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from sweep.config import Config, ConfigError, ConfigLike, load_config
     from sweep.engine.cluster import Cluster
     from sweep.engine.reporter import Reporter
+    from sweep.plots.picture import plot
     from sweep.results.store import StoreError
     from sweep.studies.predictions import predict
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "critical", "load_config", "open", "predict", "run", "trajectory",
+    "Config", "ConfigError", "StoreError", "critical", "load_config", "open", "plot", "predict", "run",
+    "trajectory",
 ]  # fmt: skip
 
 _HOMES = {
@@ -30,6 +32,7 @@ _HOMES = {
     "ConfigError": "sweep.config",
     "StoreError": "sweep.results.store",
     "load_config": "sweep.config",
+    "plot": "sweep.plots.picture",
     "predict": "sweep.studies.predictions",
 }
 """The modules that define the names which are not defined here."""
@@ -140,7 +143,7 @@ def trajectory(
 
     Returns
     -------
-    Dataset over (trajectory, sample): `time` and the series that the model can show, NaN after the end of a
+    Dataset over (trajectory, time): the series that the model can show, NaN after the end of a
     trajectory.  Over (trajectory): all that a sweep gives for the cell, from the very same steps, which the sampling
     does not change.
 

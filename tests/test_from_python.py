@@ -114,6 +114,11 @@ def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name(mu: Any, said: str) 
         sweep.trajectory(SAID, mu=mu)
 
 
+def test_a_cell_has_no_parameter_that_its_model_lacks() -> None:
+    with pytest.raises(ConfigError, match=r"^mu: no parameter of the noslip model; allowed: a, b"):
+        sweep.trajectory({"model": "noslip"}, mu=60)
+
+
 def test_faults_come_in_the_order_of_lines(write: Write) -> None:
     text = "colour: red\nintegrator: {t_end: -1}\nstart: {n0: x}\nmeasure: [spin]\nfriction: {nu: 3}\nbody: {a: 0}\n"
     with pytest.raises(ConfigError) as refusal:

@@ -41,7 +41,7 @@ class Violation(AssertionError):
     """An input that was neither accepted nor properly refused."""
 
 
-PHRASES = ("input should", "should be", "valid ", "pydantic", "instance of", "field required", "extra inputs")
+PHRASES = ("input should", "should be", "a valid ", "pydantic", "instance of", "field required", "extra inputs")
 """Words of pydantic's."""
 
 
