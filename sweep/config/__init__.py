@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from sweep.config import cases, document, schema
-from sweep.config.faults import ConfigError, Fault, brief
+from sweep.config.faults import ConfigError, Fault
+from sweep.config.messages import describe
+from sweep.config.plain import plain
 from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.kernels import measures, methods
@@ -22,48 +26,65 @@ from sweep.models import MODELS, TIERS
 from sweep.models.model import Model, Tier
 from sweep.parameters import PARAMETERS
 
-__all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "as_config", "load_config"]
+__all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
+
+ConfigLike = Config | Mapping[str, Any] | str | os.PathLike[str]
+"""What stands for a configuration: itself, what its file says, or the path of that file."""
 
 
-def as_config(config: Config | str | Path, overrides: Mapping[str, Any] | None = None) -> Config:
-    """`config` itself, or the one read from the file at this path, with `overrides` as `load_config` takes them."""
-    if isinstance(config, Config):
-        if overrides:
-            raise TypeError("overrides need the path of a configuration: a Config cannot be changed")
-        return config
-    return load_config(config, overrides)
-
-
-def load_config(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Config:
+def load_config(
+    config: ConfigLike, overrides: Mapping[str, Any] | None = None, *, argument: Callable[[str], str] = str
+) -> Config:
     """Read and check a configuration.
 
     Parameters
     ----------
-    path : YAML file
-    overrides : values that replace the file's, by path ("friction.mu") or, for a parameter or a
-        setting of the integrator, by its bare name ("mu")
+    config : path of a YAML file, what such a file says as a mapping, or a configuration.  An axis of a mapping may be
+        a list, tuple, range, NumPy array or `xarray.DataArray`
+    overrides : values that replace those of `config`, by path ("friction.mu") or, for a parameter or a setting of the
+        integrator, by bare name ("mu")
+    argument : what faults call the override of this key
 
     Raises
     ------
     ConfigError
         with a `Fault` for each thing that is wrong.
     """
-    source = document.read(Path(path))
+    if isinstance(config, Config) and not overrides:
+        return config
+    source = _source(config)
     for key, value in (overrides or {}).items():
-        plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-        source.set(_full_path(key), plain, f"--set {brief(key)}")
+        source.set(_full_path(key), plain(value), argument(key))
     # A name made from the file's must not be refused, since the user did not choose it.
-    stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(path).stem).lstrip("._-")[:100]
+    stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")
     try:
         checked = schema.Schema.model_validate(source.values)
     except ValidationError as error:
-        faults = [schema.describe(e) for e in error.errors()]
-        raise ConfigError([source.fault(path, text, at_key=key) for path, text, key in faults]) from None
-    return _resolve(checked, source)
+        found = describe(error.errors(), schema.Schema)
+        raise ConfigError([source.fault(path, text, at_key=key) for path, text, key in found]) from None
+    resolved = _resolve(checked, source)
+    object.__setattr__(resolved, "source", source)
+    return resolved
+
+
+def _source(config: ConfigLike) -> document.Document:
+    """The document of a configuration, to be changed freely."""
+    if isinstance(config, Config):
+        if config.source:
+            return deepcopy(config.source)
+        values, table = config.document(), None
+        if config.cases is not None:
+            table = config.cases_file or "cases", config.cases
+            values["cases"] = table[0]
+        return document.Document("", values, table=table)
+    if isinstance(config, Mapping):
+        return document.Document("", plain(config))
+    return document.read(Path(config))
 
 
 def _full_path(key: str) -> tuple[str, ...]:
+    """Where the value of an override belongs."""
     if key in PARAMETERS:
         return PARAMETERS[key].section, key
     return ("integrator", key) if key in Integrator.model_fields else tuple(key.split("."))
@@ -79,7 +100,7 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         if section in {p.section for p in PARAMETERS.values()}
         for key in keys
     }
-    columns = cases.read(source, checked.cases) if checked.cases is not None else None
+    columns = _table(checked.cases, source) if checked.cases is not None else None
     faults = list(_misfits(checked, given, columns, source))
     order = sorted(model.parameters, key=lambda n: (_rank(n, schema.FIRST_AXES), _rank(n, tuple(given))))
     parameters = {}
@@ -114,6 +135,13 @@ def _resolve(checked: Any, source: document.Document) -> Config:
     if checked.verify is None and config.integrator.method == methods.AUTO and not config.refine:
         return replace(config, verify=schema.VERIFIED if Grid.of(config).size * schema.VERIFIED >= 1 else 0.0)
     return config
+
+
+def _table(name: str, source: document.Document) -> dict[str, tuple[float, ...]]:
+    """The columns of the table of cases, which is read once for all that is made from `source`."""
+    if not source.table or source.table[0] != name:
+        source.table = name, cases.read(source, name)
+    return source.table[1]
 
 
 def _too_large(config: Config) -> str:

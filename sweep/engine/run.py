@@ -11,12 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, as_config
+from sweep.config import Config
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.earlier import RERUN, Earlier, reason_against, taken_over
@@ -31,7 +29,7 @@ from sweep.results.identity import Identity, not_resumed
 from sweep.results.memory import Memory
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
-from sweep.results.store import Store, StoreError
+from sweep.results.store import Running, Store, StoreError
 
 LARGE = 2_000_000
 """Cells of the largest dataset that is loaded into memory unasked."""
@@ -43,44 +41,15 @@ def tile_size(cells: int) -> int:
 
 
 def run(
-    config: Config | str | Path,
+    config: Config,
     output: str | Path | None = None,
     *,
     fresh: bool = False,
     rerun: str | None = None,
     reporter: Reporter | None = None,
     cluster: Cluster | None = None,
-    **overrides: Any,
 ) -> xr.Dataset:
-    """Run a sweep.
-
-    If `output` holds the dataset of a smaller run, of fewer cells or to an earlier `t_end`, only what it lacks is
-    simulated.  The dataset is the same, bit for bit, as that of a run of all cells at once.
-
-    Parameters
-    ----------
-    config : a configuration or the path of one
-    output : folder for the dataset and its maps; until they are finished it holds a checkpoint, from
-        which the same call resumes.  By default nothing is written
-    fresh : discard what an earlier run left in `output`
-    rerun : "failed" or "limit": simulate again just those cells of the dataset in `output` that failed, or that
-        reached the time limit, with the settings of the integrator as they are now; the others stay as they are
-    reporter : receives progress and messages; by default there are none
-    cluster : processes to run the cells in; by default the threads of this one
-    overrides : values that replace those of the file, such as ``mu=60`` or ``t_end=1000``
-
-    Returns
-    -------
-    Dataset over the axes of the configuration; the `long_name` of a variable says what it means.
-    If `output` is given and there are more than `LARGE` cells, values are read from the file when
-    they are asked for.
-
-    Raises
-    ------
-    ConfigError, StoreError
-        if the configuration, or what `output` holds, cannot be used.
-    """
-    config = as_config(config, overrides)
+    """As `sweep.api.run`, of a checked configuration."""
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun {rerun!r}; allowed: {', '.join(RERUN)}")
     reporter = reporter or Reporter()
@@ -126,8 +95,7 @@ def _earlier(config: Config, identity: Identity, files: RunFiles, rerun: str | N
 def _compute(
     config: Config, store: Store, reporter: Reporter, cluster: Cluster | None, earlier: Earlier | None = None
 ) -> Whole | Refined | Enlarged:
-    if store.done or store.load_running():
-        reporter.note(f"resuming an earlier run, which finished {len(store.done)} tiles")
+    running = store.load_running()
     result: Whole | Refined | Enlarged
     if earlier:
         reporter.note(earlier.words)
@@ -137,8 +105,18 @@ def _compute(
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
     count = Count(reporter)
     while result.grow(tile_size):
+        if not count.cells and (store.done or running):
+            reporter.note(_kept(result, store, running))
         _run_tiles(result.simulated(), result.tiles, store, count, cluster)
     return result
+
+
+def _kept(result: Whole | Refined | Enlarged, store: Store, running: Running | None) -> str:
+    """What an earlier run left."""
+    grid = Grid.of(result.simulated())
+    finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
+    more = f", {sum(map(len, running.tables.values()))} under way" if running else ""
+    return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 
 
 def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count, cluster: Cluster | None) -> None:
