@@ -137,10 +137,14 @@ def _contour(
 def _label(axes: Axes, points: Array, name: str, side: str, across: tuple[str, str]) -> None:
     """The symbol of a critical spin beside its line, on the side of the larger spins or on the roomier one."""
     place_on_map = axes.transData + axes.transAxes.inverted()
-    if name == "n_c1":  # the lines are farthest apart at the ends nearer the middle
-        x, y = min(points[[0, -1]], key=lambda point: float(np.hypot(*(place_on_map.transform(point) - 0.5))))
+    last = len(points) - 1
+    if name == "n_c1":  # the lines are farthest apart near the ends that are closer to the middle
+        x, y = min(
+            points[[last // 8, last - last // 8]],
+            key=lambda point: float(np.hypot(*(place_on_map.transform(point) - 0.5))),
+        )
     else:
-        x, y = points[int(0.6 * (len(points) - 1))]
+        x, y = points[int(0.6 * last)]
     outwards = 1 if side == "plus" else -1
     if across[0] == "n0":
         place: dict[str, Any] = {"xytext": (0, 4 * outwards), "ha": "center", "va": "bottom" if outwards > 0 else "top"}
