@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config
+from sweep.config import Config, ConfigLike, load_config
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.earlier import RERUN, Earlier, reason_against, taken_over
@@ -41,15 +43,17 @@ def tile_size(cells: int) -> int:
 
 
 def run(
-    config: Config,
+    config: ConfigLike,
     output: str | Path | None = None,
     *,
     fresh: bool = False,
     rerun: str | None = None,
     reporter: Reporter | None = None,
     cluster: Cluster | None = None,
+    **overrides: Any,
 ) -> xr.Dataset:
-    """As `sweep.api.run`, of a checked configuration."""
+    """As `sweep.api.run`; what there is to tell goes to `reporter` alone."""
+    config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun {rerun!r}; allowed: {', '.join(RERUN)}")
     reporter = reporter or Reporter()
