@@ -6,6 +6,7 @@ at once.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -271,6 +272,32 @@ def info(file: Path) -> None:
         with _about(file):
             text = "\n".join([str(dataset.attrs.get("title", file.name)), summarize(dataset), contents(dataset)])
         _say(text)
+
+
+@main.command()
+@FILE
+@click.option("--port", type=click.IntRange(1, 65535), help="Port of the page [default: the first free from 5006].")
+@click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
+def explore(file: Path, port: int | None, no_browser: bool) -> None:
+    """Explore the maps of a dataset in the browser.
+
+    A click on a cell runs its trajectory.  The page is served to this machine alone, until Ctrl-C.
+    """
+    with _explained():
+        try:
+            from sweep.explore.server import serve
+        except ModuleNotFoundError as error:
+            if error.name not in ("bokeh", "tornado"):
+                raise
+            _refuse("explore", "needs Bokeh, which is not installed: pip install 'rattleback-sweep[explore]'")
+        from sweep.explore.slices import open_source
+
+        with _about(file):
+            source = open_source(file)
+        serve(source, port, browser=not no_browser, say=_say)
+        _say("stopped")
+        sys.stdout.flush()
+        os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it
 
 
 def _load(config: Path, settings: tuple[str, ...]) -> Config:
