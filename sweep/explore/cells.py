@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 import threading
 import time
@@ -125,7 +124,7 @@ def _interval(config: Config, reporter: Reporter | None) -> float | None:
     """The time between samples that keeps a long trajectory to `SAMPLES`; None where the usual one does."""
     if config.integrator.t_end <= SAMPLES / 2:
         return None
-    stop = float(trajectory(config, every=math.inf, reporter=reporter)["t_stop"][0])
+    stop = float(trajectory(config, every=config.integrator.t_end, reporter=reporter)["t_stop"][0])
     return None if stop <= SAMPLES / 2 else stop / SAMPLES
 
 
