@@ -17,7 +17,6 @@ from bokeh.models import (
     ColumnDataSource,
     CustomJS,
     Div,
-    InlineStyleSheet,
     RadioButtonGroup,
     Row,
     Select,
@@ -46,7 +45,7 @@ _BUTTONS = 6
 
 _COUNTS = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
 
-_BARE = InlineStyleSheet(css=":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }")
+_BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }"
 
 
 def escaped(text: str) -> str:
@@ -231,10 +230,10 @@ class CellControls:
         self._end.text = "<br>".join(told)
 
     def _row(self, k: int, activate: Callable[[int], None], remove: Callable[[int], None]) -> tuple[Row, Button]:
-        border = InlineStyleSheet(css=f".bk-btn {{ border-left: 8px solid {CURVES[k]} !important; text-align: left }}")
+        border = f".bk-btn {{ border-left: 8px solid {CURVES[k]} !important; text-align: left }}"
         button = Button(label="", sizing_mode="stretch_width", stylesheets=[border], name=f"cell {k + 1}")
         button.on_click(lambda: activate(k))
-        away = Button(label="×", width=36, name=f"remove {k + 1}", stylesheets=[_named(f"remove {k + 1}")])
+        away = Button(label="×", width=36, name=f"remove {k + 1}")
         away.on_click(lambda: remove(k))
         return Row(button, away, visible=False, sizing_mode="stretch_width"), button
 
@@ -265,10 +264,6 @@ def _step(axis: Axis | None) -> float:
     if axis is None or len(axis.values) < 2:
         return 0.01
     return float(10 ** np.floor(np.log10((axis.values[-1] - axis.values[0]) / 50)))
-
-
-def _named(name: str) -> InlineStyleSheet:
-    return InlineStyleSheet(css=f"/* {name} */")
 
 
 class Saving:

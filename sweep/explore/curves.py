@@ -183,7 +183,7 @@ def _figure(label: str, height: int, name: str) -> Any:
                     major_tick_line_color="#8a949e", minor_tick_line_color=None)  # fmt: skip
     if name == "spin":
         plot.add_layout(Legend(items=[], location="top_right", padding=4, spacing=0, label_text_font_size="11px",
-                               background_fill_alpha=0.8, border_line_color=None))  # fmt: skip
+                               background_fill_alpha=0.8, border_line_color=None, name="curve legend"))  # fmt: skip
     return plot
 
 

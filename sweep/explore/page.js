@@ -204,6 +204,10 @@ const sweep = (() => {
     history.replaceState(null, "", `?${query}`)
   }
 
+  function notice(text) {
+    document.querySelector("#notice").classList.toggle("silent", !text)
+  }
+
   function save(bytes, name, type) {
     const link = document.createElement("a")
     link.href = URL.createObjectURL(new Blob([bytes], {type}))
@@ -246,5 +250,5 @@ const sweep = (() => {
 
   document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
 
-  return {address, copy, cell, moment, paint, picture, play, point, repaint, save, tap, use}
+  return {address, copy, cell, moment, notice, paint, picture, play, point, repaint, save, tap, use}
 })()

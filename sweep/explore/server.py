@@ -50,6 +50,7 @@ def start(source: Source, port: int | None, loop: IOLoop) -> tuple[BaseServer, i
     """A server on `ADDRESS` that takes requests as soon as the loop runs, and its port."""
     # Its advice to name an option of Bokeh's own command helps nobody here; the browser is refused all the same.
     logging.getLogger("bokeh.server.views.ws").setLevel(logging.CRITICAL)
+    logging.getLogger("tornado.access").setLevel(logging.ERROR)
     sockets, found = _bind(port)
     hosts = [f"{host}:{found}" for host in ("localhost", ADDRESS)]
     application = Application(FunctionHandler(view.make(source, Runner())))
@@ -67,4 +68,4 @@ def _bind(port: int | None) -> tuple[list[Any], int]:
             return bind_sockets(ADDRESS, each)  # type: ignore[no-any-return]
         except OSError as error:
             last = error
-    raise OSError(last.errno, f"port {port or f'{FIRST_PORT} to {LAST_PORT}'}: {last.strerror}")
+    raise OSError(last.errno, last.strerror, f"port {port or f'{FIRST_PORT} to {LAST_PORT}'}")

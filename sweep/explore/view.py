@@ -65,8 +65,10 @@ class View:
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._cell = Div(sizing_mode="stretch_width", name="cell")
         self._notice = Div(name="notice", styles={"color": "white"})
-        code = "document.querySelector('#notice').classList.toggle('silent', !cb_obj.text)"
-        self._notice.js_on_change("text", CustomJS(code=code))
+        self._notice.js_on_change("text", CustomJS(code="sweep.notice(cb_obj.text)"))
+        args = {"address": self._address, "notice": self._notice}
+        code = "sweep.address(address.data.query[0]); sweep.notice(notice.text)"
+        self._document.js_on_event("document_ready", CustomJS(args=args, code=code))
         self._figures = Curves()
         self._controls = controls.MapControls(self._source, self._change)
         self._chosen = controls.CellControls(self._source, self._base, self._edit, self._activate, self._remove)
@@ -79,11 +81,8 @@ class View:
             self._source, lambda: self._netcdf(), self._yaml if self._setup else None,
             [self._figures.spin, self._figures.energy, self._figures.path],
         )  # fmt: skip
-        save = self._saving.root
-        # The address travels with a root, so that its callback is there from the first moment.
-        save.tags = [self._address]
         for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, path,
-                     self._chosen.root, save):  # fmt: skip
+                     self._chosen.root, self._saving.root):  # fmt: skip
             self._document.add_root(root)
         page.dress(self._document, self._source, live=True)
 
