@@ -20,6 +20,8 @@ from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from sweep.config import Config
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
@@ -238,22 +240,42 @@ def bench(output: Path) -> None:
 
 @main.command()
 @FILE
-@click.option("--var", "variable", help="Variable to draw [default: reversals, simulated beside predicted].")
-@click.option("--output", type=_PATH, help="PNG file [default: beside FILE].")
-def plot(file: Path, variable: str | None, output: Path | None) -> None:
-    """Draw the maps of a dataset again."""
+@click.option(
+    "--var", "variable", help="Variable to draw [default: reversals, simulated and predicted, and their difference]."
+)
+@click.option("--x", help="Axis drawn across.")
+@click.option("--y", help="Axis drawn upwards.")
+@click.option("--sel", "cells", multiple=True, metavar="NAME=VALUE",
+              help="Draw only the value of an axis nearest to this one, e.g. n0=0.05 (repeatable).")  # fmt: skip
+@click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
+@click.option("--cmap", metavar="NAME", help="A colour map of matplotlib.")
+@click.option(
+    "--output",
+    type=_PATH,
+    help="Picture to write; its suffix names the format: png, pdf or svg [default: a PNG beside FILE].",
+)
+def plot(
+    file: Path, variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...], limits: str | None,
+    cmap: str | None, output: Path | None,
+) -> None:  # fmt: skip
+    """Draw a dataset: maps or curves of a run, single trajectories, or critical spins."""
     with _explained():
-        from sweep.plots import picture
-        from sweep.results.netcdf import open_dataset
-        from sweep.results.writing import replacing
+        sel = dict(_parse_pair(cell, "--sel") for cell in cells)
+        span = _parse_span(limits, "--limits") if limits is not None else None
+        from sweep.plots import panels, picture
 
         interrupt.raise_again()
-        dataset = open_dataset(file)
+        target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
+        if picture.suffix(target) == "html":
+            _plot_page(file, target, variable, x, y, sel, limits, cmap)
+            return
+        if picture.suffix(target) not in picture.FORMATS:
+            _refuse(f"--output {target}", f"unknown format; allowed: {picture.ALLOWED}, .html")
+        dataset = _open(file)
         with _about(file):
-            figure = picture.draw(dataset, variable)
-            target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
-            with replacing(target) as temporary:
-                figure.savefig(temporary, format="png")
+            for name, taken in panels.nearest(dataset, sel).items():
+                _say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
+            picture.plot(dataset, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, output=target)
         _say(f"wrote {target}")
 
 
@@ -262,15 +284,11 @@ def plot(file: Path, variable: str | None, output: Path | None) -> None:
 def info(file: Path) -> None:
     """Show what is in a dataset: axes, counts by status, agreement with the prediction, provenance."""
     with _explained():
-        from sweep.results.netcdf import open_dataset
-        from sweep.results.store import StoreError
-        from sweep.results.summary import contents, summarize
+        from sweep.results.summary import contents, describe
 
-        dataset = open_dataset(file)
-        if "status" not in dataset:
-            raise StoreError(f"{file}: not a dataset of sweep: no variable status")
+        dataset = _open(file)
         with _about(file):
-            text = "\n".join([str(dataset.attrs.get("title", file.name)), summarize(dataset), contents(dataset)])
+            text = "\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)])
         _say(text)
 
 
@@ -284,12 +302,8 @@ def explore(file: Path, port: int | None, no_browser: bool) -> None:
     A click on a cell runs its trajectory.  The page is served to this machine alone, until Ctrl-C.
     """
     with _explained():
-        try:
+        with _needs_bokeh("explore"):
             from sweep.explore.server import serve
-        except ModuleNotFoundError as error:
-            if error.name not in ("bokeh", "tornado"):
-                raise
-            _refuse("explore", "needs Bokeh, which is not installed: pip install 'rattleback-sweep[explore]'")
         from sweep.explore.slices import open_source
 
         with _about(file):
@@ -298,6 +312,44 @@ def explore(file: Path, port: int | None, no_browser: bool) -> None:
         _say("stopped")
         sys.stdout.flush()
         os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it
+
+
+def _plot_page(
+    file: Path, target: Path, variable: str | None, x: str | None, y: str | None, sel: dict[str, float],
+    limits: str | None, cmap: str | None,
+) -> None:  # fmt: skip
+    """Draw a map as a page of its own."""
+    with _needs_bokeh("--output"):
+        from sweep.explore.page import save_html
+    for option, value in (("--limits", limits), ("--cmap", cmap)):
+        if value is not None:
+            _refuse(option, "not for a page; allowed: with a png, pdf or svg")
+    with _about(file):
+        save_html(_open(file), target, variable, x, y, sel)
+    _say(f"wrote {target}")
+
+
+@contextmanager
+def _needs_bokeh(what: str) -> Iterator[None]:
+    """Make a missing Bokeh a fault that tells how to install it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name not in ("bokeh", "tornado"):
+            raise
+        _refuse(what, "needs Bokeh, which is not installed: pip install 'rattleback-sweep[explore]'")
+
+
+def _open(file: Path) -> xr.Dataset:
+    """The dataset of a command, of whatever kind."""
+    from sweep.results.kind import kind
+    from sweep.results.netcdf import open_dataset
+    from sweep.results.store import StoreError
+
+    dataset = open_dataset(file)
+    if kind(dataset) is None:
+        raise StoreError(f"{file}: not a dataset of sweep: no variable of it, such as status")
+    return dataset
 
 
 def _load(config: Path, settings: tuple[str, ...]) -> Config:
@@ -323,6 +375,17 @@ def _parse_pair(text: str, option: str) -> tuple[str, float]:
     if (parsed := number(value)) is None:
         _refuse(f"{option} {brief(text)}", "allowed: NAME=NUMBER")
     return name, parsed
+
+
+def _parse_span(text: str, option: str) -> tuple[float, float]:
+    from sweep.config.document import number
+    from sweep.config.faults import brief
+
+    low, dots, high = text.partition("..")
+    ends = number(low), number(high)
+    if not dots or ends[0] is None or ends[1] is None or not ends[0] < ends[1]:
+        _refuse(f"{option} {brief(text)}", "allowed: LOW..HIGH, two numbers, the lower one first")
+    return ends[0], ends[1]
 
 
 def _refuse(option: str, message: str, *path: str) -> NoReturn:

@@ -110,7 +110,7 @@ class MapControls:
             event = "active" if isinstance(control, RadioButtonGroup) else "value_throttled"
             on(control, event, partial(self._moved, name))
         groups = [
-            _titled("variable", Row(self._count, self._other, styles={"gap": "6px"})),
+            _titled("variable", Row(self._count, self._other, styles={"gap": "6px", "flex-wrap": "wrap"})),
             self._x, self._y,
             *(_titled(source.words(d), c) if isinstance(c, RadioButtonGroup) else c for d, c in self._rest.items()),
         ]  # fmt: skip
@@ -267,33 +267,28 @@ def _step(axis: Axis | None) -> float:
 
 
 class Saving:
-    """Buttons that save what is seen."""
+    """Buttons that save what is seen: the map in the column `plots`, and the other figures."""
 
     def __init__(
-        self, source: Source, netcdf: Callable[[], bytes], yaml: Callable[[], bytes] | None, figures: Sequence[Any]
-    ) -> None:
+        self, source: Source, netcdf: Callable[[], bytes], yaml: Callable[[], bytes] | None, plots: Column,
+        figures: Sequence[Any],
+    ) -> None:  # fmt: skip
         # What a name may be in a configuration, whatever the title of the dataset is.
         words = re.sub(r"[^A-Za-z0-9_-]", "", str(source.dataset.attrs.get("title", "")).split(":")[0])
         self.stem = f"{words or 'sweep'}_explored"
-        self._figures = list(figures)
         self._file = ColumnDataSource({"bytes": [], "name": [], "type": []}, name="file")
         code = "if (cb_obj.data.name.length) sweep.save(cb_obj.data.bytes[0], cb_obj.data.name[0], cb_obj.data.type[0])"
         self._file.js_on_change("data", CustomJS(code=code))
-        self._png = Button(label="PNG", name="png", width=64)
+        png = Button(label="PNG", name="png", width=64)
+        args = {"plots": plots, "figures": list(figures), "name": f"{self.stem}.png"}
+        png.js_on_click(CustomJS(args=args, code="sweep.picture([...plots.children, ...figures], name)"))
         link = Button(label="Copy link", name="link", width=92)
         link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
-        buttons = [link, self._png, self._button("netCDF", f"{self.stem}.nc", "application/x-netcdf", netcdf)]
+        buttons = [link, png, self._button("netCDF", f"{self.stem}.nc", "application/x-netcdf", netcdf)]
         if yaml:
             buttons.append(self._button("YAML", f"{self.stem}.yaml", "application/yaml", yaml))
-        self._link = link
         link.tags = [self._file]
         self.root = Row(*buttons, name="save")
-
-    def use(self, plot: Any) -> None:
-        """Let the picture show this map."""
-        self._png.js_event_callbacks = {}
-        args = {"figures": [plot, *self._figures], "name": f"{self.stem}.png"}
-        self._png.js_on_click(CustomJS(args=args, code="sweep.picture(figures, name)"))
 
     def _button(self, label: str, name: str, mime: str, content: Callable[[], bytes]) -> Button:
         button = Button(label=label, name=label, width=76)

@@ -25,9 +25,9 @@ from bokeh.plotting import figure
 
 from sweep.explore.cells import Curve
 from sweep.explore.colours import CURVES
+from sweep.explore.slices import critical_symbol
 from sweep.explore.state import MAX_CELLS
 from sweep.grid import Array
-from sweep.plots.labels import critical_symbol
 
 _POINTS = 6000
 """Points drawn of a curve at most: the lowest and the highest sample of each stretch."""
@@ -45,7 +45,7 @@ class Curves:
     def __init__(self) -> None:
         self.spin = _figure("spin n (√(g/c))", 260, "spin")
         self.energy = _figure("energy (m g c)", 190, "energies")
-        self.path = _figure("contact point y (c)", 320, "path")
+        self.path = _figure("contact point y (c)", 320, "contact path")
         self.path.xaxis[0].axis_label = "contact point x (c)"
         self.path.match_aspect = True
         self.energy.x_range = self.spin.x_range

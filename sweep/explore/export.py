@@ -7,9 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-import xarray as xr
-
 from sweep.config import Config, Values
 from sweep.explore.cells import Curve, Setup
 from sweep.explore.slices import Source
@@ -17,18 +14,15 @@ from sweep.explore.state import Cell, State
 
 
 def netcdf(source: Source, address: str, state: State, curves: Sequence[Curve]) -> bytes:
-    """The slice with all its variables, and in the group `trajectories` the dense trajectories, as a netCDF file."""
+    """The slice with all its variables, and in the groups `trajectory_1`, … the trajectories, as a netCDF file."""
     fixed = {d: state.at.get(d, 0) for d in source.dims if d not in (state.x, state.y)}
     part = source.dataset.isel(fixed, missing_dims="ignore").load()
     part = part.assign_attrs(explored=address)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "slice.nc")
         part.to_netcdf(path, engine="netcdf4")
-        if curves:
-            dense = [c.dataset.dropna("sample", how="all", subset=["time"]) for c in curves]
-            together = xr.concat(dense, "trajectory", join="outer", data_vars="all", combine_attrs="override")
-            together = together.assign_coords(trajectory=np.arange(len(curves)))
-            together.to_netcdf(path, engine="netcdf4", mode="a", group="trajectories")
+        for k, curve in enumerate(curves, 1):
+            curve.dataset.to_netcdf(path, engine="netcdf4", mode="a", group=f"trajectory_{k}")
         return path.read_bytes()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from bokeh.resources import INLINE
 from sweep.explore import figure, state
 from sweep.explore.colours import Scale
 from sweep.explore.controls import escaped
+from sweep.explore.lines import Lines, critical_lines
 from sweep.explore.slices import DIFFERENCE, Slice, Source
 from sweep.plots import labels
 from sweep.results.writing import replacing
@@ -54,14 +56,21 @@ def headings(source: Source) -> tuple[str, str]:
     return str(source.dataset.attrs.get("title", Path(source.name).name)), labels.constants(source.dataset)
 
 
-def legend(part: Slice, colours: Scale) -> str:
-    """The patterns that occur in a map, and what lies beyond its scale, as HTML."""
+def legend(part: Slice, colours: Scale, lines: Sequence[Lines]) -> str:
+    """The patterns and lines that occur in a map, and what lies beyond its scale, as HTML."""
     swatch = "display:inline-block;width:26px;height:14px;border:1px solid #8a949e;border-radius:2px;flex:none"
     items = [
         f'<span style="display:inline-flex;gap:7px;align-items:center">'
         f'<i style="{swatch};background:{_SWATCHES[kind]}"></i>{escaped(words)}</span>'
         for kind, words in part.legend.items()
     ]
+    for each in lines:
+        style = f"width:26px;border-top:2px {figure.DASHES[each.name]} #000;flex:none"
+        name = f"n_{each.name[2:]}" if "n0" in (part.x.name, part.y.name) else f"n₀ = n_{each.name[2:]}"
+        items.append(
+            f'<span style="display:inline-flex;gap:7px;align-items:center"><i style="{style}"></i>'
+            f"{name} ({each.source}): {each.words}</span>"
+        )
     if colours.beyond:
         items.append(f"<span>{escaped(colours.beyond)}</span>")
     return f'<div style="display:flex;flex-wrap:wrap;gap:4px 18px;font-size:12.5px">{"".join(items)}</div>'
@@ -92,10 +101,12 @@ def save_html(
     if faults:
         raise ValueError("; ".join(faults))
     part, columns = _all_values(source, shown)
-    drawn = figure.draw(source, part, columns)
+    lines = critical_lines(source, part, shown.at)
+    drawn = figure.Map(source, part.x, part.y)
+    colours = drawn.show(part, columns, lines)
     document = Document()
     document.add_root(Column(drawn.figure, sizing_mode="stretch_width", name="map"))
-    document.add_root(Div(text=legend(part, drawn.scale), sizing_mode="stretch_width", name="legend"))
+    document.add_root(Div(text=legend(part, colours, lines), sizing_mode="stretch_width", name="legend"))
     dress(document, source, live=False)
     fixed = [labels.value(d, source.axes[d].values[i]) for d, i in shown.at.items() if d in _rest(source, shown)]
     document.template_variables["constants"] = ", ".join([*fixed, document.template_variables["constants"]])

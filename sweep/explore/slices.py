@@ -102,8 +102,8 @@ class Source:
     def __init__(self, dataset: xr.Dataset, name: str = "dataset") -> None:
         cells = dataset["status"] if "status" in dataset else next(iter(dataset.data_vars.values()), None)
         dims = () if cells is None else tuple(str(d) for d in cells.dims)
-        if not dims or {"trajectory", "sample"} & set(dims):
-            what = "a trajectory" if dims else "a single cell or no dataset of sweep"
+        if not dims or "trajectory" in dims:
+            what = "single trajectories" if dims else "no axis"
             raise StoreError(f"{name}: {what}; allowed: a dataset of run or critical, with an axis or more")
         self.name = name
         self.dims = dims
@@ -150,7 +150,7 @@ class Source:
         if name.startswith("n_c") and name.count("_") > 1:
             _, _, _, *how = name.split("_")
             words = ", ".join([_HOW.get(h, h) for h in how] or ["formula"])
-            return f"{labels.critical_symbol(name)}, {words}"
+            return f"{critical_symbol(name)}, {words}"
         return labels.words(self.dataset, name)
 
     def label(self, name: str) -> str:
@@ -217,6 +217,12 @@ class Source:
             return ", ".join(flags.get(int(v), str(v)) for v in values)
         finite = [f"{v:.6g}" for v in values if np.isfinite(v)]
         return f"{', '.join(finite)} {labels.unit(self.dataset, name)}".strip() if finite else "none"
+
+
+def critical_symbol(name: str) -> str:
+    """The symbol of a critical spin: n_c1⁺ for `n_c1_plus` and for `n_c1_plus_linear`."""
+    _, number, side, *_ = name.split("_")
+    return f"n_{number}{'⁺' if side == 'plus' else '⁻'}"
 
 
 def open_source(path: Path) -> Source:

@@ -17,6 +17,7 @@ from sweep.explore.cells import Curve, News, Runner, Setup, usable
 from sweep.explore.colours import CURVES
 from sweep.explore.controls import escaped
 from sweep.explore.curves import Curves
+from sweep.explore.lines import critical_lines
 from sweep.explore.slices import Source
 from sweep.explore.state import MAX_CELLS, Cell, State
 from sweep.plots import labels
@@ -44,6 +45,7 @@ class View:
         self._next_key = len(self._keys)
         self._active = max(len(self.state.cells) - 1, 0)
         self._running: dict[int, News] = {}
+        self._drawn: figure.Map | None = None
         self._faults = faults
         self._build()
         self._draw_map()
@@ -78,9 +80,11 @@ class View:
         path = Column(self._figures.path, self._figures.player, sizing_mode="stretch_width", name="path")
         self._shown_with_curves = (*plots, *path.children)
         self._saving = controls.Saving(
-            self._source, lambda: self._netcdf(), self._yaml if self._setup else None,
+            self._source, self._netcdf, self._yaml if self._setup else None, self._map,
             [self._figures.spin, self._figures.energy, self._figures.path],
         )  # fmt: skip
+        # The address travels with a root: what a callback of the document alone refers to is not kept up to date.
+        self._saving.root.tags = [self._address]
         for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, path,
                      self._chosen.root, self._saving.root):  # fmt: skip
             self._document.add_root(root)
@@ -101,12 +105,13 @@ class View:
         beside = tuple(n for n in _BESIDE if n in self._source.variables)
         part = self._source.slice(state.show, state.x, state.y, state.at, beside)
         columns = {state.show: part.values, **{name: part.dataset[name].values for name in beside}}
-        drawn = figure.draw(self._source, part, columns, probe=self._probe, request=self._request)
-        self._map.children = [drawn.figure]
-        self._drawn, self._part = drawn, part
-        controls.on(drawn.cursor, "data", lambda _: self._point())
-        self._saving.use(drawn.figure)
-        self._legend.text = page.legend(part, drawn.scale)
+        lines = critical_lines(self._source, part, state.at)
+        if self._drawn is None or self._drawn.axes != (state.x, state.y):
+            self._drawn = figure.Map(self._source, part.x, part.y, self._probe, self._request)
+            self._map.children = [self._drawn.figure]
+            controls.on(self._drawn.cursor, "data", lambda _: self._point())
+        self._part = part
+        self._legend.text = page.legend(part, self._drawn.show(part, columns, lines), lines)
         self._controls.show(state)
 
     def _index(self, i: int, j: int) -> dict[str, int] | None:
@@ -125,7 +130,9 @@ class View:
 
     def _point(self) -> None:
         """Tell about the cell under the pointer, or else about the chosen one."""
-        index = self._place(self._probe) or self._place(self._drawn.cursor)
+        index = self._place(self._probe)
+        if index is None and self._drawn:
+            index = self._place(self._drawn.cursor)
         if index is None:
             self._cell.text = controls.HINT if self._setup else controls.HINT_STILL
             return
@@ -220,6 +227,7 @@ class View:
         x, y = self.state.x, self.state.y
         on_map = [(k, cell) for k, cell in enumerate(cells) if x in cell and (not y or y in cell)]
         here = {d: source.axes[d].values[i] for d, i in self.state.at.items() if d not in (x, y)}
+        assert self._drawn
         self._drawn.pins.data = {
             "x": [source.axes[x].place(cell[x]) for _, cell in on_map],
             "y": [source.axes[y].place(cell[y]) if y else 0.0 for _, cell in on_map],

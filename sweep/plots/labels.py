@@ -52,6 +52,8 @@ _VARIABLE_WORDS = {
     "sensitive": "does the count depend on the start's 10th digit?",
     "energy_error": "largest error of the energy, relative",
     "form_factor": "form factor L(f)",
+    "spin": "spin n",
+    "time": "time t",
 }
 
 _FLAG_WORDS = {"noise_limited": {0: "no", 1: "yes"}, "window_dependent": {0: "no", 1: "yes"}, "status": STATUS_WORDS}
@@ -64,12 +66,6 @@ _SCALE = re.compile(r", in ((?:1/)?(?:sqrt\([gc/ ]+\)|[gcm](?: [gcm])*))(?=;|$)"
 def symbol(name: str) -> str:
     """A parameter's symbol, such as n₀."""
     return SYMBOLS.get(name, name)
-
-
-def critical_symbol(name: str) -> str:
-    """The symbol of a critical spin: n_c1⁺ for `n_c1_plus` and for `n_c1_plus_linear`."""
-    _, number, side, *_ = name.split("_")
-    return f"n_{number}{'⁺' if side == 'plus' else '⁻'}"
 
 
 def unit(dataset: xr.Dataset, name: str) -> str:

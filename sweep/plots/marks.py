@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from sweep.grid import Array
 from sweep.kernels.status import FAILURES, TIME_LIMIT
 from sweep.plots.labels import STATUS_WORDS, flag_words
 from sweep.results.dataset import VARIABLES
@@ -66,27 +67,31 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     cannot fail, a final spin is no count) are false everywhere.
     """
     found, simulated = field(dataset, name), _is_simulated(name)
-    nowhere = xr.zeros_like(found, dtype=bool).drop_attrs()
 
-    def among(variable: str, *values: int) -> xr.DataArray:
-        return nowhere | dataset[variable].isin(values) if variable in dataset else nowhere
+    def among(variable: str, *values: int) -> Array:
+        """Where a variable with flags has one of these values, over the dimensions of `found`."""
+        if not simulated or variable not in dataset:
+            return np.zeros(found.shape, bool)
+        flags = dataset[variable].variable
+        where = np.isin(flags.values, values).transpose([flags.dims.index(d) for d in found.dims if d in flags.dims])
+        places = tuple(slice(None) if d in flags.dims else None for d in found.dims)
+        return np.asarray(np.broadcast_to(where[places], found.shape))
 
-    kinds = dict.fromkeys(WORDS, nowhere)
-    missing = found.isnull() if found.dtype.kind == "f" else nowhere
-    if name in ("status", "inferred"):
-        return kinds
-    if simulated:
-        kinds["not_run"], kinds["failed"] = among("status", 0), among("status", *FAILURES)
-        kinds["inferred"] = among("inferred", 1)
-        empty = kinds["not_run"] | kinds["failed"]
-        if name in _GROWING or (name, "time_limit") in _PER_VARIABLE:
-            kinds["time_limit"] = among("status", TIME_LIMIT) & ~missing
-        kinds["noise_limited"] = among("noise_limited", 1) & ~empty
-        if name in _GROWING:
-            kinds["uncertain"] = (among("sensitive", 1) | among("window_dependent", 1)) & ~empty
-        missing = missing & ~empty & ~kinds["inferred"]
-    kinds["no_value"] = missing
-    return {kind: where.drop_attrs() for kind, where in kinds.items()}
+    not_run, failed, inferred = among("status", 0), among("status", *FAILURES), among("inferred", 1)
+    missing = np.isnan(found.values) if found.dtype.kind == "f" else np.zeros(found.shape, bool)
+    sound = ~(not_run | failed)
+    grows, limited = name in _GROWING, name in _GROWING or (name, "time_limit") in _PER_VARIABLE
+    kinds = {
+        "not_run": not_run,
+        "failed": failed,
+        "no_value": missing & sound & ~inferred,
+        "time_limit": among("status", TIME_LIMIT) & ~missing & limited,
+        "inferred": inferred,
+        "noise_limited": among("noise_limited", 1) & sound,
+        "uncertain": (among("sensitive", 1) | among("window_dependent", 1)) & sound & grows,
+    }
+    coordinates = {dim: dataset[dim].values for dim in found.dims if dim in dataset.coords}
+    return {kind: xr.DataArray(kinds[kind], coordinates, found.dims) for kind in WORDS}
 
 
 def legend(dataset: xr.Dataset, name: str, among: dict[str, xr.DataArray] | None = None) -> dict[str, str]:

@@ -79,8 +79,9 @@ def test_a_step_fixed_for_another_method_is_not_used_by_dopri5(write: Write) -> 
     assert series.attrs["integrator"].startswith("dopri5")
 
 
-@pytest.mark.parametrize("target", [".", "nowhere/x.png"])
+@pytest.mark.parametrize("target", ["folder.png", "nowhere/x.png"])
 def test_pictures_that_cannot_be_written(target: str, write: Write, tmp_path: Path) -> None:
+    (tmp_path / "folder.png").mkdir()
     invoke("run", write(TEXT), "--output", tmp_path / "o")
     result = invoke("plot", tmp_path / "o" / "odd.nc", "--output", tmp_path / target)
     assert (result.exit_code, "cannot be written" in result.stderr) == (2, True)
