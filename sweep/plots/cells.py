@@ -63,7 +63,9 @@ def _region(axes: Axes, where: Array, across: tuple[Array, Array], kind: str, **
     """All cells of a kind as one patch, so that its hatch goes on from cell to cell."""
     if where.any():
         with mpl.rc_context({"hatch.linewidth": 0.7}):
-            axes.add_patch(PathPatch(outline(where, *across), linewidth=0, gid=kind, **style))
+            patch = PathPatch(outline(where, *across), linewidth=0, gid=kind, **style)
+        # `add_patch` would go through every corner in Python to adapt the limits: a minute for 10⁶ cells.
+        axes.add_artist(patch).set_in_layout(False)
 
 
 def outline(where: Array, rows: Array, columns: Array) -> Path:

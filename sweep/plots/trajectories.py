@@ -23,8 +23,8 @@ _PANELS: tuple[tuple[str, dict[str, str]], ...] = (
     ("normal coordinate Y", {"mode_2": "Y"}),
     ("amplitude A of the first mode", {"amplitude_1": "A"}),
     ("amplitude B of the second mode", {"amplitude_2": "B"}),
-    ("acceleration along x", {"v0_rate_1": "dv₀/dt, of the point of contact", "slip_rate_1": "dv$_p$/dt, of the slip"}),
-    ("acceleration along y", {"v0_rate_2": "dv₀/dt, of the point of contact", "slip_rate_2": "dv$_p$/dt, of the slip"}),
+    ("acceleration along x", {"v0_rate_1": "dv₀/dt, v₀ = x$_p$ × ω", "slip_rate_1": "dv$_p$/dt, of the slip"}),
+    ("acceleration along y", {"v0_rate_2": "dv₀/dt, v₀ = x$_p$ × ω", "slip_rate_2": "dv$_p$/dt, of the slip"}),
     ("normal force R", {"normal_force": "R"}),
     ("energy", {"energy": "above rest", "dissipated": "work against friction"}),
 )
