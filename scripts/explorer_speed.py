@@ -31,7 +31,7 @@ integrator: {t_end: 10000}
 
 MAP = "Bokeh.documents[0].get_model_by_name('map').children[0]"
 
-PAINTED = f"window.Bokeh?.documents[0]?.is_idle && {MAP}.renderers[1].data_source.data.image[0].length > 4"
+PAINTED = f"window.Bokeh?.documents[0]?.is_idle && {MAP}.renderers[2].data_source.data.image[0].length > 4"
 
 DRAWN = "Bokeh.documents[0].get_model_by_name('curve legend').items[0].label.value"
 

@@ -7,10 +7,10 @@ lightness that tells values apart, and the eight colours of Okabe and Ito for fl
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from bokeh.models import ColorMapper, FixedTicker, LinearColorMapper, LogColorMapper
 from bokeh.palettes import PuOr11, Viridis256, interp_palette
 
 from sweep.explore.slices import DIFFERENCE, Slice
@@ -31,17 +31,16 @@ _SHARE = 0.995
 class Scale:
     """How values become colours."""
 
-    mapper: ColorMapper
+    palette: Sequence[str]
+    low: float
+    high: float
+    logarithmic: bool = False
     ticks: list[float] | None = None
     """On the bar; chosen by Bokeh if None."""
     words: dict[float, str] = field(default_factory=dict)
     """What the ticks say instead of their numbers."""
     beyond: str = ""
     """What lies beyond the scale, if something does."""
-
-    @property
-    def ticker(self) -> FixedTicker | None:
-        return None if self.ticks is None else FixedTicker(ticks=self.ticks, minor_ticks=[])
 
 
 def scale(part: Slice) -> Scale:
@@ -51,7 +50,7 @@ def scale(part: Slice) -> Scale:
     if flags:
         return _flags(flags)
     if not shown.size:
-        return Scale(LinearColorMapper(palette=Viridis256, low=0, high=1))
+        return Scale(Viridis256, 0, 1)
     whole = shown.dtype.kind in "iu"
     if part.name == DIFFERENCE or (shown.min() < 0 < shown.max()):
         return _diverging(shown, whole)
@@ -62,21 +61,20 @@ def _flags(words: dict[int, str]) -> Scale:
     low, high = min(words), max(words)
     palette = [_FLAGS[i % len(_FLAGS)] for i in range(high - low + 1)]
     ticks = [float(v) for v in words]
-    mapper = LinearColorMapper(palette=palette, low=low - 0.5, high=high + 0.5)
-    return Scale(mapper, ticks, dict(zip(ticks, words.values(), strict=True)))
+    return Scale(palette, low - 0.5, high + 0.5, ticks=ticks, words=dict(zip(ticks, words.values(), strict=True)))
 
 
 def _diverging(shown: Array, whole: bool) -> Scale:
     top = float(np.quantile(np.abs(shown), _SHARE))
     most = float(np.abs(shown).max())
     if not whole:
-        return Scale(LinearColorMapper(palette=interp_palette(PuOr11, 255), low=-top or -1, high=top or 1))
+        return Scale(interp_palette(PuOr11, 255), -top or -1, top or 1)
     top = max(math.ceil(top), 1)
     palette = interp_palette(PuOr11, 2 * top + 1) if top <= _MOST else interp_palette(PuOr11, 255)
-    mapper = LinearColorMapper(palette=palette, low=-top - 0.5, high=top + 0.5)
     ticks = _whole_ticks(-top, top)
     beyond = f"the last colours also stand for differences up to {most:g}" if most > top else ""
-    return Scale(mapper, ticks, {t: f"{t:+g}" if t else "0" for t in ticks}, beyond)
+    words = {t: f"{t:+g}" if t else "0" for t in ticks}
+    return Scale(palette, -top - 0.5, top + 0.5, ticks=ticks, words=words, beyond=beyond)
 
 
 def _counts(shown: Array) -> Scale:
@@ -85,16 +83,14 @@ def _counts(shown: Array) -> Scale:
     many = top - low + 1
     palette = interp_palette(Viridis256, many) if many <= _MOST else Viridis256
     beyond = f"the last colour also stands for counts up to {most}" if most > top else ""
-    return Scale(LinearColorMapper(palette=palette, low=low - 0.5, high=top + 0.5), _whole_ticks(low, top), {}, beyond)
+    return Scale(palette, low - 0.5, top + 0.5, ticks=_whole_ticks(low, top), beyond=beyond)
 
 
 def _numbers(shown: Array) -> Scale:
     low, high = float(shown.min()), float(shown.max())
     if low == high:
         low, high = low - (abs(low) or 1) * 1e-3, high + (abs(high) or 1) * 1e-3
-    if low > 0 and high > 100 * low:
-        return Scale(LogColorMapper(palette=Viridis256, low=low, high=high))
-    return Scale(LinearColorMapper(palette=Viridis256, low=low, high=high))
+    return Scale(Viridis256, low, high, logarithmic=low > 0 and high > 100 * low)
 
 
 def _whole_ticks(low: int, high: int) -> list[float]:

@@ -70,7 +70,7 @@ class Curves:
             line.visible = label.visible = bool(np.isfinite(spin))
             if line.visible:
                 line.location = label.y = spin
-                label.x = self._slider.end
+                label.x = self._slider.end * (0.93 if "c1" in name else 1.0)  # they often lie close together
 
     def _critical_line(self, name: str) -> tuple[Span, Label]:
         dash = "dotted" if "c1" in name else "dashed"

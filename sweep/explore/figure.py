@@ -18,6 +18,7 @@ from bokeh.models import (
     FixedTicker,
     HoverTool,
     LinearColorMapper,
+    LogColorMapper,
     Range1d,
 )  # fmt: skip
 from bokeh.plotting import figure
@@ -70,19 +71,18 @@ class Map:
         self._source, self._place = source, _place(x.edges, y.edges)
         self.axes = (x.name, y.name)
         self.figure = plot = _frame(source, x, y)
-        anything = LinearColorMapper(palette=["black"], low=0, high=1)
         self._cells = ColumnDataSource({"image": [np.zeros((1, 1), "uint8")], **self._place})
-        self._image = plot.image(
-            image="image", x="x", y="y", dw="dw", dh="dh", source=self._cells, color_mapper=anything
-        )  # fmt: skip
+        # Two images, because an image goes on with the mapper that it was made with.
+        self._images = [
+            plot.image(image="image", x="x", y="y", dw="dw", dh="dh", source=self._cells, color_mapper=mapper)
+            for mapper in (LinearColorMapper(palette=["black"]), LogColorMapper(palette=["black"]))
+        ]
         overlay = ColumnDataSource({"image": [np.zeros((2, 2), "uint32")], **self._place}, syncable=False)
         plot.image_rgba(image="image", x="x", y="y", dw="dw", dh="dh", source=overlay)
         self._lines = {name: _line(plot, dash) for name, dash in DASHES.items()}
         self.cursor, self.pins = _cursor(plot), _pins(plot)
-        self._hover = HoverTool(renderers=[self._image], point_policy="follow_mouse")
+        self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
-        self._bar = ColorBar(color_mapper=anything, **_BAR)
-        plot.add_layout(self._bar, "right")
         self._kinds = ColumnDataSource({"kinds": [np.zeros((1, 1), "uint8")]})
         _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "names": list(marks.WORDS),
                  "overlay": overlay, "ex": x.edges, "ey": y.edges, "cursor": self.cursor, "probe": probe,
@@ -98,7 +98,10 @@ class Map:
         """
         colours = scale(part)
         tables = {name: [plain(table)] for name, table in columns.items()}
-        self._image.glyph.color_mapper = colours.mapper
+        for image in self._images:
+            image.visible = (image is self._images[1]) == colours.logarithmic
+        mapper = self._images[colours.logarithmic].glyph.color_mapper
+        mapper.update(palette=colours.palette, low=colours.low, high=colours.high)
         self._cells.data = {"image": [plain(part.values)], **self._place, **tables}
         self._kinds.data = {"kinds": [part.kinds]}
         drawn = {each.name: each.parts for each in lines}
@@ -107,8 +110,14 @@ class Map:
             source.data = {"xs": [x for x, _ in parts], "ys": [y for _, y in parts]}
         self.figure.title.text = self._source.label(part.name)
         unit = labels.unit(self._source.dataset, part.name) if part.name in part.dataset else ""
-        self._bar.update(color_mapper=colours.mapper, ticker=colours.ticker or BasicTicker(), title=unit or None,
-                         major_label_overrides=colours.words)  # fmt: skip
+        ticker = BasicTicker() if colours.ticks is None else FixedTicker(ticks=colours.ticks, minor_ticks=[])
+        # A new bar, because an old one leaves out ticks beyond its first scale.
+        self.figure.right = [
+            ColorBar(
+                color_mapper=mapper, ticker="auto" if colours.logarithmic else ticker, title=unit or None,
+                major_label_overrides=colours.words, **_BAR,
+            )
+        ]  # fmt: skip
         tip, formatters = _tip(self._source, part, list(columns))
         self._hover.update(tooltips=tip, formatters=formatters)
         return colours

@@ -30,7 +30,7 @@ _SWATCHES = {
     "failed": "repeating-linear-gradient(45deg,#9ea3a8 0 1px,transparent 1px 6px),"
     "repeating-linear-gradient(-45deg,#9ea3a8 0 1px,transparent 1px 6px),#404347",
     "no_value": "#9ea3a8",
-    "time_limit": "repeating-linear-gradient(135deg,#fff 0 1px,#222 1px 2px,transparent 2px 6px),#21918c",
+    "time_limit": "repeating-linear-gradient(45deg,#fff 0 1px,#222 1px 2px,transparent 2px 6px),#21918c",
     "inferred": "radial-gradient(circle at 2px 2px,#fff 1px,transparent 1.4px) 0 0/5px 5px,#21918c",
     "noise_limited": "repeating-linear-gradient(0deg,#fff 0 1px,#222 1px 2px,transparent 2px 6px),#21918c",
     "uncertain": "repeating-linear-gradient(90deg,#fff 0 1px,#222 1px 2px,transparent 2px 6px),#21918c",

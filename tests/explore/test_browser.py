@@ -91,7 +91,7 @@ def visit(browser: Browser, served: str) -> Iterator[Callable[..., Page]]:
 def settle(page: Page) -> None:
     """Wait until the map and its patterns are drawn."""
     page.wait_for_function("document.querySelector('#map canvas, #map *') && window.Bokeh?.documents[0]?.is_idle")
-    page.wait_for_function(f"{MAP}.inner_width > 10 && {MAP}.renderers[1].data_source.data.image[0].length > 4")
+    page.wait_for_function(f"{MAP}.inner_width > 10 && {MAP}.renderers[2].data_source.data.image[0].length > 4")
 
 
 NAMED = "Bokeh.documents[0].get_model_by_name"
@@ -253,6 +253,10 @@ def test_axes_variable_and_selection_change(visit: Callable[..., Page], opened: 
     settle(page)
     difference = (opened["reversals"] - opened["reversals_predicted"]).isel(b=1).transpose("n0", "mu").values
     assert model(page, "map figure", "[...m.renderers[0].data_source.data.image[0]]") == difference.ravel().tolist()
+    for i, j in [(0, 0), (1, 1), (4, 0)]:
+        if opened["status"].values[i, 1, j] == 1:
+            colours = np.unique(pixels(page, i, j, rows=2), axis=0)
+            assert colour_in_palette(page, int(difference[j, i])) in colours.tolist(), (i, j)
     mapper = model(page, "map figure", "(({low, high}) => [low, high])(m.renderers[0].glyph.color_mapper)")
     assert mapper[0] == -mapper[1]
     select(page, "show", "final spin n")
@@ -400,7 +404,7 @@ def test_nothing_runs_out_of_the_window(width: int, visit: Callable[..., Page]) 
     for name in ("map figure", "spin", "energies", "contact path"):
         assert 200 < model(page, name, "m.outer_width") <= width
     # The patterns are painted for the new size.
-    shape = model(page, "map figure", "m.renderers[1].data_source.data.image[0].shape")
+    shape = model(page, "map figure", "m.renderers[2].data_source.data.image[0].shape")
     assert abs(shape[1] - model(page, "map figure", "m.inner_width")) <= 1
 
 
