@@ -216,6 +216,7 @@ def test_patterns_follow_the_view(visit: Callable[..., Page]) -> None:
     before = pixels(page, 2, 0)
     page.evaluate(f"{MAP}.x_range.setv({{start: 55, end: 65}}); {MAP}.y_range.setv({{start: 1.5, end: 2.5}})")
     page.wait_for_timeout(300)
+    assert model(page, "map figure", "(({x, dw}) => [x[0], dw[0]])(m.renderers[2].data_source.data)") == [55, 10]
     after = pixels(page, 2, 1.5, 1, 1)
     lines = [1 - max(np.unique(part, axis=0, return_counts=True)[1]) / len(part) for part in (before, after)]
     assert lines[0] == pytest.approx(lines[1], abs=0.06)
