@@ -72,8 +72,8 @@ def _divided(start: float, stop: float, num: int) -> list[float]:
     if num == 1:
         return [start]
     (p, q), (r, s) = start.as_integer_ratio(), stop.as_integer_ratio()
-    first, last, whole = p * s, r * q, q * s * (num - 1)
-    return [(first * (num - 1 - i) + last * i) / whole for i in range(num)]
+    whole, from_start, each = q * s * (num - 1), p * s * (num - 1), r * q - p * s
+    return [(from_start + i * each) / whole for i in range(num)]
 
 
 @dataclass(frozen=True)
