@@ -36,9 +36,11 @@ Columns = Mapping[str, Array]
 
 
 COUNT, SPIN, ENERGY, MODES, FORMULAS = "count", "spin", "energy", "modes", "formulas"
+LINEAR, SETTLES = "linear", "settles"
 """What a model may offer: a number of reversals; the spin as a function of time; an energy that only friction changes;
 two rocking modes that the linear theory of the slip model describes; Takano's formulas for the critical spins and the
-number of reversals."""
+number of reversals; spins between which a tiny rattle decays, by the eigenvalues of its Jacobian; and that its
+trajectories settle at such spins, because friction resists a large rattle as it does a tiny one."""
 
 
 @inline
@@ -84,8 +86,7 @@ class Tier:
     parameters: tuple[str, ...]
     """Names of the physical parameters that it depends on; `sweep.parameters` has their meanings."""
     offers: frozenset[str]
-    """What can be asked of it, out of `COUNT`, `SPIN`, `ENERGY`, `MODES` and `FORMULAS`.  If a model lacks `FORMULAS`,
-    no stable ranges of spin are searched for, and its trajectories never settle."""
+    """What can be asked of it, out of the names above, such as `COUNT`."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,8 @@ class Model(Tier):
     from columns of parameters, each coefficient of shape (cells,)."""
     start: Callable[[Columns], tuple[Array, ...]]
     """(columns) -> the states at t = 0, each of shape (cells,)."""
+    slower_period: Callable[[Columns], Array]
+    """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none."""
     upright: Callable[..., tuple[Any, ...]]
     """Inline, (spin) -> the states of steady upright spin without rattle."""
     rhs: Callable[..., tuple[Any, ...]]
@@ -128,6 +131,11 @@ class Model(Tier):
     0.1, μ = 20, where accuracy determines the step); they fall as its fifth power."""
     ripple: Ripple = NO_RIPPLE
     """How the spin ripples with the rattle, for the ripple-free spin whose changes of sign are counted."""
+    spin_unit: Callable[[Columns], Array] = lambda columns: np.ones_like(columns["a"])
+    """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
+    largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""
+    extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
+    """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
     shows beside spin and energy, by names that `sweep.studies.trajectory` explains."""
