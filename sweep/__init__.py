@@ -10,15 +10,15 @@ from sweep.api import __all__ as __all__
 TYPE_CHECKING = False  # True for type checkers; `typing` is not imported before Ctrl-C is taken care of
 if TYPE_CHECKING:
     from sweep.api import *  # noqa: F403
+else:
 
+    def __getattr__(name: str) -> object:
+        if name not in __all__:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from sweep import api
 
-def __getattr__(name: str) -> object:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from sweep import api
-
-    return getattr(api, name)
+        return getattr(api, name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return __all__

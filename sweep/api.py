@@ -1,4 +1,7 @@
-"""The public names: what `import sweep` offers, which is what `python -m sweep` does from the shell."""
+"""The public names: what `import sweep` offers, which is what `python -m sweep` does from the shell.
+
+What a function needs is imported when it is called: an import of all would take a second.
+"""
 
 from __future__ import annotations
 
@@ -6,33 +9,188 @@ from importlib import import_module
 
 TYPE_CHECKING = False  # as in `sweep`
 if TYPE_CHECKING:
-    from sweep.config import Config, ConfigError, load_config
-    from sweep.engine.run import run
-    from sweep.results.store import StoreError
-    from sweep.studies.critical import critical
-    from sweep.studies.predictions import predict
-    from sweep.studies.trajectory import trajectory
+    import os
+    from pathlib import Path
+    from typing import Any
 
-__all__ = ["Config", "ConfigError", "StoreError", "critical", "load_config", "predict", "run", "trajectory"]
+    import xarray as xr
+
+    from sweep.config import Config, ConfigError, ConfigLike, load_config
+    from sweep.engine.cluster import Cluster
+    from sweep.engine.reporter import Reporter
+    from sweep.plots.picture import plot
+    from sweep.results.store import StoreError
+    from sweep.studies.predictions import predict
+
+__all__ = [
+    "Config", "ConfigError", "StoreError", "critical", "load_config", "open", "plot", "predict", "run",
+    "trajectory",
+]  # fmt: skip
 
 _HOMES = {
     "Config": "sweep.config",
     "ConfigError": "sweep.config",
     "StoreError": "sweep.results.store",
-    "critical": "sweep.studies.critical",
     "load_config": "sweep.config",
+    "plot": "sweep.plots.picture",
     "predict": "sweep.studies.predictions",
-    "run": "sweep.engine.run",
-    "trajectory": "sweep.studies.trajectory",
 }
-"""The modules that define these names; each is imported when one of its names is first used."""
+"""The modules that define the names which are not defined here."""
 
 
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+def run(
+    config: ConfigLike,
+    output: str | Path | None = None,
+    *,
+    fresh: bool = False,
+    progress: bool | None = None,
+    reporter: Reporter | None = None,
+    cluster: Cluster | None = None,
+    **overrides: Any,
+) -> xr.Dataset:
+    """Run a sweep.
+
+    Parameters
+    ----------
+    config : path of a configuration, what its file would say as a mapping, or a `Config`
+    output : folder for the dataset and its maps; until they are finished it holds a checkpoint, from which the same
+        call resumes.  By default nothing is written
+    fresh : discard what an earlier run left in `output`
+    progress : whether to show a bar; by default in notebooks alone
+    reporter : receives progress and messages in place of a bar
+    cluster : processes to run the cells in; by default the threads of this one
+    overrides : values that replace those of `config`, such as ``mu=60``, ``t_end=1000`` or ``n0=np.linspace(0, 1, 9)``
+
+    Returns
+    -------
+    Dataset over the axes of the configuration; the `long_name` of a variable says what it means.  If `output` is given
+    and there are more than two million cells, values are read from the file when they are asked for.
+
+    Raises
+    ------
+    ConfigError, StoreError
+        if the configuration, or what `output` holds, cannot be used.
+    """
+    from sweep.config import load_config
+    from sweep.engine.run import run
+    from sweep.progress import shown
+
+    checked = load_config(config, overrides)
+    with shown(progress, reporter) as told:
+        return run(checked, output, fresh=fresh, reporter=told, cluster=cluster)
 
 
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+def critical(
+    config: ConfigLike,
+    width: float = 1e-3,
+    output: str | Path | None = None,
+    *,
+    fresh: bool = False,
+    progress: bool | None = None,
+    reporter: Reporter | None = None,
+    **overrides: Any,
+) -> xr.Dataset:
+    """Critical spins over all axes of `config` except n0: by the paper's formulas, by eigenvalues, and by simulation.
+
+    n_c1 is the first spin, outwards from zero, at which a tiny rattle grows.  n_c2 is the first spin, outwards from
+    the simulated n_c1, from which the trajectory from the configuration's start point reverses before t_end.
+
+    Parameters
+    ----------
+    config, output, fresh, progress, reporter, overrides : as for `run`
+    width : of the brackets from simulation, relative to the spin
+
+    Returns
+    -------
+    Dataset over the axes without n0.  With each `*_simulated` come the ends of its bracket, `*_inner` and `*_outer`,
+    and its `*_reason`, which says why it is NaN, or that it disagrees with the eigenvalues.  `critical_reason` is the
+    first of the four reasons that is not `exists`.
+
+    Raises
+    ------
+    ConfigError, StoreError
+        as `run`; also if the model is a formula, or the start point is an axis.
+    """
+    from sweep.config import load_config
+    from sweep.progress import shown
+    from sweep.studies.critical import critical
+
+    checked = load_config(config, overrides)
+    with shown(progress, reporter, "bodies") as told:
+        return critical(checked, width, output, fresh=fresh, reporter=told)
+
+
+def trajectory(
+    config: ConfigLike,
+    *,
+    every: float | None = None,
+    progress: bool | None = None,
+    reporter: Reporter | None = None,
+    **values: Any,
+) -> xr.Dataset:
+    """Follow single cells densely in time.
+
+    The method is always dopri5, whatever the configuration names: it alone can stop after any step for a sample.
+
+    Parameters
+    ----------
+    config, progress, reporter : as for `run`
+    every : time between samples, in sqrt(c/g), rounded to whole steps; by default nearly twenty per period of the
+        fastest motion
+    values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``, of which each combination is one trajectory;
+        an axis of `config` that is not named takes its first value.  Anything else replaces a value of `config`, such
+        as ``t_end=300``
+
+    Returns
+    -------
+    Dataset over (trajectory, time): the series that the model can show, NaN after the end of a
+    trajectory.  Over (trajectory): all that a sweep gives for the cell, from the very same steps, which the sampling
+    does not change.
+
+    Raises
+    ------
+    ConfigError
+        if the configuration cannot be used, the model is a formula, or a cell cannot be run.
+    """
+    from sweep.config import load_config
+    from sweep.parameters import PARAMETERS
+    from sweep.progress import shown
+    from sweep.studies.trajectory import trajectory
+
+    cells = {name: value for name, value in values.items() if name in PARAMETERS}
+    checked = load_config(config, {name: value for name, value in values.items() if name not in PARAMETERS})
+    with shown(progress, reporter, "sqrt(c/g)") as told:
+        return trajectory(checked, every=every, reporter=told, **cells)
+
+
+def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
+    """Open a dataset that this program wrote.
+
+    Parameters
+    ----------
+    load : read it into memory and close the file.  If False, values are read when they are asked for, and the file
+        stays open until the dataset is closed
+
+    Raises
+    ------
+    StoreError
+        if the file is not such a dataset, or is larger than memory.
+    """
+    from pathlib import Path
+
+    from sweep.results.netcdf import open_dataset
+    from sweep.results.store import StoreError
+
+    dataset = open_dataset(Path(path), load=load)
+    if "sweep_version" not in dataset.attrs:
+        dataset.close()
+        raise StoreError(f"{path}: not a dataset of sweep: no attribute sweep_version")
+    return dataset
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(_HOMES[name]), name)

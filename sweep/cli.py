@@ -6,6 +6,7 @@ at once.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,17 +20,40 @@ from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
-    from sweep.config import Config
+    import xarray as xr
+    from click.shell_completion import CompletionItem
+
+    from sweep.config import Config, Fault
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
+CLOSED_PIPE = 141
+"""As the shell reports of any command that SIGPIPE ends: what read its output, such as `head`, has enough."""
 
 _PATH = click.Path(path_type=Path)
+
+
+def _keys(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """The keys of a configuration that go on from what was typed."""
+    from click.shell_completion import CompletionItem
+
+    from sweep.config.schema import PATHS
+
+    return [CompletionItem(f"{key}=", help=words) for key, words in PATHS.items() if key.startswith(begun)]
+
+
+def _parameters(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """The parameters that go on from what was typed."""
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(f"{p.name}=", help=p.long_name) for p in PARAMETERS.values() if p.name.startswith(begun)]
+
 
 CONFIG = click.argument("config", type=_PATH)
 FILE = click.argument("file", type=_PATH)
 SETTINGS = click.option(
-    "--set", "settings", multiple=True, metavar="PATH=VALUE",
-    help="Replace a value of the configuration, e.g. friction.mu=60 (repeatable).",
+    "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=_keys,
+    help="Replace a value of the configuration, e.g. friction.mu=60, or friction.mu=20..60:41 for the range "
+    "START..STOP:NUM (repeatable).",
 )  # fmt: skip
 OUTPUT = click.option("--output", type=_PATH, help="Folder for the results [default: runs/NAME].")
 QUIET = click.option("--quiet", is_flag=True, help="Print only errors.")
@@ -46,7 +70,8 @@ def main() -> None:
     """Parameter sweeps for the reversals of a rattleback.
 
     Exit codes: 0 done; 2 a configuration or file is wrong; 3 more cells failed than the
-    configuration allows; 130 interrupted, the same command resumes the run.
+    configuration allows; 130 interrupted, the same command resumes the run; 141 what read its
+    output has closed the pipe.
     """
 
 
@@ -96,6 +121,7 @@ def run(
         from sweep.results.summary import failed_fraction, summarize
 
         interrupt.raise_again()
+        before = _stamps(folder, checked.name)
         with Terminal(quiet) as terminal:
             try:
                 with connected(workers, scheduler) as cluster:
@@ -106,7 +132,7 @@ def run(
                 sys.exit(INTERRUPTED)
         if not quiet:
             click.echo(summarize(result))
-            _say(f"wrote {folder / checked.name}.nc and .png")
+            _say(_written(folder, checked.name, before))
         failed = failed_fraction(result)
         if failed > checked.max_failed_fraction:
             allowed = f"max_failed_fraction {checked.max_failed_fraction:.2%}"
@@ -116,7 +142,7 @@ def run(
 
 @main.command()
 @CONFIG
-@click.option("--at", "cells", multiple=True, metavar="NAME=VALUE",
+@click.option("--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=_parameters,
               help="Which cell, e.g. --at mu=60 --at b=3; a parameter given again adds a trajectory.")  # fmt: skip
 @OUTPUT
 @SETTINGS
@@ -132,15 +158,12 @@ def trajectory(
     """
     with _explained():
         checked = _load(config, settings)
-        at: dict[str, Any] = {}
-        for name, value in (_parse_pair(cell, "--at") for cell in cells):
-            at.setdefault(name, []).append(value)
-        if unknown := [name for name in at if name not in PARAMETERS]:
-            _refuse("--at", f"unknown parameter; allowed: {', '.join(PARAMETERS)}", unknown[0])
+        at = _cells(cells)
         if dry_run:
             from sweep.studies.trajectory import estimate
 
-            click.echo(estimate(checked, at))
+            with _of_option("--at"):
+                click.echo(estimate(checked, at))
             return
         from sweep.plots import trajectories as plots
         from sweep.progress import Terminal
@@ -148,7 +171,7 @@ def trajectory(
         from sweep.studies.trajectory import trajectory as follow
 
         interrupt.raise_again()
-        with Terminal(quiet, "sqrt(c/g)") as terminal:
+        with Terminal(quiet, "sqrt(c/g)") as terminal, _of_option("--at"):
             result = follow(checked, reporter=terminal, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
         files.save_result(result, plots.draw(result))
@@ -186,6 +209,8 @@ def critical(
         from sweep.studies.critical import remarks
 
         folder = output or Path("runs") / checked.name
+        name = f"{checked.name}_critical"
+        before = _stamps(folder, name)
         interrupt.raise_again()
         with Terminal(quiet, "bodies") as terminal:
             try:
@@ -197,7 +222,7 @@ def critical(
         if found := remarks(result):
             _say("\n".join(found), err=quiet)
         if not quiet:
-            _say(f"wrote {folder / checked.name}_critical.nc and .png")
+            _say(_written(folder, name, before))
 
 
 @main.command()
@@ -240,22 +265,39 @@ def bench(output: Path) -> None:
 
 @main.command()
 @FILE
-@click.option("--var", "variable", help="Variable to draw [default: reversals, simulated beside predicted].")
-@click.option("--output", type=_PATH, help="PNG file [default: beside FILE].")
-def plot(file: Path, variable: str | None, output: Path | None) -> None:
-    """Draw the maps of a dataset again."""
+@click.option(
+    "--var", "variable", help="Variable to draw [default: reversals, simulated and predicted, and their difference]."
+)
+@click.option("--x", help="Axis drawn across.")
+@click.option("--y", help="Axis drawn upwards.")
+@click.option("--sel", "cells", multiple=True, metavar="NAME=VALUE",
+              help="Draw only the value of an axis nearest to this one, e.g. n0=0.05 (repeatable).")  # fmt: skip
+@click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
+@click.option("--cmap", metavar="NAME", help="A colour map of matplotlib.")
+@click.option(
+    "--output",
+    type=_PATH,
+    help="Picture to write; its suffix names the format: png, pdf or svg [default: a PNG beside FILE].",
+)
+def plot(
+    file: Path, variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...], limits: str | None,
+    cmap: str | None, output: Path | None,
+) -> None:  # fmt: skip
+    """Draw a dataset: maps or curves of a run, single trajectories, or critical spins."""
     with _explained():
-        from sweep.plots import picture
-        from sweep.results.netcdf import open_dataset
-        from sweep.results.writing import replacing
+        sel = dict(_parse_pair(cell, "--sel") for cell in cells)
+        span = _parse_span(limits, "--limits") if limits is not None else None
+        from sweep.plots import panels, picture
 
         interrupt.raise_again()
-        dataset = open_dataset(file)
+        target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
+        if picture.suffix(target) not in picture.FORMATS:
+            _refuse(f"--output {target}", f"unknown format; allowed: {picture.ALLOWED}")
+        dataset = _open(file)
         with _about(file):
-            figure = picture.draw(dataset, variable)
-            target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
-            with replacing(target) as temporary:
-                figure.savefig(temporary, format="png")
+            for name, taken in panels.nearest(dataset, sel).items():
+                _say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
+            picture.plot(dataset, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, output=target)
         _say(f"wrote {target}")
 
 
@@ -264,16 +306,24 @@ def plot(file: Path, variable: str | None, output: Path | None) -> None:
 def info(file: Path) -> None:
     """Show what is in a dataset: axes, counts by status, agreement with the prediction, provenance."""
     with _explained():
-        from sweep.results.netcdf import open_dataset
-        from sweep.results.store import StoreError
-        from sweep.results.summary import contents, summarize
+        from sweep.results.summary import contents, describe
 
-        dataset = open_dataset(file)
-        if "status" not in dataset:
-            raise StoreError(f"{file}: not a dataset of sweep: no variable status")
+        dataset = _open(file)
         with _about(file):
-            text = "\n".join([str(dataset.attrs.get("title", file.name)), summarize(dataset), contents(dataset)])
+            text = "\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)])
         _say(text)
+
+
+def _open(file: Path) -> xr.Dataset:
+    """The dataset of a command, of whatever kind."""
+    from sweep.results.kind import kind
+    from sweep.results.netcdf import open_dataset
+    from sweep.results.store import StoreError
+
+    dataset = open_dataset(file)
+    if kind(dataset) is None:
+        raise StoreError(f"{file}: not a dataset of sweep: no variable of it, such as status")
+    return dataset
 
 
 def _load(config: Path, settings: tuple[str, ...]) -> Config:
@@ -288,7 +338,21 @@ def _load(config: Path, settings: tuple[str, ...]) -> Config:
         if not (equals and path):
             _refuse(f"--set {brief(setting)}", "not a setting; allowed: PATH=VALUE")
         parsed[path] = parse_value(value, f"--set {brief(path)}")
-    return load_config(config, parsed)
+    return load_config(config, parsed, argument=lambda path: f"--set {path}")
+
+
+def _cells(texts: tuple[str, ...]) -> dict[str, Any]:
+    """The values of `--at` by parameter."""
+    from sweep.config.faults import brief, suggestion
+
+    given: dict[str, list[float]] = {}
+    for text in texts:
+        name = text.partition("=")[0]
+        if name not in PARAMETERS:
+            meant = suggestion(name, PARAMETERS)
+            _refuse(f"--at {brief(text)}", f"unknown parameter{meant}; allowed: {', '.join(PARAMETERS)}")
+        given.setdefault(name, []).append(_parse_pair(text, "--at")[1])
+    return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
 
 
 def _parse_pair(text: str, option: str) -> tuple[str, float]:
@@ -301,11 +365,52 @@ def _parse_pair(text: str, option: str) -> tuple[str, float]:
     return name, parsed
 
 
-def _refuse(option: str, message: str, *path: str) -> NoReturn:
+@contextmanager
+def _of_option(option: str) -> Iterator[None]:
+    """Name `option` in faults of the parameters that it gave."""
+    from dataclasses import replace
+
+    from sweep.config.faults import ConfigError
+
+    def named(fault: Fault) -> Fault:
+        first, *rest = fault.path or ("",)
+        ours = not fault.file and (not first or first in PARAMETERS)
+        return replace(fault, path=(f"{option} {first}".rstrip(), *rest)) if ours else fault
+
+    try:
+        yield
+    except ConfigError as error:
+        raise ConfigError(list(map(named, error.faults))) from None
+
+
+def _parse_span(text: str, option: str) -> tuple[float, float]:
+    from sweep.config.document import number
+    from sweep.config.faults import brief
+
+    low, dots, high = text.partition("..")
+    ends = number(low), number(high)
+    if not dots or ends[0] is None or ends[1] is None or not ends[0] < ends[1]:
+        _refuse(f"{option} {brief(text)}", "allowed: LOW..HIGH, two numbers, the lower one first")
+    return ends[0], ends[1]
+
+
+def _refuse(option: str, message: str) -> NoReturn:
     """Raise the fault of an option."""
     from sweep.config.faults import ConfigError, Fault
 
-    raise ConfigError([Fault(option, None, None, path, message)])
+    raise ConfigError([Fault(option, None, None, (), message)])
+
+
+def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:
+    """What tells by their suffixes whether the results `name` in `folder` are written anew."""
+    stats = {suffix: path.stat() for suffix in (".nc", ".png") if (path := folder / f"{name}{suffix}").exists()}
+    return {suffix: (stat.st_ino, stat.st_mtime_ns) for suffix, stat in stats.items()}
+
+
+def _written(folder: Path, name: str, before: dict[str, tuple[int, int]]) -> str:
+    """Which results were written since `_stamps` returned `before`."""
+    new = [suffix for suffix, stamp in _stamps(folder, name).items() if stamp != before.get(suffix)]
+    return f"wrote {folder / name}{' and '.join(new)}" if new else "nothing was written"
 
 
 def _say(text: str, *, err: bool = False) -> None:
@@ -342,10 +447,16 @@ class _explained:
         if isinstance(error, KeyboardInterrupt):
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
+        if isinstance(error, BrokenPipeError):
+            # What is left in the buffers when Python ends goes nowhere.
+            for stream in (sys.stdout, sys.stderr):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+            sys.exit(CLOSED_PIPE)
         from sweep.config.faults import ConfigError
+        from sweep.jit import NotCompiled
         from sweep.results.store import StoreError
 
-        if isinstance(error, ConfigError | StoreError):
+        if isinstance(error, ConfigError | StoreError | NotCompiled):
             _say(str(error), err=True)
             sys.exit(WRONG_INPUT)
         if isinstance(error, OSError):

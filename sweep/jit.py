@@ -36,10 +36,23 @@ _waiting: list[tuple[Callable[..., Any], bool]] = []
 """Functions that Numba does not know yet, because it is not imported, and whether they are inlined."""
 
 
+class NotCompiled(RuntimeError):
+    """Numba was told not to compile, and uncompiled kernels are thousands of times slower."""
+
+
 @cache
 def load_numba() -> Any:
-    """The module `numba`, which from now on knows the inline functions: others that compile them take it from here."""
+    """The module `numba`, which from now on knows the inline functions: others that compile them take it from here.
+
+    Raises
+    ------
+    NotCompiled
+        if the environment switches compilation off.
+    """
     import numba
+
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # set when it is imported
+        raise NotCompiled("NUMBA_DISABLE_JIT is set, but kernels have to be compiled; allowed: unset, or 0")
     from numba.core.bytecode import FunctionIdentity
 
     # Numba numbers the functions of each process from 1, and only that number distinguishes the symbols of two

@@ -1,35 +1,59 @@
-"""Progress of a run on the terminal."""
+"""Progress of a run on the terminal and in a notebook."""
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.table import Column
 
 from sweep.engine.reporter import Progress as Done
 from sweep.engine.reporter import Reporter
 from sweep.jit import showing
 
+
+def shown(
+    progress: bool | None, reporter: Reporter | None = None, unit: str = "cells"
+) -> AbstractContextManager[Reporter]:
+    """Who is told of the progress of a call: `reporter` if there is one, else a bar where one is wanted.
+
+    Parameters
+    ----------
+    progress : whether a bar is wanted; None if only in a notebook
+    unit : what is counted
+    """
+    if reporter or not (in_notebook() if progress is None else progress):
+        return nullcontext(reporter or Reporter())
+    return Notebook(unit) if in_notebook() else Terminal(unit=unit)
+
+
+def in_notebook() -> bool:
+    """Whether this process is the kernel of a notebook."""
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
 _COMPILING = "compiling for this model and machine; later runs find it in the cache"
+
+
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        """Leave it to the caller what a closed pipe means; rich would end the process with exit code 1."""
+        raise BrokenPipeError
 
 
 class Terminal(Reporter):
     """A bar with what is done and the time left, of cells also failures and trajectories per second."""
 
     def __init__(self, quiet: bool = False, unit: str = "cells") -> None:
-        self.console = Console(stderr=True, quiet=quiet, highlight=False)
+        self.console = _Console(stderr=True, quiet=quiet, highlight=False)
         self.last: Done | None = None
-        cells = TextColumn("{task.fields[failed]} failed · {task.fields[rate]:.3g} trajectories/s ·")
-        self._bar = Progress(
-            TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"),
-            BarColumn(),
-            *([cells] if unit == "cells" else []),
-            TimeRemainingColumn(compact=True),
-            TextColumn("left"),
-            console=self.console,
-        )
+        self._bar = _line(unit, self.console)
         self._task: TaskID | None = None
         self._told = False
 
@@ -65,3 +89,69 @@ class Terminal(Reporter):
             self._bar.start()
             self._task = self._bar.add_task("", total=progress.cells, failed=0, rate=0.0)
         self._bar.update(self._task, total=progress.cells, completed=progress.done, failed=progress.failed, rate=rate)
+
+
+# Characters that all words need, with room for a bar.
+_WIDE = 80
+
+
+def _line(unit: str, console: Console) -> Progress:
+    """The line that is shown: on a narrow terminal the bar, and no more words than leave room for it."""
+    wide = console.width >= _WIDE
+    whole, count = Column(no_wrap=True), "{task.completed:.0f}/{task.total:.0f}"
+    left = TimeRemainingColumn(compact=True, table_column=whole)
+    if not wide:
+        bar = BarColumn(None, table_column=Column(ratio=1, min_width=4))
+        return Progress(TextColumn(count, table_column=whole), bar, left, console=console, expand=True)
+    cells = TextColumn("{task.fields[failed]} failed · {task.fields[rate]:.3g} trajectories/s ·", table_column=whole)
+    parts = [TextColumn(f"{count} {unit}", table_column=whole), BarColumn(), *([cells] if unit == "cells" else [])]
+    return Progress(*parts, left, TextColumn("left"), console=console)
+
+
+class Notebook(Reporter):
+    """A bar under the cell of a notebook, drawn by the browser."""
+
+    def __init__(self, unit: str = "cells") -> None:
+        self._unit = unit
+        self._output: Any = None
+        self._drawn = 0.0
+        self._last: Done | None = None
+
+    def __enter__(self) -> Notebook:
+        self._open = ExitStack()
+        self._open.enter_context(showing(self._compiling))
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._open.close()
+        if self._last:
+            self._draw(self._words(self._last), self._last)
+
+    @contextmanager
+    def _compiling(self) -> Iterator[None]:
+        self._draw(_COMPILING)
+        yield
+
+    def note(self, message: str) -> None:
+        print(message)
+
+    def chunk(self, progress: Done) -> None:
+        self._last = progress
+        if time.monotonic() - self._drawn > 0.1:
+            self._draw(self._words(progress), progress)
+
+    def _words(self, progress: Done) -> str:
+        failed = f" · {progress.failed} failed" if self._unit == "cells" else ""
+        return f"{progress.done:.0f}/{progress.cells:.0f} {self._unit}{failed} · {progress.seconds:.1f} s"
+
+    def _draw(self, words: str, progress: Done | None = None) -> None:
+        """Show a bar and `words`, in place of those shown before."""
+        from IPython.display import HTML, display
+
+        bar = f'<progress value="{progress.done}" max="{progress.cells}"></progress> ' if progress else ""
+        shown = HTML(f"{bar}<code>{words}</code>")
+        if self._output is None:
+            self._output = display(shown, display_id=True)
+        else:
+            self._output.update(shown)
+        self._drawn = time.monotonic()

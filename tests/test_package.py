@@ -123,3 +123,36 @@ def test_data_of_the_reports_is_found(python: Path, folder: Path) -> None:
 
 def test_console_script(python: Path, folder: Path) -> None:
     assert call(folder, python.parent / "sweep", "--version").startswith("sweep, version ")
+
+
+USER = """\
+import numpy as np
+import sweep
+
+reveal_type(sweep.run({"friction": {"mu": 60}}, mu=np.array([1.0]), progress=False))
+reveal_type(sweep.trajectory("x.yaml", mu=60, t_end=300))
+reveal_type(sweep.critical(sweep.load_config("x.yaml"), width=0.1))
+reveal_type(sweep.predict("x.yaml"))
+reveal_type(sweep.open("x.nc"))
+reveal_type(sweep.load_config("x.yaml").axes)
+sweep.run(3)
+sweep.run("x.yaml", fresh="yes")
+sweep.nothing
+"""
+"""A user's program, and what a type checker has to say of its lines."""
+
+TYPES = [
+    *['Revealed type is "xarray.core.dataset.Dataset"'] * 5,
+    'Revealed type is "dict[str, tuple[float, ...]]"',
+    'Argument 1 to "run" has incompatible type "int"',
+    'Argument "fresh" to "run" has incompatible type "str"',
+    'Module has no attribute "nothing"',
+]
+
+
+def test_type_hints_arrive(python: Path, folder: Path) -> None:
+    (folder / "user.py").write_text(USER, encoding="utf-8")
+    command = [sys.executable, "-m", "mypy", "--strict", "--python-executable", python, "user.py"]
+    done = subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    said = [line for line in done.stdout.splitlines() if line.startswith("user.py:")]
+    assert [words in line for words, line in zip(TYPES, said, strict=True)] == [True] * len(TYPES), done.stdout

@@ -5,14 +5,14 @@ Each directive is named after its table and takes no arguments: see `setup`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any, get_args
+from collections.abc import Callable
+from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from sweep.config import schema
+from sweep.config import messages, schema
 from sweep.kernels import measures, methods
 from sweep.kernels.status import FAILURES
 from sweep.models import TIERS
@@ -37,33 +37,11 @@ def _parameters() -> tuple[Row, list[Row]]:
     return ("name", "meaning", "unit", "default", "allowed"), rows
 
 
-# A setting's meaning; everything else in its row is read from the schema.
-_MEANINGS = {
-    "name": "name of the run and of its files; by default that of the configuration file",
-    "model": "which {ref}`model <models>` to integrate",
-    "cases": "CSV table with a column for each parameter and a row for each trajectory, instead of axes",
-    "integrator.method": "integration method; `auto` chooses the faster one for each cell",
-    "integrator.step": "fixed step in $\\sqrt{c/g}$, or `auto`",
-    "integrator.tolerance": "error in spin, at $t = 400$, that an automatic step keeps to",
-    "integrator.t_end": "time limit in $\\sqrt{c/g}$",
-    "integrator.stop_when_settled": "whether a trajectory ends when neither spin nor count can change any more",
-    "measure": "what to compute, of the {ref}`measurements <measurements>`; by default those marked there",
-    "verify": "share of the cells, drawn at random, to run again with finer steps",
-    "refine": "size of the largest blocks of a refined map, as a power of two; 0 simulates every cell",
-    "max_failed_fraction": "share of failed cells from which on the command exits with 3",
-}
-
-
 def _settings() -> tuple[Row, list[Row]]:
-    fields: dict[str, Any] = {}
-    for name, field in schema.Schema.model_fields.items():
-        if name == "integrator":
-            fields |= {f"integrator.{key}": f for key, f in schema.Integrator.model_fields.items()}
-        elif name not in schema.SECTIONS:
-            fields[name] = field
-    if missing := fields.keys() ^ _MEANINGS.keys():
-        raise ValueError(f"settings without a meaning here, or meanings without a setting: {sorted(missing)}")
-    rows = [(f"`{name}`", _MEANINGS[name], _default(f), _allowed(f)) for name, f in fields.items()]
+    rows = [
+        (f"`{path}`", str(field.description), _default(field), messages.allowed(field))
+        for path, field in schema.SETTINGS.items()
+    ]
     return ("name", "meaning", "default", "allowed"), rows
 
 
@@ -74,27 +52,6 @@ def _default(field: Any) -> str:
     if value is None or value == "":
         return ""
     return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
-
-
-def _allowed(field: Any) -> str:
-    signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
-    bounds = [
-        f"{sign} {getattr(bound, kind):g}"
-        for bound in field.metadata
-        for kind, sign in signs.items()
-        if hasattr(bound, kind)
-    ]
-    if bounds:
-        return ", ".join(bounds)
-
-    def names(annotation: Any) -> Iterable[str]:
-        for part in get_args(annotation):
-            if isinstance(part, str):
-                yield f"`{part}`"
-            else:
-                yield from names(part)
-
-    return ", ".join(names(field.annotation))
 
 
 def _variables() -> tuple[Row, list[Row]]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,86 +14,103 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from sweep.config import cases, document, schema
-from sweep.config.faults import ConfigError, Fault, brief
+from sweep.config import cases, document, scenes, schema
+from sweep.config.faults import ConfigError, Fault
+from sweep.config.messages import describe
+from sweep.config.plain import plain
 from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.kernels import measures, methods
 from sweep.kernels.measures import MEASURES
-from sweep.models import MODELS, TIERS
 from sweep.models.model import Model, Tier
-from sweep.parameters import PARAMETERS
+from sweep.models.scene import SI
+from sweep.parameters import PAPER, PARAMETERS, SECTIONS
 
-__all__ = ["Config", "ConfigError", "Fault", "Integrator", "Values", "as_config", "load_config"]
+__all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 
-
-def as_config(config: Config | str | Path, overrides: Mapping[str, Any] | None = None) -> Config:
-    """`config` itself, or the one read from the file at this path, with `overrides` as `load_config` takes them."""
-    if isinstance(config, Config):
-        if overrides:
-            raise TypeError("overrides need the path of a configuration: a Config cannot be changed")
-        return config
-    return load_config(config, overrides)
+ConfigLike = Config | Mapping[str, Any] | str | os.PathLike[str]
+"""What stands for a configuration: itself, what its file says, or the path of that file."""
 
 
-def load_config(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Config:
+def load_config(
+    config: ConfigLike, overrides: Mapping[str, Any] | None = None, *, argument: Callable[[str], str] = str
+) -> Config:
     """Read and check a configuration.
 
     Parameters
     ----------
-    path : YAML file
-    overrides : values that replace the file's, by path ("friction.mu") or, for a parameter or a
-        setting of the integrator, by its bare name ("mu")
+    config : path of a YAML file, what such a file says as a mapping, or a configuration.  An axis of a mapping may be
+        a list, tuple, range, NumPy array or `xarray.DataArray`
+    overrides : values that replace those of `config`, by path ("friction.mu") or, for a parameter or a setting of the
+        integrator, by bare name ("mu")
+    argument : what faults call the override of this key
 
     Raises
     ------
     ConfigError
         with a `Fault` for each thing that is wrong.
     """
-    source = document.read(Path(path))
+    if isinstance(config, Config) and not overrides:
+        return config
+    source = _source(config)
     for key, value in (overrides or {}).items():
-        plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-        source.set(_full_path(key), plain, f"--set {brief(key)}")
+        source.set(_full_path(key), plain(value), argument(key))
     # A name made from the file's must not be refused, since the user did not choose it.
-    stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(path).stem).lstrip("._-")[:100]
+    stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")
     try:
         checked = schema.Schema.model_validate(source.values)
     except ValidationError as error:
-        faults = [schema.describe(e) for e in error.errors()]
-        raise ConfigError([source.fault(path, text, at_key=key) for path, text, key in faults]) from None
-    return _resolve(checked, source)
+        found = describe(error.errors(), schema.Schema)
+        raise ConfigError([source.fault(path, text, at_key=key) for path, text, key in found]) from None
+    resolved = _resolve(checked, source)
+    object.__setattr__(resolved, "source", source)
+    return resolved
+
+
+def _source(config: ConfigLike) -> document.Document:
+    """The document of a configuration, to be changed freely."""
+    if isinstance(config, Config):
+        if config.source:
+            return deepcopy(config.source)
+        values, table = config.document(), None
+        if config.cases is not None:
+            table = config.cases_file or "cases", config.cases
+            values["cases"] = table[0]
+        return document.Document("", values, table=table)
+    if isinstance(config, Mapping):
+        return document.Document("", plain(config))
+    return document.read(Path(config))
 
 
 def _full_path(key: str) -> tuple[str, ...]:
+    """Where the value of an override belongs."""
     if key in PARAMETERS:
-        return PARAMETERS[key].section, key
+        return PARAMETERS[key].place
     return ("integrator", key) if key in Integrator.model_fields else tuple(key.split("."))
 
 
 def _resolve(checked: Any, source: document.Document) -> Config:
     """Fill in defaults, order the axes, and check that the values fit together."""
-    model = TIERS[checked.model]
+    given = _given(checked, source)
+    columns = _table(checked.cases, source) if checked.cases is not None else None
+    names, law, units = (*given, *(columns or ())), checked.friction.name, checked.units
+    if faults := list(scenes.misfits(checked, names, source)):
+        raise ConfigError(faults)
+    model = schema.tier_of(checked.model, law, units, names)
     checked = _with_method(checked, model)
-    given = {
-        key: getattr(getattr(checked, section), key)
-        for section, keys in source.values.items()
-        if section in {p.section for p in PARAMETERS.values()}
-        for key in keys
-    }
-    columns = cases.read(source, checked.cases) if checked.cases is not None else None
-    faults = list(_misfits(checked, given, columns, source))
+    faults = list(_misfits(checked, model, given, columns, source))
     order = sorted(model.parameters, key=lambda n: (_rank(n, schema.FIRST_AXES), _rank(n, tuple(given))))
     parameters = {}
     for name in order:
-        default = PARAMETERS[name].default
+        default = None if units == SI and name in PAPER else PARAMETERS[name].default
         if name in given:
             parameters[name] = given[name]
         elif name in (columns or {}):
             continue
         elif default is None:
             parameter = PARAMETERS[name]
-            faults.append(source.fault((parameter.section, name), f"missing; allowed: {parameter.allowed}"))
+            faults.append(source.fault(parameter.place, f"missing; allowed: {parameter.allowed}"))
         else:
             parameters[name] = Values((default,), False, default)
     if faults:
@@ -107,6 +126,8 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         refine=checked.refine,
         cases=columns,
         cases_file=checked.cases,
+        units=units,
+        law=law,
     )
     for path, check in _CHECKS:
         if reason := check(config):
@@ -114,6 +135,24 @@ def _resolve(checked: Any, source: document.Document) -> Config:
     if checked.verify is None and config.integrator.method == methods.AUTO and not config.refine:
         return replace(config, verify=schema.VERIFIED if Grid.of(config).size * schema.VERIFIED >= 1 else 0.0)
     return config
+
+
+def _given(checked: Any, source: document.Document) -> dict[str, Values]:
+    """The physical parameters that the document names, in its order."""
+    found: dict[str, Values] = {}
+    for key, value in source.values.items():
+        if key in SECTIONS:
+            found |= {name: getattr(getattr(checked, key), name) for name in value if name in PARAMETERS}
+        elif key in PARAMETERS:
+            found[key] = getattr(checked, key)
+    return found
+
+
+def _table(name: str, source: document.Document) -> dict[str, tuple[float, ...]]:
+    """The columns of the table of cases, which is read once for all that is made from `source`."""
+    if not source.table or source.table[0] != name:
+        source.table = name, cases.read(source, name)
+    return source.table[1]
 
 
 def _too_large(config: Config) -> str:
@@ -130,13 +169,13 @@ def _too_large_to_refine(config: Config) -> str:
 
 def _unusable_step(config: Config) -> str:
     """What is wrong with a step that the configuration fixes; "" if nothing is."""
-    step = config.integrator.step
-    if step == "auto" or config.model not in MODELS:
+    step, model = config.integrator.step, config.tier
+    if step == "auto" or not isinstance(model, Model):
         return ""
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
     with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
-        longest = min(float(methods.longest_step(columns).min()) for columns in distinct(Grid.of(config), BODY))
+        longest = min(float(methods.longest_step(model, columns).min()) for columns in distinct(Grid.of(config), BODY))
     if step <= longest:
         return ""
     return f"{step:g}; allowed: auto, or at most {longest:.3g}, a quarter of the rattle's period"
@@ -147,6 +186,7 @@ def _unusable_step(config: Config) -> str:
 _CHECKS: tuple[tuple[tuple[str, ...], Callable[[Config], str]], ...] = (
     ((), _too_large),
     (("refine",), _too_large_to_refine),
+    (("body",), scenes.impossible),
     (("start", "x0"), off_the_body),
     (("integrator", "step"), _unusable_step),
 )
@@ -171,12 +211,15 @@ def _rank(name: str, names: tuple[str, ...]) -> int:
 
 
 def _misfits(
-    checked: Any, given: dict[str, Any], columns: dict[str, tuple[float, ...]] | None, source: document.Document
+    checked: Any,
+    model: Tier,
+    given: dict[str, Any],
+    columns: dict[str, tuple[float, ...]] | None,
+    source: document.Document,
 ) -> Iterator[Fault]:
     """Faults of values that are valid by themselves but do not fit together."""
-    model = TIERS[checked.model]
     for name in given:
-        path = (PARAMETERS[name].section, name)
+        path = PARAMETERS[name].place
         # A number that the model does not use may stay, so that one file serves every model.
         if name not in model.parameters and given[name].is_axis:
             yield source.fault(

@@ -22,7 +22,9 @@ from sweep.config.faults import ConfigError, Fault, Path
 LIMIT = 1 * files.MIB
 """Largest document, in bytes: reading takes some 20 s per megabyte."""
 
-_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_NUMBER = r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
+_FLOAT = re.compile(_NUMBER)
+_RANGE = re.compile(rf"(?P<start>{_NUMBER})\.\.(?P<stop>{_NUMBER}):(?P<num>{_NUMBER})")
 _SPECIAL = {".inf": float("inf"), "-.inf": float("-inf"), ".nan": float("nan")}
 _WORDS: dict[str, bool | None] = {
     "true": True, "True": True, "false": False, "False": False, "null": None, "~": None, "": None,
@@ -31,36 +33,48 @@ _WORDS: dict[str, bool | None] = {
 
 @dataclass
 class Document:
-    """The values of a configuration, and where each stands: file, line and column."""
+    """The values of a configuration, and where each comes from: a line and column of a file, or an argument."""
 
     file: str
+    """"" for a mapping, which is no file."""
     values: Any = None
-    keys: dict[Path, tuple[str, int | None, int | None]] = field(default_factory=dict)
-    """Where each key of a mapping stands, by the path to its value."""
-    places: dict[Path, tuple[str, int | None, int | None]] = field(default_factory=dict)
-    """Where each value stands, by its path."""
+    keys: dict[Path, tuple[int, int]] = field(default_factory=dict)
+    """Line and column of each key of a mapping, by the path to its value."""
+    places: dict[Path, tuple[int, int]] = field(default_factory=dict)
+    """Line and column of each value, by its path."""
+    arguments: dict[Path, tuple[str, Path]] = field(default_factory=dict)
+    """For each value that an argument gave, and each section that it added: the argument, and the path that it set."""
+    table: tuple[str, Any] | None = None
+    """Name and columns of the table of cases, once it is read."""
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
         """A fault at `path`; it is placed at the nearest section above if the document lacks that path."""
         table, known = (self.keys if at_key else self.places), path
-        while known and known not in table:
+        while known and known not in table and known not in self.arguments:
             known = known[:-1]
-        file, line, column = table.get(known, (self.file, None, None))
-        return Fault(file, line, column, path, message)
+        if known not in self.arguments:
+            line, column = table.get(known, (None, None))
+            return Fault(self.file, line, column, path, message)
+        argument, target = self.arguments[known]
+        if path[: len(target)] == target:
+            return Fault("", None, None, (argument, *path[len(target) :]), message)
+        return Fault(argument, None, None, path, message)
 
-    def set(self, path: Path, value: Any, source: str) -> None:
-        """Put `value` at `path`, and add the sections above it; faults in it name `source` as their file."""
+    def set(self, path: Path, value: Any, argument: str) -> None:
+        """Put `value` at `path`, and add the sections above it; faults in it name `argument`."""
         section = self.values
-        for part in path[:-1]:
+        for depth, part in enumerate(path[:-1], start=1):
+            if part not in section:
+                self.arguments[path[:depth]] = argument, path
             section = section.setdefault(part, {})
             if not isinstance(section, dict):
-                allowed = "a path through sections to a key"
-                raise ConfigError([Fault(source, None, None, path, f"{part} is not a section; allowed: {allowed}")])
+                message = f"{part} is not a section; allowed: a path through sections to a key"
+                raise ConfigError([Fault("", None, None, (argument,), message)])
         section[path[-1]] = value
-        for table in (self.keys, self.places):
+        for table in (self.keys, self.places, self.arguments):
             for old in [p for p in table if p[: len(path)] == path]:
                 del table[old]
-            table[path] = (source, None, None)
+        self.arguments[path] = argument, path
 
 
 def read(path: FilePath) -> Document:
@@ -85,7 +99,9 @@ def read(path: FilePath) -> Document:
 
 
 def parse_value(text: str, source: str) -> Any:
-    """The value of a command line's text, read as YAML; a `ConfigError` names `source`."""
+    """The value of a command line's text: START..STOP:NUM as a range, else YAML; a `ConfigError` names `source`."""
+    if span := _RANGE.fullmatch(text):
+        return {"start": float(span["start"]), "stop": float(span["stop"]), "num": float(span["num"])}
     node = _compose(text, source)
     scratch, faults = Document(source), list[Fault]()
     value = None if node is None else _convert(node, (), scratch, faults)
@@ -108,15 +124,18 @@ def _compose(text: str, file: str) -> Node | None:
 
 
 def _convert(node: Node, path: Path, document: Document, faults: list[Fault]) -> Any:
-    def place(of: Node) -> tuple[str, int, int]:
-        return document.file, of.start_mark.line + 1, of.start_mark.column + 1
+    def place(of: Node) -> tuple[int, int]:
+        return of.start_mark.line + 1, of.start_mark.column + 1
+
+    def refuse(of: Node, at: Path, message: str) -> None:
+        faults.append(Fault(document.file, *place(of), at, message))
 
     document.places[path] = place(node)
     # An alias leads back to a node with an anchor; as anchors are refused, no alias is ever followed.
     # A tag stands at the start of its node.  Types that ruamel infers without one, such as timestamps,
     # do not matter: `_scalar` reads the text itself.
     if node.anchor or node.start_mark.buffer[node.start_mark.pointer] == "!":
-        faults.append(Fault(*place(node), path, "a YAML tag or anchor; allowed: plain values"))
+        refuse(node, path, "a YAML tag or anchor; allowed: plain values")
         return None
     if isinstance(node, ScalarNode):
         return _scalar(node)
@@ -125,12 +144,12 @@ def _convert(node: Node, path: Path, document: Document, faults: list[Fault]) ->
     result: dict[str, Any] = {}
     for key_node, value_node in node.value:
         if not isinstance(key_node, ScalarNode):
-            faults.append(Fault(*place(key_node), path, "a key must be a word"))
+            refuse(key_node, path, "a key must be a word")
             continue
         key = key_node.value
         if key in result:
-            line = document.keys[(*path, key)][1]
-            faults.append(Fault(*place(key_node), (*path, key), f"duplicate key, first on line {line}"))
+            line, _ = document.keys[(*path, key)]
+            refuse(key_node, (*path, key), f"duplicate key, first on line {line}")
             continue
         document.keys[(*path, key)] = place(key_node)
         result[key] = _convert(value_node, (*path, key), document, faults)

@@ -5,23 +5,34 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import sys
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
-from sweep.config.faults import quote
+from sweep.config.document import Document, number
+from sweep.config.faults import ConfigError, Fault, Path, quote, suggestion
+from sweep.config.messages import Allowed, describe, refusal, wrong
+from sweep.config.plain import plain
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
+from sweep.models.general import BASES
+from sweep.models.laws import LAWS
+from sweep.models.model import Model, Tier
+from sweep.models.scene import PAPER, PAPERS_LAW, SI, is_papers, variant
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
+from sweep.variables import in_si
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
@@ -38,17 +49,26 @@ class _Strict(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
 
 
+def _whole(raw: Any) -> Any:
+    """1e3 as 1000."""
+    return int(raw) if isinstance(raw, float) and raw.is_integer() else raw
+
+
+Whole = Annotated[int, BeforeValidator(_whole)]
+"""A whole number, however it is written."""
+
+
 class Range(_Strict):
     start: float
     stop: float
-    num: int = Field(ge=1, le=MAX_AXIS)
+    num: Whole = Field(ge=1, le=MAX_AXIS)
     spacing: Literal["linear", "log"] = "linear"
 
     def values(self) -> list[float]:
         if self.spacing == "linear":
             return _divided(self.start, self.stop, self.num)
         if np.sign(self.start) * np.sign(self.stop) <= 0:
-            raise _wrong("a log range needs start and stop of one sign, both not zero", "spacing")
+            raise wrong("a log range needs start and stop of one sign, both not zero", "spacing")
         logs = _divided(math.log10(abs(self.start)), math.log10(abs(self.stop)), self.num)
         inside = [math.copysign(10.0**log, self.start) for log in logs[1:-1]]
         return [self.start, *inside, self.stop][: self.num]
@@ -63,11 +83,6 @@ def _divided(start: float, stop: float, num: int) -> list[float]:
     return [(first * (num - 1 - i) + last * i) / whole for i in range(num)]
 
 
-def _wrong(reason: str, *at: str | int) -> PydanticCustomError:
-    """A fault in the value that is being checked; `at` is the path inside that value."""
-    return PydanticCustomError("value", "{reason}", {"reason": reason, "at": at})
-
-
 @dataclass(frozen=True)
 class Values:
     """A parameter's checked value: one number, or an axis of distinct numbers."""
@@ -78,72 +93,105 @@ class Values:
     """The value as it stands in the configuration."""
 
 
+_DEGREES = re.compile(r"\s*(\S+)\s+deg\s*")
+
+
+def _in_radians(raw: Any) -> Any:
+    """`raw` with "0.5 deg" as a number of radians, also in a list or a range."""
+    if isinstance(raw, list):
+        return [_in_radians(item) for item in raw]
+    if isinstance(raw, dict):
+        return {key: _in_radians(item) for key, item in raw.items()}
+    spelled = _DEGREES.fullmatch(raw) if isinstance(raw, str) else None
+    degrees = number(spelled[1]) if spelled else None
+    return raw if degrees is None else math.radians(degrees)
+
+
 def _parse_values(parameter: Parameter, raw: Any) -> Values:
+    if parameter.units == "radian":
+        raw = _in_radians(raw)
     spec: Any = raw
     if isinstance(raw, dict):
         try:
             span = Range.model_validate(raw)
         except ValidationError as error:
-            first = error.errors()[0]
-            raise _wrong(_message(first, Range), *first["loc"]) from None
+            # An unknown key first: it tells why another is missing.
+            path, message, _ = max(describe(error.errors(), Range), key=lambda found: found[2])
+            raise wrong(message, *path) from None
         numbers, spec = span.values(), span.model_dump()
     elif isinstance(raw, list):
         if not raw:
-            raise _wrong("an empty axis; allowed: one number or more")
+            raise wrong("an empty axis; allowed: one number or more")
         for i, item in enumerate(raw):
             _check_number(item, parameter, i)
         numbers = spec = [float(item) for item in raw]
     else:
         _check_number(raw, parameter)
         return Values((float(raw),), False, float(raw))
-    for number in numbers:
-        if not parameter.allows(number):
-            raise _wrong(f"{number:g} is out of bounds; allowed: {parameter.allowed}")
+    for value in numbers:
+        if not parameter.allows(value):
+            raise wrong(f"{value:g} is out of bounds; allowed: {parameter.allowed}")
     if len(set(numbers)) < len(numbers):
-        raise _wrong("an axis with equal values; allowed: distinct numbers")
+        raise wrong("an axis with equal values; allowed: distinct numbers")
     return Values(tuple(numbers), True, spec)
+
+
+def numbers_of(parameter: Parameter, raw: Any) -> tuple[float, ...]:
+    """The numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter."""
+    try:
+        return _parse_values(parameter, plain(raw)).numbers
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise ConfigError([Fault("", None, None, (parameter.name, *context["at"]), context["reason"])]) from None
 
 
 def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
     if isinstance(raw, bool) or not isinstance(raw, int | float):
-        what = "nothing" if raw is None else quote(raw)
-        raise _wrong(
-            f"{what} is not a number; allowed: {parameter.allowed}"
+        raise wrong(
+            f"{quote(raw)} is not a number; allowed: {parameter.allowed}"
             + ("" if at else ", a list of such, or {start, stop, num, spacing: linear|log}"),
             *at,
         )
     if not (abs(raw) <= sys.float_info.max and parameter.allows(raw)):
-        raise _wrong(f"{quote(raw)} is out of bounds; allowed: {parameter.allowed}", *at)
+        raise wrong(f"{quote(raw)} is out of bounds; allowed: {parameter.allowed}", *at)
+
+
+_STEP = Allowed("auto, or a finite number > 0 in sqrt(c/g)")
+_MEASURE = Allowed(f"a list of {', '.join(MEASURES)}")
 
 
 def _step(raw: Any) -> Any:
     if raw == "auto" or (isinstance(raw, int | float) and not isinstance(raw, bool) and 0 < raw <= sys.float_info.max):
         return raw
-    raise _wrong(f"{quote(raw)}; allowed: auto, or a finite number > 0 in sqrt(c/g)")
+    raise wrong(refusal(raw, _STEP.words, ["auto"]))
 
 
 def _measures(raw: Any) -> Any:
     """Specs of the measurements: "reversals" for `reversals`, "reversal_times=12" for `{reversal_times: 12}`."""
-    if not isinstance(raw, list):
+    if raw is None:
         return raw
+    if not isinstance(raw, list):
+        raise wrong(refusal(raw, _MEASURE.words))
     specs = [_measure(item, i) for i, item in enumerate(raw)]
     if len({spec.partition("=")[0] for spec in specs}) < len(specs):
-        raise _wrong("a name twice; allowed: each once")
+        raise wrong("a name twice; allowed: each once")
     return specs
 
 
 def _measure(raw: Any, i: int) -> str:
     name, setting = next(iter(raw.items())) if isinstance(raw, dict) and len(raw) == 1 else (raw, None)
     if not isinstance(name, str) or name not in MEASURES:
-        raise _wrong(f"{quote(raw)} is not a measurement; allowed: {', '.join(MEASURES)}", i)
+        meant = suggestion(name, MEASURES)
+        raise wrong(f"{quote(raw)} is not a measurement{meant}; allowed: {', '.join(MEASURES)}", i)
     kind = MEASURES[name]
     if not isinstance(raw, dict):
         return kind().spec
     if kind.bounds is None:
-        raise _wrong(f"{name} has no setting; allowed: {name}", i)
+        raise wrong(f"{name} has no setting; allowed: {name}", i)
     low, high = kind.bounds
+    setting = _whole(setting)
     if isinstance(setting, bool) or not isinstance(setting, int) or not low <= setting <= high:
-        raise _wrong(f"{quote(setting)}; allowed: a whole number from {low} to {high}", i, name)
+        raise wrong(f"{quote(setting)}; allowed: a whole number from {low} to {high}", i, name)
     return kind(setting).spec  # type: ignore[call-arg]
 
 
@@ -154,51 +202,126 @@ FOREVER = 1e7
 """What `t_end: .inf` stands for, in sqrt(c/g): longer than any rattleback spins.  A trajectory that has not settled by
 then has the status `time_limit` all the same."""
 
+LATEST = 1e12
+"""Largest `t_end`, in sqrt(c/g)."""
+
 
 class Integrator(_Strict):
-    method: Literal[(*METHODS, AUTO)] = AUTO  # type: ignore[valid-type]
+    method: Literal[(*METHODS, AUTO)] = Field(  # type: ignore[valid-type]
+        default=AUTO, description="integration method; `auto` chooses the faster one for each cell"
+    )
     """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time.  With a number
     for `step`, and for a model that only one method can integrate, that is the default."""
-    step: Annotated[float | Literal["auto"], BeforeValidator(_step)] = "auto"
-    tolerance: float = Field(default=TOLERANCE, ge=1e-14, lt=1)
-    """Error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep."""
-    t_end: Annotated[float, BeforeValidator(lambda raw: FOREVER if raw == math.inf else raw)] = Field(
-        default=30_000.0, gt=0, le=1e12
+    step: Annotated[float | Literal["auto"], BeforeValidator(_step), _STEP] = Field(
+        default="auto", description="fixed step in sqrt(c/g), or `auto`"
     )
-    """Time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` stands for `FOREVER`."""
-    stop_when_settled: bool = True
+    tolerance: float = Field(
+        default=TOLERANCE, ge=1e-14, lt=1,
+        description="error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep",
+    )  # fmt: skip
+    t_end: Annotated[
+        float,
+        BeforeValidator(lambda raw: FOREVER if isinstance(raw, float) and raw == math.inf else raw),
+        Allowed(f"a number > 0 and <= {LATEST:g}, or .inf"),
+    ] = Field(
+        default=30_000.0, gt=0, le=LATEST,
+        description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}",
+    )  # fmt: skip
+    stop_when_settled: bool = Field(
+        default=True, description="whether a trajectory ends when neither spin nor count can change any more"
+    )
 
 
-def _section(name: str) -> Any:
-    """The schema of one section of physical parameters, made from the table of parameters."""
-    fields: dict[str, Any] = {
+def _physical(section: str) -> dict[str, Any]:
+    """The fields of the physical parameters in a section, made from the table of parameters."""
+    return {
         p.name: (
             Annotated[Any, BeforeValidator(lambda raw, p=p: _parse_values(p, raw)), Field(description=p.long_name)],
             None,
         )
         for p in PARAMETERS.values()
-        if p.section == name
+        if p.section == section
     }
-    return create_model(name.capitalize(), __base__=_Strict, **fields)
+
+
+class _Words(_Strict):
+    """What a section has beside physical parameters: of most, nothing."""
+
+
+class Law(_Words):
+    law: Literal["viscous", "coulomb", "stribeck", "none"] = Field(
+        default="viscous", description="law of slip friction"
+    )
+    regularisation: Literal["sqrt", "tanh", "cubic"] = Field(
+        default="sqrt", description="how Coulomb friction passes through zero slip, within `speed`"
+    )
+
+    @property
+    def name(self) -> str:
+        """As in `sweep.models.laws.LAWS`."""
+        return f"{self.law}-{self.regularisation}" if self.law == "coulomb" else self.law
+
+
+_WORDS: dict[str, type[_Words]] = {"friction": Law}
 
 
 class _Top(_Strict):
-    name: str = Field(default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")
-    model: Literal[tuple(TIERS)] = "slip"  # type: ignore[valid-type]
-    cases: str | None = None
+    name: Annotated[str, Allowed("up to 100 of A-Z, a-z, 0-9, '.', '_', '-', the first a letter or digit")] = Field(
+        default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
+        description="name of the run and of its files; by default that of the configuration file",
+    )  # fmt: skip
+    model: Literal[tuple(TIERS)] = Field(  # type: ignore[valid-type]
+        default="slip", description="which model to integrate"
+    )
+    units: Literal[PAPER, SI] = Field(  # type: ignore[valid-type]
+        default=PAPER, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
+    )
+    cases: Annotated[str | None, Allowed("the name of a CSV file")] = Field(
+        default=None,
+        description="CSV table with a column for each parameter and a row for each trajectory, instead of axes",
+    )
     integrator: Integrator = Integrator()
-    measure: Annotated[list[str] | None, BeforeValidator(_measures)] = None
-    """By default, those measurements marked `by_default` that the model supports."""
-    verify: float | None = Field(default=None, ge=0, le=1)
-    """Share of the cells that are run again with the plain method at half its step; by default `VERIFIED` where the
-    method is `auto`, nothing is inferred and the share amounts to a cell, else none."""
-    refine: int = Field(default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1)
-    """The largest blocks of cells whose inside is inferred from their sides have 2^refine cells a side."""
-    max_failed_fraction: float = Field(default=0.01, ge=0, le=1)
+    measure: Annotated[list[str] | None, BeforeValidator(_measures), _MEASURE] = Field(
+        default=None, description="what to compute; by default the measurements marked so that the model supports"
+    )
+    verify: float | None = Field(
+        default=None, ge=0, le=1,
+        description=f"share of the cells, drawn at random, to run again with the plain method at half its step; by "
+        f"default {VERIFIED:g} with `method: auto` where that is a cell or more and nothing is inferred, else 0",
+    )  # fmt: skip
+    refine: Whole = Field(
+        default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1,
+        description="the largest blocks of cells whose inside is inferred from their sides have 2^refine cells a side; "
+        "0 simulates every cell",
+    )  # fmt: skip
+    max_failed_fraction: float = Field(
+        default=0.01, ge=0, le=1, description="share of failed cells beyond which the command exits with 3"
+    )
 
 
-_sections: dict[str, Any] = {name: (_section(name), Field(default_factory=dict)) for name in SECTIONS}
-Schema: Any = create_model("Configuration", __base__=_Top, **_sections)
+def _section(name: str) -> tuple[Any, Any]:
+    made: Any = create_model(name.capitalize(), __base__=_WORDS.get(name, _Words), **_physical(name))
+    return made, Field(default_factory=made)
+
+
+_sections: dict[str, Any] = {name: _section(name) for name in SECTIONS}
+Schema: Any = create_model("Configuration", __base__=_Top, **_physical(""), **_sections)
+
+SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fields.items() if name != "integrator"}
+SETTINGS |= {f"friction.{name}": field for name, field in Law.model_fields.items()}
+SETTINGS |= {f"integrator.{name}": field for name, field in Integrator.model_fields.items()}
+"""All values of a configuration but the physical parameters, by path; the `description` of each says what it means."""
+
+PATHS: dict[str, str] = {p.path: p.long_name for p in PARAMETERS.values()}
+PATHS |= {path: str(field.description) for path, field in SETTINGS.items()}
+"""The path of every value of a configuration, and what it means."""
+
+
+def tier_of(model: str, law: str, units: str, names: Collection[str]) -> Tier:
+    """The model of a configuration that names these parameters."""
+    if model not in BASES or is_papers(law, units, names):
+        return TIERS[model]
+    return variant(model, law, units, names)
 
 
 @dataclass(frozen=True)
@@ -218,21 +341,56 @@ class Config:
     cases: dict[str, tuple[float, ...]] | None = None
     """Columns of the table of cases, if there is one."""
     cases_file: str | None = None
+    units: str = PAPER
+    law: str = PAPERS_LAW
+    """Name of the law of friction, as in `sweep.models.laws.LAWS`."""
+    source: Document | None = field(default=None, init=False, compare=False, repr=False)
+    """What it was made from, so that single values can be replaced; a copy with other values has none."""
+
+    def fault(self, path: Path, message: str) -> Fault:
+        """A fault at `path`, with the place where the user can correct it if that is known."""
+        return (self.source or Document("")).fault(path, message)
 
     @property
     def axes(self) -> dict[str, tuple[float, ...]]:
         return {name: v.numbers for name, v in self.parameters.items() if v.is_axis}
 
+    @cached_property
+    def tier(self) -> Tier:
+        """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
+        return tier_of(self.model, self.law, self.units, (*self.parameters, *(self.cases or ())))
+
+    @property
+    def equations(self) -> Model:
+        """The model of a configuration that is simulated."""
+        assert isinstance(self.tier, Model)
+        return self.tier
+
+    def described(self, name: str) -> dict[str, str]:
+        """The CF attributes of a physical parameter."""
+        parameter = PARAMETERS[name]
+        if name in LAWS[self.law].pure:
+            return {"long_name": "coefficient of friction", "units": "1"}
+        units, long_name = parameter.units, parameter.long_name
+        if self.units == SI:
+            units, long_name = in_si(units, long_name)
+        return {"long_name": long_name, "units": units}
+
     def document(self) -> dict[str, Any]:
         """The whole configuration, defaults included, as plain data."""
         written = [PARAMETERS[name].section for name in self.axes if name not in FIRST_AXES]
         # In the order of the axes, so that they keep it when the document is read again.
-        sections: dict[str, dict[str, Any]] = {section: {} for section in (*written, *SECTIONS)}
+        sections: dict[str, dict[str, Any]] = {section: {} for section in (*written, *SECTIONS) if section}
+        top: dict[str, Any] = {"units": self.units} if self.units != PAPER else {}
+        if self.law != PAPERS_LAW:
+            law, _, regularisation = self.law.partition("-")
+            sections["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
         for name, value in self.parameters.items():
-            sections[PARAMETERS[name].section][name] = value.spec
+            sections.get(PARAMETERS[name].section, top)[name] = value.spec
         return {
             "name": self.name,
             "model": self.model,
+            **top,
             **({"cases": self.cases_file} if self.cases_file else {}),
             **{section: values for section, values in sections.items() if values},
             "integrator": self.integrator.model_dump(),
@@ -266,30 +424,3 @@ def _written(spec: str) -> str | dict[str, int]:
     """The spec of a measurement in the form in which a configuration gives it."""
     name, _, setting = spec.partition("=")
     return {name: int(setting)} if setting else name
-
-
-def describe(error: Any) -> tuple[tuple[str | int, ...], str, bool]:
-    """Of one of pydantic's errors: its path, its message, and whether the key itself is at fault."""
-    path = error["loc"]
-    at = error.get("ctx", {}).get("at", ())
-    return (*path, *at), _message(error, _model_at(path[:-1])), error["type"] == "extra_forbidden"
-
-
-def _model_at(path: tuple[str | int, ...]) -> Any:
-    model: Any = Schema
-    for part in path:
-        annotation = getattr(model, "model_fields", {}).get(part)
-        model = annotation.annotation if annotation else model
-    return model
-
-
-def _message(error: Any, model: Any) -> str:
-    if error["type"] == "extra_forbidden":
-        return f"unknown key; allowed: {', '.join(model.model_fields)}"
-    if error["type"] == "missing":
-        return "missing; required here"
-    text = str(error["msg"])
-    given = error["input"]
-    if error["type"] == "value":
-        return text
-    return f"{quote(given)}: {text[0].lower()}{text[1:]}" if not isinstance(given, dict) else text

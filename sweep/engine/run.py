@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, as_config
+from sweep.config import Config, ConfigLike, load_config
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.earlier import RERUN, Earlier, reason_against, taken_over
@@ -31,7 +31,7 @@ from sweep.results.identity import Identity, not_replaced
 from sweep.results.memory import Memory
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
-from sweep.results.store import Store, StoreError
+from sweep.results.store import Running, Store, StoreError
 
 LARGE = 2_000_000
 """Cells of the largest dataset that is loaded into memory unasked."""
@@ -43,7 +43,7 @@ def tile_size(cells: int) -> int:
 
 
 def run(
-    config: Config | str | Path,
+    config: ConfigLike,
     output: str | Path | None = None,
     *,
     fresh: bool = False,
@@ -80,7 +80,7 @@ def run(
     ConfigError, StoreError
         if the configuration, or what `output` holds, cannot be used.
     """
-    config = as_config(config, overrides)
+    config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun {rerun!r}; allowed: {', '.join(RERUN)}")
     reporter = reporter or Reporter()
@@ -126,8 +126,7 @@ def _earlier(config: Config, identity: Identity, files: RunFiles, rerun: str | N
 def _compute(
     config: Config, store: Store, reporter: Reporter, cluster: Cluster | None, earlier: Earlier | None = None
 ) -> Whole | Refined | Enlarged:
-    if store.done or store.load_running():
-        reporter.note(f"resuming an earlier run, which finished {len(store.done)} tiles")
+    running = store.load_running()
     result: Whole | Refined | Enlarged
     if earlier:
         reporter.note(earlier.words)
@@ -137,8 +136,18 @@ def _compute(
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
     count = Count(reporter)
     while result.grow(tile_size):
+        if not count.cells and (store.done or running):
+            reporter.note(_kept(result, store, running))
         _run_tiles(result.simulated(), result.tiles, store, count, cluster)
     return result
+
+
+def _kept(result: Whole | Refined | Enlarged, store: Store, running: Running | None) -> str:
+    """What an earlier run left."""
+    grid = Grid.of(result.simulated())
+    finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
+    more = f", {sum(map(len, running.tables.values()))} under way" if running else ""
+    return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 
 
 def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count, cluster: Cluster | None) -> None:

@@ -14,8 +14,8 @@ So ω' = α + R β with α = J⁻¹ (τ0 - ω × J ω) and β = J⁻¹ (x_p × (
 
     v_p' = R (u + f) - g u - x_p × ω' - ω × (v_p + v_0 - x_p').
 
-The contact point stays in the plane, v_p · u = 0.  The derivative of that, with u' = u × ω, is v_p' · u = -u · (ω × v_p),
-which cancels the same term on the right.  With q = u × x_p,
+The contact point stays in the plane, v_p · u = 0.  With u' = u × ω the derivative of that is v_p' · u =
+-u · (ω × v_p), which cancels the same term on the right.  With q = u × x_p,
 
     R = (g + (v_0 - x_p') · u' + q · α) / (1 - q · β).
 

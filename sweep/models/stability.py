@@ -61,7 +61,7 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     ValueError
         if the Jacobian of the model is not quadratic in the spin.
     """
-    constants = model.constants.of(columns)
+    constants, limits = model.constants.of(columns), SPIN_LIMIT * model.spin_unit(columns)
     rest = np.zeros_like(constants[0])
     ranges = np.full((6, len(rest)), np.nan)
     cells = np.flatnonzero(growth_rate(model, constants, rest) < _DECAYS)
@@ -69,7 +69,7 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
         constants = take(constants, cells)
         changes = _possible_changes(*_polynomial(model, constants))
         for sign, rows in ((-1, (0, 3, 2)), (1, (1, 4, 5))):
-            ends = _ends(model, constants, sign * changes, sign)
+            ends = _ends(model, constants, sign * changes, sign, limits[cells])
             for row, end in zip(rows, ends, strict=True):
                 ranges[row, cells] = sign * end
     return ranges
@@ -109,13 +109,13 @@ def _compound(J: Array) -> Array:
     return np.asarray(J[:, p, i] * (q == j) - J[:, q, i] * (p == j) + J[:, q, j] * (p == i) - J[:, p, j] * (q == i))
 
 
-def _ends(model: Model, constants: Any, changes: Array, sign: int) -> tuple[Array, Array, Array]:
+def _ends(model: Model, constants: Any, changes: Array, sign: int, limits: Array) -> tuple[Array, Array, Array]:
     """|spin| at the end of the range about zero, and at both ends of the next one, on the side of `sign`."""
-    changes = np.sort(np.where((changes > 0) & (changes <= SPIN_LIMIT), changes, np.inf), axis=-1)
+    changes = np.sort(np.where((changes > 0) & (changes <= limits[:, None]), changes, np.inf), axis=-1)
     changes = np.append(changes, np.full((len(changes), 1), np.inf), axis=-1)
     # Whether the rattle grows between one change and the next.
     cells, place = np.nonzero(np.isfinite(changes))
-    spins = (changes[cells, place] + np.minimum(changes[cells, place + 1], SPIN_LIMIT)) / 2
+    spins = (changes[cells, place] + np.minimum(changes[cells, place + 1], limits[cells])) / 2
     growth = np.full(changes.shape, np.nan)
     growth[cells, place] = growth_rate(model, take(constants, cells), sign * spins)
 

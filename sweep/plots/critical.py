@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from sweep.plots.panels import MAX_ROWS, heading, indices, panel_title, symbol
+from sweep.plots import labels, legends, theory
+from sweep.plots.maps import arrangement
+from sweep.plots.panels import MAX_PANELS, heading, indices, is_logarithmic, title
+
+_COLOURS = {"n_c1": "C0", "n_c2": "C1"}
+
+_SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
+    "": ("formula of Takano (2011)", {"linestyle": "--"}),
+    "_linear": ("eigenvalues of the model", {"linestyle": "-"}),
+    "_simulated": ("simulation", {"linestyle": "none", "marker": "x", "markersize": 4}),
+}
+"""Where a critical spin comes from, and how that is drawn."""
 
 
 def draw(dataset: xr.Dataset) -> Figure:
@@ -14,23 +28,39 @@ def draw(dataset: xr.Dataset) -> Figure:
     dims = [str(d) for d in dataset["n_c1_plus_simulated"].dims]
     dims.sort(key=lambda d: -dataset.sizes[d])
     x = dims[0] if dims else None
-    panels = list(indices(dataset, dims[1:]))[:MAX_ROWS]
-    figure = Figure(figsize=(8, 1.2 + 3.2 * len(panels)), dpi=110, layout="constrained")
+    panels = list(indices(dataset, dims[1:]))[:MAX_PANELS]
+    rows, columns = arrangement(len(panels), 2)
+    figure = Figure(figsize=(min(8 * columns, 14), 2 + 3.2 * rows), dpi=110, layout="constrained")
     figure.suptitle(heading(dataset), fontsize=10)
-    rows = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
-    styles = {"": ("--", "formula"), "_linear": ("-", "eigenvalues"), "_simulated": ("x", "simulation")}
-    for axes, panel in zip(rows, panels, strict=True):
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
+    for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
         chosen = dataset.isel(panel)
         at = np.atleast_1d(chosen[x].values) if x else np.zeros(1)
-        for colour, name in enumerate(("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")):
-            for suffix, (style, source) in styles.items():
-                if name + suffix in chosen:
-                    values = np.atleast_1d(chosen[name + suffix].values)
-                    label = f"{name[:4]}{'+' if name.endswith('plus') else '-'}, {source}"
-                    axes.plot(at, values, style, color=f"C{colour}", linewidth=1, markersize=4, label=label)
+        order = np.argsort(at)
+        if is_logarithmic(at[order]):
+            axes.set_xscale("log")
+        for name, colour in _COLOURS.items():
+            for side in ("plus", "minus"):
+                for suffix, (_, style) in _SOURCES.items():
+                    if (variable := f"{name}_{side}{suffix}") in chosen:
+                        values = np.atleast_1d(chosen[variable].values)
+                        axes.plot(at[order], values[order], color=colour, linewidth=1, gid=variable, **style)
         axes.axhline(0, color="black", linewidth=0.5)
-        axes.set_title(panel_title(dataset, panel), fontsize=9)
-        axes.set_ylabel("n / sqrt(g/c)")
-    rows[0].legend(fontsize=6, ncols=4)
-    rows[-1].set_xlabel(symbol(x) if x else "")
+        axes.set_title(title(dataset, panel), fontsize=9)
+        axes.set_ylabel("spin n (√(g/c))", fontsize=9)
+        axes.tick_params(labelsize=8, labelbottom=k + columns >= len(panels))
+        if x and k + columns >= len(panels):
+            axes.set_xlabel(labels.label(dataset, x), fontsize=9)
+    for axes in grid[len(panels) :]:
+        axes.remove()
+    legends.below(figure, [*_names(), *_sources()])
     return figure
+
+
+def _names() -> list[Line2D]:
+    words = {name: f"n$_{{{name[2:]}}}$: {theory.WORDS[name]} where |n| is larger" for name in _COLOURS}
+    return [Line2D([], [], color=colour, linewidth=4, label=words[name]) for name, colour in _COLOURS.items()]
+
+
+def _sources() -> list[Line2D]:
+    return [Line2D([], [], color="0.3", linewidth=1, label=words, **style) for words, style in _SOURCES.values()]

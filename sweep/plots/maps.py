@@ -2,116 +2,179 @@
 
 from __future__ import annotations
 
-from typing import Any
+from math import log
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize
+from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sweep.grid import Array
-from sweep.plots.panels import Panels, best_shape, failed, heading, panel_title, symbol, words
+from sweep.plots import cells, labels, legends, scales, theory
+from sweep.plots.marks import blank, legend, marks
+from sweep.plots.panels import Panels, edges, heading, is_logarithmic, title
+from sweep.plots.scales import Limits, Scale
 
-_MAX_COLOURS = 40
+_MAX_VALUES = 1000
+"""Values drawn of an axis, taken evenly: more would be less than a pixel each."""
+
+_PAGE, _WIDEST, _RATIO = 14.0, 4.4, 0.78
+"""Inches of the page across, inches of a map across, and its height relative to that."""
+
+_BAR = 0.05
+"""Width of a bar relative to a map."""
+
+_SMALL = 4
+"""Maps beside each other beyond which they are too small for labels at lines."""
+
+_OF_DIFFERENCES = ("failed", "not_run", "time_limit")
+"""Kinds of cell marked on maps of differences too; the map of the simulated counts beside it has all."""
+
+_TITLES = {"reversals": "simulated", "reversals_predicted": "predicted (Takano 2011)"}
+_SMALL_TITLES = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
 
 
-def draw(panels: Panels) -> Figure:
-    """A map of each variable over the two long axes, in a row for each value of the others."""
-    dataset, names = panels.dataset, panels.names
-    down, right = panels.across
-    figure = Figure(figsize=(1.5 + 4.6 * len(names), 1.2 + 3.6 * len(panels.each)), dpi=110, layout="constrained")
-    figure.suptitle(heading(dataset), fontsize=10)
-    grid = figure.subplots(len(panels.each), len(names), squeeze=False, sharex=True, sharey=True)
-    for row, panel in zip(grid, panels.each, strict=True):
-        colours, norm = _colours(dataset.isel(panel), names)
-        for axes, name in zip(row, names, strict=True):
-            chosen = dataset.isel(panel)
-            values = chosen[name].transpose(down, right).values
-            empty = np.isnan(values.astype(float)) | failed(chosen, name).transpose(down, right).values
-            # Cells without a result are dark and hatched, never in a colour of the scale.
-            axes.set_facecolor("0.25")
-            axes.patch.set(hatch="xxx", edgecolor="0.6")
-            mesh = axes.pcolormesh(
-                dataset[right], dataset[down], np.ma.masked_where(empty, values),
-                cmap=colours, norm=norm, shading="nearest",
-            )  # fmt: skip
-            axes.set_title(f"{words(name)}\n{panel_title(dataset, panel)}", fontsize=9)
-            _mark_best_shape(axes, dataset, right)
-            handles = _mark_uncertain(axes, chosen, name, (down, right))
-            if empty.any():
-                label = f"no result: {empty.sum()} of {empty.size}"
-                handles.append(Patch(facecolor="0.25", hatch="xxx", edgecolor="0.6", label=label))
-            if handles:
-                axes.legend(handles=handles, fontsize=7, loc="upper left")
-        row[0].set_ylabel(symbol(down))
-        bar = figure.colorbar(mesh, ax=list(row), label=words(names[0]) if len(names) == 1 else "reversals")
-        _label_bar(bar, dataset, names[0], norm)
-    for axes in grid[-1]:
-        axes.set_xlabel(symbol(right))
+def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Figure:
+    """A map of each variable over two axes, side by side, and such a row for each value of the other axes."""
+    rows, groups = arrangement(len(panels.each), len(panels.names))
+    columns = groups * len(panels.names)
+    width = min(_PAGE / columns, _WIDEST)
+    figure = Figure(figsize=(width * columns + 1.2, 1.6 + width * _RATIO * rows), dpi=110, layout="constrained")
+    figure.suptitle(heading(panels.dataset), fontsize=10)
+    kinds = _columns(panels)
+    grid = figure.add_gridspec(rows, groups * len(kinds), width_ratios=groups * [_BAR if k == "" else 1 for k in kinds])
+    thin = {d: slice(None, None, -(-panels.dataset.sizes[d] // _MAX_VALUES)) for d in panels.across}
+    entries: dict[str, Artist] = {}
+    first: Axes | None = None
+    for k, panel in enumerate(panels.each):
+        row, group = divmod(k, groups)
+        chosen = panels.dataset.isel(thin).isel(panel)
+        for i, name in enumerate(kinds):
+            place = grid[row, group * len(kinds) + i]
+            scale = _scale(chosen, panels, name or kinds[i - 1], limits, cmap)
+            if name == "":
+                _bar(figure.add_subplot(place), panels.dataset, kinds[i - 1], scale)
+                continue
+            axes = figure.add_subplot(place, sharex=first, sharey=first)
+            first = first or axes
+            entries |= _map(axes, chosen, name, panels.across, scale, small=columns > _SMALL)
+            axes.set_title(_title(panels, name, panel, small=columns > _SMALL), fontsize=9)
+            _label_axes(axes, panels, left=i == 0, lowest=k + groups >= len(panels.each))
+    _legend(figure, panels, entries)
     return figure
 
 
-def _mark_uncertain(axes: Axes, chosen: xr.Dataset, name: str, across: tuple[str, str]) -> list[Artist]:
-    """Dots on the cells whose number of reversals cannot be known; returns their entry for the legend."""
-    if name != "reversals":
-        return []
-    uncertain = xr.zeros_like(chosen[name], dtype=bool)
-    for flag in ("sensitive", "window_dependent"):
-        if flag in chosen:
-            uncertain |= (chosen[flag] != 0) & ~failed(chosen, name)
-    rows, columns = np.nonzero(uncertain.transpose(*across).values)
-    if not len(rows):
-        return []
+def _columns(panels: Panels) -> list[str]:
+    """The variables of a panel in their order, and "" for each bar: after the last map that shares its scale."""
+    if "flag_values" in panels.dataset[panels.names[0]].attrs:  # told in the legend
+        return panels.names
+    counted = [name for name in panels.names if name != "difference"]
+    return [*counted, *([""] if counted else []), *(["difference", ""] if "difference" in panels.names else [])]
+
+
+def arrangement(panels: int, maps: int) -> tuple[int, int]:
+    """Rows of the page, and panels side by side in each, for so many panels of so many maps: shaped as a screen."""
+
+    def misshapen(groups: int) -> float:
+        return abs(log(groups * maps / (-(-panels // groups) * _RATIO) / 2))
+
+    groups = min(range(1, panels + 1), key=misshapen)
+    return -(-panels // groups), groups
+
+
+def _map(
+    axes: Axes, chosen: xr.Dataset, name: str, across: list[str], scale: Scale, *, small: bool
+) -> dict[str, Artist]:
+    """Draw one map; returns the entries that its lines need in the legend."""
     down, right = across
-    label = f"count not certain: {len(rows)} of {uncertain.size}"
-    return list(axes.plot(chosen[right].values[columns], chosen[down].values[rows], "o", color="white", markersize=2.5,
-                          markeredgecolor="black", markeredgewidth=0.4, label=label))  # fmt: skip
+    field = chosen[name].transpose(down, right)
+    kinds = marks(chosen, name)
+    empty = blank(kinds).transpose(down, right).values | field.isnull().values
+    values = field.values
+    around = edges(chosen[down].values), edges(chosen[right].values)
+    if is_logarithmic(chosen[right].values):
+        axes.set_xscale("log")
+    if is_logarithmic(chosen[down].values):
+        axes.set_yscale("log")
+    axes.pcolormesh(
+        around[1], around[0], np.ma.masked_where(empty, values),
+        cmap=scale.colours, norm=scale.norm, rasterized=values.size > 5000,
+    )  # fmt: skip
+    axes.set(xlim=around[1][[0, -1]], ylim=around[0][[0, -1]])
+    dark = np.where(empty, False, scale.lightness(np.where(empty, values.ravel()[0], values)) < 0.5)
+    arrays = {kind: where.transpose(down, right).values for kind, where in kinds.items()}
+    if name == "difference":
+        arrays = {kind: where for kind, where in arrays.items() if kind in _OF_DIFFERENCES}
+    cells.draw(axes, arrays, around, dark)
+    if name not in theory.REVERSALS:
+        return {}
+    return dict(theory.draw(axes, chosen, (down, right), labelled=not small))
 
 
-def _mark_best_shape(axes: Axes, dataset: xr.Dataset, right: str) -> None:
-    b = best_shape(dataset)
-    if right == "b" and b and dataset["b"].min() <= b <= dataset["b"].max():
-        axes.axvline(b, color="white", linestyle="--", linewidth=1.2)
-        axes.annotate(f"max L(f)\nb = {b:.2f}", (b, 0.99), xycoords=("data", "axes fraction"), color="white",
-                      fontsize=7, va="top", xytext=(3, 0), textcoords="offset points")  # fmt: skip
+def _scale(chosen: xr.Dataset, panels: Panels, name: str, limits: Limits | None, cmap: str | None) -> Scale:
+    """The scale of a map: simulated and predicted counts of a panel share theirs."""
+    if "flag_values" in chosen[name].attrs:
+        return scales.flags(_flags_present(panels.dataset[name]), cmap)
+    if name == "difference":
+        alone = panels.names == [name]
+        return scales.differences(_values(chosen, name), limits if alone else None, cmap if alone else None)
+    if chosen[name].dtype.kind == "i":
+        together = [other for other in panels.names if other != "difference"]
+        return scales.counts(np.concatenate([_values(chosen, other) for other in together]), limits, cmap)
+    return scales.continuous(_values(chosen, name), limits, cmap)
 
 
-def _colours(dataset: xr.Dataset, names: list[str]) -> tuple[Colormap, Normalize]:
-    values = np.concatenate([np.ravel(dataset[name].values) for name in names])
-    if "flag_values" in dataset[names[0]].attrs:
-        n = len(dataset[names[0]].attrs["flag_values"])
-        return ListedColormap(mpl.colormaps["tab10"].colors[:n]), BoundaryNorm(np.arange(n + 1) - 0.5, n)  # type: ignore[attr-defined]
-    if values.dtype.kind == "i":
-        return _count_colours(values)
-    finite = values[np.isfinite(values)]
-    low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
-    if low > 0 and high > 100 * low:
-        return mpl.colormaps["viridis"], LogNorm(low, high)
-    return mpl.colormaps["viridis"], Normalize(low, high)
+def _values(chosen: xr.Dataset, name: str) -> Array:
+    """The values of the cells that have a result; a zero if none has."""
+    values = chosen[name].values[~blank(marks(chosen, name)).values]
+    return values if values.size else np.zeros(1, chosen[name].dtype)
 
 
-def _count_colours(values: Array) -> tuple[Colormap, BoundaryNorm]:
-    """A colour for each integer; the rare few of the highest counts share the last one."""
-    top = max(int(np.quantile(values, 0.995)), 1)
-    unit = -(-(top + 1) // _MAX_COLOURS)
-    edges = np.arange(-0.5, top + unit + 0.5, unit)
-    over = values.max() > edges[-1]
-    norm = BoundaryNorm(edges, len(edges) - 1 + over, extend="max" if over else "neither")
-    return mpl.colormaps["viridis"].resampled(len(edges) - 1 + over), norm
+def _flags_present(flags: xr.DataArray) -> list[int]:
+    return [int(value) for value in np.unique(flags)]
 
 
-def _label_bar(bar: Any, dataset: xr.Dataset, name: str, norm: Normalize) -> None:
-    if isinstance(norm, BoundaryNorm):
-        edges = np.asarray(norm.boundaries)
-        unit = int(edges[1] - edges[0])
-        first = (edges[:-1] + 0.5).astype(int)
-        sparse = -(-len(first) // 12)
-        labels = [("" if k % sparse else str(i)) if unit == 1 else f"{i}–{i + unit - 1}" for k, i in enumerate(first)]
-        if meanings := dataset[name].attrs.get("flag_meanings"):
-            labels = meanings.split()
-        bar.set_ticks((edges[:-1] + edges[1:]) / 2, labels=labels, fontsize=7)
-        bar.ax.tick_params(which="minor", length=0)
+def _title(panels: Panels, name: str, panel: dict[str, int], *, small: bool) -> str:
+    """What a map shows; a small one beside others leaves the values of its panel to the first of them."""
+    words = labels.words(panels.dataset, name)
+    if len(panels.names) > 1:
+        words = _SMALL_TITLES.get(name, words) if small else _TITLES.get(name, words)
+    elif panel:
+        words = ""  # it stands at the bar or in the legend
+    where = title(panels.dataset, panel) if not small or name == panels.names[0] else ""
+    return ", ".join(filter(None, [words, where]))
+
+
+def _label_axes(axes: Axes, panels: Panels, *, left: bool, lowest: bool) -> None:
+    down, right = panels.across
+    axes.tick_params(labelsize=8, labelleft=left, labelbottom=lowest)
+    if left:
+        axes.set_ylabel(labels.label(panels.dataset, down), fontsize=9)
+    if lowest:
+        axes.set_xlabel(labels.label(panels.dataset, right), fontsize=9)
+
+
+def _bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
+    bar = Colorbar(axes, scale.mappable())
+    words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name)
+    bar.set_label(words, fontsize=8)
+    axes.tick_params(labelsize=7)
+    scale.label(bar)
+
+
+def _legend(figure: Figure, panels: Panels, lines: dict[str, Artist]) -> None:
+    """Below the maps: what the colours of flags, the marks of cells and the lines of theory mean."""
+    dataset, name = panels.dataset, panels.names[0]
+    handles: list[Artist] = []
+    if meanings := labels.flag_words(dataset, name):
+        present = _flags_present(dataset[name])
+        colours = scales.flags(present).rgba(np.array(present))
+        for value, colour in zip(present, colours, strict=True):
+            count = f"{int((dataset[name] == value).sum())} of {dataset[name].size}"
+            handles.append(Patch(facecolor=colour, edgecolor="0.3", label=f"{meanings.get(value, value)} ({count})"))
+    handles += [cells.handle(kind, words) for kind, words in legend(dataset, name).items()]
+    handles += lines.values()
+    legends.below(figure, handles)

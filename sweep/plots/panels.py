@@ -1,22 +1,28 @@
-"""What figures of a dataset share: a panel for each value of the short axes, and the words on them."""
+"""What a figure of a dataset shows: which variables over which axes, in a panel for each value of the others.
+
+Free of any library that draws.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 import xarray as xr
 
-from sweep.kernels.status import FAILURES
+from sweep.grid import Array
 from sweep.models.analytic import best_b
-from sweep.results.dataset import VARIABLES
+from sweep.plots import labels
+from sweep.plots.marks import field
 
-SYMBOLS = {"mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀", "case": "case"}
+MAX_PANELS = 8
+"""Panels that a figure may have."""
 
-MAX_ROWS = 8
-"""Panels that a figure may have, one below the other."""
+_PANEL_VALUES = 4
+"""An axis of more values is drawn as an axis; one of fewer gets a panel for each value."""
 
 
 @dataclass(frozen=True)
@@ -25,11 +31,62 @@ class Panels:
 
     dataset: xr.Dataset
     names: list[str]
-    """Variables."""
+    """Variables, among them perhaps `difference`."""
     across: list[str]
-    """Dimensions drawn as axes: up to two."""
+    """Dimensions drawn as axes, the vertical one first: up to two."""
     each: list[dict[str, int]]
     """For each panel, its index along every other dimension."""
+
+
+def choose(
+    dataset: xr.Dataset,
+    variable: str | None = None,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    sel: Mapping[str, float] | None = None,
+) -> Panels:
+    """What to draw of a dataset; parameters as of `sweep.plots.picture.plot`.
+
+    Raises
+    ------
+    ValueError
+        if there is no such variable or axis, or there would be too many panels.
+    """
+    dataset = dataset.isel(_nearest(dataset, sel or {}))
+    names = _variables(dataset, variable)
+    dims = [str(d) for d in field(dataset, names[0]).dims]
+    for option, name in (("x", x), ("y", y)):
+        if name is not None and name not in dims:
+            raise ValueError(f"{option}: {names[0]} has no axis {name}; allowed: {', '.join(dims) or 'none'}")
+    if x is not None and x == y:
+        raise ValueError(f"x and y are both {x}; allowed: two axes")
+    across = _across(dataset, dims, x, y)
+    rest = [d for d in dims if d not in across]
+    if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
+        shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
+        raise ValueError(f"{count} panels ({shown}); allowed: {MAX_PANELS}, select one value of an axis")
+    dataset = dataset.assign({name: field(dataset, name) for name in names})
+    dataset = dataset.sortby([d for d in across if d in dataset.coords])
+    return Panels(dataset, names, across, list(indices(dataset, rest)))
+
+
+def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:
+    """For each axis of `sel`, its value nearest to the one asked for; `ValueError` where there is no such axis."""
+    return {name: float(dataset[name][i]) for name, i in _nearest(dataset, sel).items()}
+
+
+def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
+    """The places of these values along their axes."""
+    found = {}
+    for name, wanted in sel.items():
+        if name not in dataset.dims or name not in dataset.coords:
+            axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
+            raise ValueError(f"sel: no axis {name}; allowed: {axes or 'none'}")
+        if not math.isfinite(wanted):
+            raise ValueError(f"sel: {name} = {wanted}; allowed: a finite number")
+        found[name] = int(np.abs(dataset[name].values - wanted).argmin())
+    return found
 
 
 def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:
@@ -38,37 +95,63 @@ def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:
         yield dict(zip(dims, index, strict=True))
 
 
-def symbol(name: str) -> str:
-    return SYMBOLS.get(name, name)
-
-
-def words(name: str) -> str:
-    """A variable's name in words."""
-    return {"reversals": "simulated reversals", "reversals_predicted": "predicted reversals (Takano)"}.get(
-        name, name.replace("_", " ")
-    )
-
-
-def panel_title(dataset: xr.Dataset, panel: dict[str, int]) -> str:
-    return ", ".join(f"{symbol(d)} = {float(dataset[d][i]):g}" for d, i in panel.items())
+def title(dataset: xr.Dataset, panel: dict[str, int]) -> str:
+    """What sets a panel apart from the others."""
+    return ", ".join(labels.value(d, float(dataset[d][i])) for d, i in panel.items())
 
 
 def heading(dataset: xr.Dataset) -> str:
     """The dataset's title and its constant parameters."""
-    scalars = [f"{symbol(str(n))} = {float(v):g}" for n, v in dataset.coords.items() if v.ndim == 0]
-    return f"{dataset.attrs.get('title', '')}\n{', '.join(scalars)}"
-
-
-def failed(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Whether `name` has no value because the trajectory failed."""
-    if name in VARIABLES and VARIABLES[name].of_sound_runs and "status" in dataset:
-        return dataset["status"].isin((0, *FAILURES))
-    return xr.zeros_like(dataset[name], dtype=bool)
+    return f"{dataset.attrs.get('title', '')}\n{labels.constants(dataset)}".strip()
 
 
 def best_shape(dataset: xr.Dataset) -> float | None:
-    """b of the largest form factor, if it is the same in the whole dataset."""
-    if any(name not in dataset or dataset[name].ndim for name in ("a", "c")):
+    """b of the largest form factor, if it is the same in the whole dataset and lies within its axis b."""
+    if any(name not in dataset or dataset[name].ndim for name in ("a", "c")) or "b" not in dataset.dims:
         return None
     b = best_b(float(dataset["a"]), float(dataset["c"]))
-    return b if np.isfinite(b) else None
+    return b if dataset["b"].min() <= b <= dataset["b"].max() else None
+
+
+def is_logarithmic(values: Array) -> bool:
+    """Whether the values of an axis, in increasing order, have equal ratios rather than equal distances."""
+    if len(values) < 3 or values[0] <= 0:
+        return False
+    ratios = np.diff(np.log(values))
+    return bool(np.allclose(ratios, ratios[0], rtol=1e-6) and values[-1] > 1.5 * values[0])
+
+
+def edges(values: Array) -> Array:
+    """The edges of cells around the values of an axis: halfway between them, on a logarithmic axis in the logarithm."""
+    if is_logarithmic(values):
+        return np.asarray(np.exp(_midpoints(np.log(values))))
+    return _midpoints(values)
+
+
+def _midpoints(values: Array) -> Array:
+    if len(values) == 1:
+        return np.asarray(values[0] + [-0.5, 0.5])
+    between = (values[1:] + values[:-1]) / 2
+    return np.concatenate([[2 * values[0] - between[0]], between, [2 * values[-1] - between[-1]]])
+
+
+def _variables(dataset: xr.Dataset, variable: str | None) -> list[str]:
+    """The variables to draw: by default the reversals, simulated and predicted, and their difference."""
+    both = [name for name in ("reversals", "reversals_predicted") if name in dataset]
+    names = [*both, *(["difference"] if len(both) == 2 else [])]
+    if variable is not None or not names:
+        names = [variable or "spin_final"]
+    field(dataset, names[0])  # raises if there is none
+    return names
+
+
+def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:
+    """The dimensions to draw as axes, the vertical one first: those asked for, then the first long ones."""
+    free = [d for d in dims if d not in (x, y)]
+    long = [d for d in free if dataset.sizes[d] > _PANEL_VALUES]
+    longest = sorted(free, key=lambda d: -dataset.sizes[d])[:1]
+    if x is None and y is None:
+        return (long or longest)[:2]
+    if x is None:
+        return [d for d in (y, *(long or longest)[:1]) if d]
+    return [d for d in (y or next(iter(long), None), x) if d]

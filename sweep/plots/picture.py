@@ -2,43 +2,108 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
+import matplotlib as mpl
 import xarray as xr
 from matplotlib.figure import Figure
 
-from sweep.plots import curves, maps
-from sweep.plots.panels import MAX_ROWS, Panels, indices
+from sweep.plots import critical, curves, maps, panels, scales, trajectories
+from sweep.plots.scales import Limits
+from sweep.results.kind import CRITICAL, TRAJECTORY, kind
+from sweep.results.netcdf import open_dataset
+from sweep.results.writing import replacing
 
-_PANEL_VALUES = 4
-"""An axis of more values is drawn as an axis; one of fewer gets a panel for each value."""
+FORMATS = ("png", "pdf", "svg")
+"""Formats that a figure can be saved in, each named by the suffix of the file."""
 
-_MAX_VALUES = 1000
-"""Values drawn of an axis, taken evenly: more would be less than a pixel each."""
+ALLOWED = f"a file that ends in .{', .'.join(FORMATS)}"
+
+_NO_DATE: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
+_DPI = 110
 
 
-def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
-    """Draw maps (two long axes) or curves (one) of `variable`, by default the simulated and the predicted reversals.
+def plot(
+    dataset: xr.Dataset | str | Path,
+    variable: str | None = None,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    sel: Mapping[str, float] | None = None,
+    limits: Limits | None = None,
+    cmap: str | None = None,
+    output: str | Path | None = None,
+) -> Figure:
+    """Draw a dataset of a sweep, of single trajectories or of critical spins.
+
+    Parameters
+    ----------
+    dataset : a dataset, or the path of its file
+    variable : by default the reversals, simulated and predicted, and `difference`, which may also be named
+    x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
+        the values of the other axes gets a panel, up to eight
+    sel : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
+    limits : lowest and highest value of the scale
+    cmap : name of a colour map of matplotlib
+    output : file to write; its suffix names the format: png, pdf or svg
+
+    Returns
+    -------
+    The figure.  Critical spins and trajectories of which no `variable` is named have figures of their own, as the
+    commands draw them that find them.
 
     Raises
     ------
     ValueError
-        if the dataset has no such variable, or would need too many panels.
+        if the dataset has no such variable or axis, would need too many panels, or there is no such format.
+    StoreError
+        if the file is not a dataset, or `output` cannot be written.
     """
-    if variable is None and "reversals" in dataset:
-        names = [name for name in ("reversals", "reversals_predicted") if name in dataset]
-    else:
-        names = [variable or "spin_final"]
-    if missing := [name for name in names if name not in dataset]:
-        raise ValueError(f"no variable {missing[0]}; allowed: {', '.join(map(str, dataset.data_vars))}")
-    dims = [str(d) for d in dataset[names[0]].dims]
-    long = [d for d in dims if dataset.sizes[d] > _PANEL_VALUES]
-    long = long or sorted(dims, key=lambda d: -dataset.sizes[d])[:1]
-    across = long[:2]
-    dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // _MAX_VALUES)) for d in across})
-    rest = [d for d in dims if d not in across]
-    if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_ROWS:
-        shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
-        raise ValueError(f"{count} panels ({shown}); allowed: {MAX_ROWS}, select a part of the dataset first")
-    panels = Panels(dataset, names, across, list(indices(dataset, rest)))
-    return maps.draw(panels) if len(across) == 2 else curves.draw(panels)
+    if output is not None and suffix(Path(output)) not in FORMATS:
+        raise ValueError(f"output: {output}: unknown format; allowed: {ALLOWED}")
+    if not isinstance(dataset, xr.Dataset):
+        dataset = open_dataset(Path(dataset))
+    figure = draw(dataset, variable, x=x, y=y, sel=sel, limits=limits, cmap=cmap)
+    if output is not None:
+        save(figure, Path(output))
+    return figure
+
+
+def draw(
+    dataset: xr.Dataset,
+    variable: str | None = None,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    sel: Mapping[str, float] | None = None,
+    limits: Limits | None = None,
+    cmap: str | None = None,
+) -> Figure:
+    """The figure of a dataset; parameters and errors as of `plot`."""
+    if limits is not None and not limits[0] < limits[1]:
+        raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; allowed: a lower and a higher number")
+    if cmap is not None:
+        scales.colour_map(cmap)  # raises if there is none
+    found = kind(dataset)
+    if found == TRAJECTORY or (found == CRITICAL and variable is None):
+        given = {"x": x, "y": y, "limits": limits, "cmap": cmap, "sel": sel or None}
+        if beyond := [name for name, value in given.items() if value is not None]:
+            raise ValueError(f"{beyond[0]}: not for a figure of {found}; allowed: maps of a run")
+        return trajectories.draw(dataset, variable) if found == TRAJECTORY else critical.draw(dataset)
+    chosen = panels.choose(dataset, variable, x=x, y=y, sel=sel)
+    return maps.draw(chosen, limits, cmap) if len(chosen.across) == 2 else curves.draw(chosen, limits)
+
+
+def suffix(path: Path) -> str:
+    """The format that a file's suffix names."""
+    return path.suffix.removeprefix(".").lower()
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure in the format that the suffix names; the same figure gives the same bytes."""
+    form = suffix(path)
+    with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": "sweep"}):
+        dpi = _DPI if form == "png" else 2 * _DPI
+        figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE[form])

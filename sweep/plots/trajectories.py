@@ -4,62 +4,150 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from sweep.grid import Array
 from sweep.models.rocking import slower_period
-from sweep.plots.panels import symbol
+from sweep.parameters import PARAMETERS
+from sweep.plots import labels, legends, theory
+from sweep.plots.panels import heading
 
-# Title, unit, and the variables drawn together.
-_PANELS = (
-    ("contact point", "c", ("contact_x", "contact_y")),
-    ("normal coordinates", "1", ("mode_1", "mode_2")),
-    ("amplitudes", "1", ("amplitude_1", "amplitude_2")),
-    ("along x: derivatives of v_p and v_0", "g", ("v0_rate_1", "slip_rate_1")),
-    ("along y: derivatives of v_p and v_0", "g", ("v0_rate_2", "slip_rate_2")),
-    ("normal force R", "m g", ("normal_force",)),
-    ("energy above rest and work against friction", "m g c", ("energy", "dissipated")),
+# Title and the series drawn together; two panels stand beside each other.
+_PANELS: tuple[tuple[str, dict[str, str]], ...] = (
+    ("contact point along x", {"contact_x": "x"}),
+    ("contact point along y", {"contact_y": "y"}),
+    ("normal coordinate X", {"mode_1": "X"}),
+    ("normal coordinate Y", {"mode_2": "Y"}),
+    ("amplitude A of the first mode", {"amplitude_1": "A"}),
+    ("amplitude B of the second mode", {"amplitude_2": "B"}),
+    ("acceleration along x", {"v0_rate_1": "dv₀/dt, v₀ = x$_p$ × ω", "slip_rate_1": "dv$_p$/dt, of the slip"}),
+    ("acceleration along y", {"v0_rate_2": "dv₀/dt, v₀ = x$_p$ × ω", "slip_rate_2": "dv$_p$/dt, of the slip"}),
+    ("normal force R", {"normal_force": "R"}),
+    ("energy", {"energy": "above rest", "dissipated": "work against friction"}),
 )
 
+_MOST_ENTRIES = 12
+"""Trajectories named in the legend."""
 
-def draw(dataset: xr.Dataset) -> Figure:
-    """The spin with its reversals and critical values over time, and below it whatever else the dataset has."""
-    panels = [panel for panel in _PANELS if panel[2][0] in dataset]
-    figure = Figure(figsize=(9, 3.2 + 1.9 * len(panels)), dpi=110, layout="constrained")
-    rows = figure.subplots(1 + len(panels), 1, sharex=True, squeeze=False, height_ratios=[2] + [1] * len(panels))[:, 0]
-    draw_spin(rows[0], dataset)
-    rows[0].set_title(dataset.attrs.get("title", ""), fontsize=10)
-    for axes, (title, unit, names) in zip(rows[1:], panels, strict=True):
-        for i in range(dataset.sizes["trajectory"]):
-            for k, name in enumerate(names):
-                label = name.replace("_", " ") if i == 0 and len(names) > 1 else None
-                axes.plot(dataset["time"][i], dataset[name][i], linewidth=0.7, color=f"C{i + 5 * k}", label=label)
-        axes.set_title(title, fontsize=8, loc="left")
-        axes.set_ylabel(unit)
-        if len(names) > 1:
-            axes.legend(fontsize=6, loc="upper right")
-    rows[-1].set_xlabel("t / sqrt(c/g)")
+_SHADES = (0.55, 1.0)
+"""Opacity of the first and of the second series of a panel."""
+
+_CRITICAL = {"n_c1": ":", "n_c2": "--"}
+"""Styles of the critical spins, none of them that of a curve."""
+
+
+def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
+    """The spin with its reversals and critical values over time, and below it whatever else the dataset has.
+
+    Parameters
+    ----------
+    variable : the series to draw alone
+
+    Raises
+    ------
+    ValueError
+        if there is no such series.
+    """
+    over_time = set(dataset["time"].dims) - {"trajectory"}
+    series = [str(name) for name, v in dataset.data_vars.items() if over_time & set(v.dims)]
+    if variable is not None and variable not in series:
+        raise ValueError(f"no series {variable}; allowed: {', '.join(series)}")
+    panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and variable is None]
+    rows = -(-len(panels) // 2)
+    figure = Figure(figsize=(11, 4.2 + 1.9 * rows), dpi=110, layout="constrained")
+    figure.suptitle(heading(_constants_apart(dataset)), fontsize=10)
+    grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
+    first = figure.add_subplot(grid[0, :])
+    only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
+    entries = _series(first, dataset, only) if only else _spin(first, dataset)
+    axes = first
+    for k, (title, names) in enumerate(panels):
+        axes = figure.add_subplot(grid[1 + k // 2, k % 2], sharex=first)
+        _series(axes, dataset, names)
+        axes.set_title(title, fontsize=9, loc="left")
+        axes.tick_params(labelbottom=k >= len(panels) - 2)
+        if k >= len(panels) - 2:
+            axes.set_xlabel(labels.label(dataset, "time"), fontsize=9)
+    if not panels:
+        first.set_xlabel(labels.label(dataset, "time"), fontsize=9)
+    legends.below(figure, entries)
     return figure
 
 
 def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
-    """n(t) of each trajectory with its reversals as dots, and the critical spins of the first trajectory as lines."""
+    """n(t) of each trajectory with its reversals as dots, and the critical spins of each body as lines."""
+    axes.legend(handles=_spin(axes, dataset, critical), fontsize=7)
+    axes.set_xlabel(labels.label(dataset, "time"), fontsize=9)
+
+
+def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist]:
+    """Draw the spins; returns the entries for the legend."""
+    for i in range(dataset.sizes["trajectory"]):
+        times = reversal_times(dataset.isel(trajectory=i))
+        axes.plot(times, np.zeros(len(times)), "o", color=f"C{i}", markersize=4)
+    entries = _series(axes, dataset, {"spin": "spin n"})
+    axes.axhline(0, color="black", linewidth=0.5)
+    entries.append(Line2D([], [], linestyle="none", marker="o", color="0.4", markersize=4, label="reversal"))
+    return entries + (_critical_spins(axes, dataset) if critical else [])
+
+
+def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Artist]:
+    """Draw series of all trajectories, in their colours; returns the entries of the trajectories for the legend."""
+    entries: list[Artist] = []
+    # Oscillations are so dense that an opaque curve would hide those below it.
+    alone = dataset.sizes["trajectory"] == 1 or "spin" in names
+    shades = _SHADES if len(names) > 1 else (1.0 if alone else 0.7,)
     for i in range(dataset.sizes["trajectory"]):
         one = dataset.isel(trajectory=i)
-        count = f": {int(one['reversals'])} reversals" if "reversals" in one else ""
-        axes.plot(one["time"], one["spin"], linewidth=0.8, color=f"C{i}", label=_label(dataset, i) + count)
-        times = reversal_times(one)
-        axes.plot(times, np.zeros(len(times)), "o", color=f"C{i}", markersize=4)
-    axes.axhline(0, color="black", linewidth=0.5)
-    lines = {"n_c1_plus": ":", "n_c1_minus": ":", "n_c2_plus": "--", "n_c2_minus": "--"}
-    for name, style in lines.items():
-        if critical and name in dataset and np.isfinite(value := float(dataset[name][0])):
-            axes.axhline(value, color="0.5", linestyle=style, linewidth=0.8)
-            sign = {"plus": "+", "minus": "-"}[name.split("_")[2]]
-            axes.annotate(f"n_{name[2:4]}{sign}", (1.0, value), xycoords=("axes fraction", "data"), fontsize=6)
-    axes.set_ylabel("n / sqrt(g/c)")
-    axes.legend(fontsize=7)
+        for shade, name in zip(shades, names, strict=True):
+            (line,) = axes.plot(one["time"], one[name], linewidth=0.8, color=f"C{i}", alpha=shade)
+            line.set(label=_label(dataset, i), gid=name, rasterized=one.sizes[one[name].dims[0]] > 5000)
+        if i < _MOST_ENTRIES:
+            entries.append(Line2D([], [], color=f"C{i}", label=_label(dataset, i)))
+    if (more := dataset.sizes["trajectory"] - _MOST_ENTRIES) > 0:
+        entries.append(Line2D([], [], linestyle="none", label=f"and {more} more"))
+    if len(names) > 1:
+        named = zip(shades, names.values(), strict=True)
+        styles = [Line2D([], [], color="black", alpha=shade, label=words) for shade, words in named]
+        axes.legend(
+            handles=styles, fontsize=7, ncols=2, frameon=False, loc="lower right", bbox_to_anchor=(1, 0.98),
+            borderaxespad=0.2,
+        )  # fmt: skip
+    first = next(iter(names))
+    axes.set_ylabel(_with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)), fontsize=9)
+    axes.tick_params(labelsize=8)
+    return entries
+
+
+def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
+    """Lines at the critical spins, one set a body: in the colour of its first trajectory if there are several."""
+    bodies: dict[tuple[float, ...], int] = {}
+    for i in range(dataset.sizes["trajectory"]):
+        one = dataset.isel(trajectory=i)
+        found = [v for name in ("n_c1", "n_c2") for _, v, _ in theory.critical_spins(one, name)]
+        bodies.setdefault(tuple(map(float, found)), i)
+    entries: dict[str, Line2D] = {}
+    written: list[float] = []
+    low, high = axes.get_ylim()
+    for i in bodies.values():
+        colour = "0.4" if len(bodies) == 1 else f"C{i}"
+        for name in ("n_c2", "n_c1"):
+            for side, value, source in theory.critical_spins(dataset.isel(trajectory=i), name):
+                if not np.isfinite(at := float(value)):
+                    continue
+                axes.axhline(at, color=colour, linestyle=_CRITICAL[name], linewidth=0.9, gid=name)
+                entries[name] = theory.entry(name, source, over_n0=True, spin="n")
+                entries[name].set(linestyle=_CRITICAL[name], linewidth=0.9)
+                if all(abs(at - other) > 0.04 * (high - low) for other in written):
+                    axes.annotate(
+                        theory.symbol(name, side), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
+                        textcoords="offset points", fontsize=8, va="center", color=colour,
+                    )  # fmt: skip
+                    written.append(at)
+    return list(entries.values())
 
 
 def reversal_times(one: xr.Dataset) -> Array:
@@ -78,10 +166,18 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 
 def _label(dataset: xr.Dataset, i: int) -> str:
-    """The parameters that set this trajectory apart from the others."""
-    varying = [n for n in ("mu", "b", "n0", "a", "c", "delta", "x0", "y0") if n in dataset and _varies(dataset, n)]
-    return ", ".join(f"{symbol(n)} = {float(dataset[n][i]):g}" for n in varying or ["n0"])
+    """The parameters that set this trajectory apart from the others, and its number of reversals."""
+    varying = [name for name in PARAMETERS if name in dataset and len(set(np.ravel(dataset[name].values))) > 1]
+    named = ", ".join(labels.value(name, float(np.ravel(dataset[name].values)[i])) for name in varying or ["n0"])
+    return f"{named}: {int(dataset['reversals'][i])} reversals" if "reversals" in dataset else named
 
 
-def _varies(dataset: xr.Dataset, name: str) -> bool:
-    return len(set(dataset[name].values)) > 1
+def _with_unit(words: str, unit: str) -> str:
+    return f"{words} ({unit})" if words and unit else words or unit
+
+
+def _constants_apart(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with the parameters that all trajectories share as scalar coordinates."""
+    values = {name: set(np.ravel(dataset[name].values)) for name in PARAMETERS if name in dataset}
+    shared = {name: float(found.pop()) for name, found in values.items() if len(found) == 1}
+    return dataset.drop_vars(list(shared)).assign_coords(shared)

@@ -50,7 +50,7 @@ def slip_ratio() -> Section:
         figure = Figure(figsize=(8, 3), dpi=100, layout="constrained")
         for axes, component in zip(figure.subplots(1, 2), (1, 2), strict=True):
             # Starting without slip makes it jump once; the figures show the amplitudes after that.
-            late = both.isel(trajectory=i, sample=both["time"][i].values > 1.0)
+            late = both.isel(trajectory=i, time=both["time"].values > 1.0)
             v0, vp = late[f"v0_rate_{component}"], late[f"slip_rate_{component}"]
             ratio = float(np.sqrt((vp**2).mean() / (v0**2).mean()))
             section.rows.append(
@@ -101,13 +101,13 @@ def friction() -> Section:
     figure = Figure(figsize=(8, 6.5), dpi=100, layout="constrained")
     top, bottom = figure.subplots(2, 1)
     three = trajectory(configure(), mu=[60, 130, 200], every=3.0)
-    draw_spin(top, three.isel(sample=three["time"].max("trajectory").values < 6000), critical=False)
+    draw_spin(top, three.sel(time=slice(0, 6000)), critical=False)
     for i, mu in enumerate((60, 130, 200)):
         section.rows.append(against_paper(f"reversals_{mu}", f"reversals at μ = {mu}", int(three["reversals"][i])))
     rough = trajectory(configure(t_end=1500.0), mu=[500, 1000, 1500], every=0.25)
     rolling = trajectory(configure("noslip", t_end=1500.0), every=0.25)
     draw_spin(bottom, rough, critical=False)
-    bottom.plot(rolling["time"][0], rolling["spin"][0], "k--", linewidth=0.8, label="no slip")
+    bottom.plot(rolling["time"], rolling["spin"][0], "k--", linewidth=0.8, label="no slip")
     bottom.legend(fontsize=7)
     distance = [_distance(rough.isel(trajectory=i), rolling.isel(trajectory=0), 400.0) for i in range(3)]
     closer = distance[0] > distance[1] > distance[2]
@@ -133,7 +133,9 @@ def friction() -> Section:
 
 def _distance(one: xr.Dataset, other: xr.Dataset, until: float) -> float:
     times = np.arange(0, until, 0.25)
-    spins = [np.interp(times, d["time"].dropna("sample"), d["spin"].dropna("sample")) for d in (one, other)]
+    spins = [
+        np.interp(times, d["time"], d["spin"]) for d in (each.dropna("time", subset=["spin"]) for each in (one, other))
+    ]
     return float(np.abs(spins[0] - spins[1]).max())
 
 

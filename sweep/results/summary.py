@@ -9,7 +9,9 @@ import xarray as xr
 
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, SETTLED, TIME_LIMIT
-from sweep.results.dataset import STATUSES
+from sweep.parameters import PARAMETERS
+from sweep.results.dataset import EXISTS, REASONS, STATUSES
+from sweep.results.kind import CRITICAL, TRAJECTORY, kind
 
 
 def failed_fraction(dataset: xr.Dataset) -> float:
@@ -22,6 +24,18 @@ def summarize(dataset: xr.Dataset) -> str:
     return "\n".join(_summary(dataset))
 
 
+def describe(dataset: xr.Dataset) -> str:
+    """A few lines on the results of a dataset of any kind."""
+    found = kind(dataset)
+    if found == TRAJECTORY:
+        return "\n".join(_trajectories(dataset))
+    if found == CRITICAL:
+        return "\n".join(_critical(dataset))
+    if "status" in dataset:
+        return summarize(dataset)
+    return "no status: predictions, or a part of a run"
+
+
 def contents(dataset: xr.Dataset) -> str:
     """The variables, attributes and configuration of a dataset, a line each."""
     variables = [
@@ -30,6 +44,38 @@ def contents(dataset: xr.Dataset) -> str:
     ]
     attributes = [f"{key}: {dataset.attrs[key]}" for key in sorted(set(dataset.attrs) - {"title", "config"})]
     return "\n".join([*variables, *attributes, f"config:\n{dataset.attrs.get('config', '')}"])
+
+
+def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
+    """A line for each trajectory: how it ended, and its reversals."""
+    most = 20
+    yield f"{dataset.sizes['trajectory']} trajectories, sampled in time"
+    for i in range(min(dataset.sizes["trajectory"], most)):
+        one = dataset.isel(trajectory=i)
+        where = ", ".join(f"{name} = {float(one[name]):g}" for name in PARAMETERS if name in one)
+        count = f", {int(one['reversals'])} reversals" if "reversals" in one else ""
+        samples = int(np.isfinite(one["spin"]).sum())
+        yield f"  {where}: {STATUSES[int(one['status'])]} at t = {float(one['t_stop']):.6g}{count}, {samples} samples"
+    if dataset.sizes["trajectory"] > most:
+        yield f"  and {dataset.sizes['trajectory'] - most} more"
+
+
+def _critical(dataset: xr.Dataset) -> Iterator[str]:
+    """How many critical spins were found, and why the others were not."""
+    yield f"critical spins of {_count(dataset['critical_reason'], 'bodies')}"
+    for name in ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus"):
+        codes, spins = dataset[f"{name}_reason"].values, dataset[f"{name}_simulated"].values
+        counts = {words: int((codes == code).sum()) for code, words in REASONS.items()}
+        counts["found"] = counts.pop(REASONS[EXISTS])
+        ends = ", ".join(f"{count} {words.replace('_', ' ')}" for words, count in counts.items() if count)
+        span = f"; {np.nanmin(spins):.4g} to {np.nanmax(spins):.4g}" if np.isfinite(spins).any() else ""
+        yield f"  {name}: {ends}{span}"
+
+
+def _count(variable: xr.DataArray, of: str) -> str:
+    """How many values there are, and along which axes."""
+    axes = " × ".join(f"{d} {n}" for d, n in variable.sizes.items())
+    return f"{variable.size} {of} ({axes or 'no axis'})"
 
 
 def _summary(dataset: xr.Dataset) -> Iterator[str]:

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError, Fault, Values
+from sweep.config import Config, ConfigError, Values
 from sweep.engine.reporter import Reporter
 from sweep.grid import Array, Grid
 from sweep.jit import fingerprint
-from sweep.models import MODELS
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset, netcdf
@@ -158,7 +157,7 @@ def _searchable(config: Config) -> Config:
     """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
     stepwise(config)  # raises if there is nothing to simulate
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
-        raise ConfigError([Fault("critical", None, None, ("start", beyond[0]), "an axis; allowed: a number")])
+        raise ConfigError([config.fault(("start", beyond[0]), "an axis; allowed: a number")])
     parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
     return replace(config, parameters=parameters, cases=cases or None)
@@ -180,7 +179,7 @@ def _search(config: Config, width: float, store: Store, reporter: Reporter) -> x
     if store.done or store.load_running():
         reporter.note(f"resuming an earlier search, which finished {len(store.done)} rounds of simulations")
     grid = Grid.of(config)
-    prediction = predict(MODELS[config.model], grid)
+    prediction = predict(config.equations, grid)
     arrays: dict[str, Array] = dict(dataset.predicted(prediction))
     arrays.pop("reversals_predicted", None)
     reasons = np.full((2, 2, grid.size), NO_FRICTION)

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from sweep import prediction
-from sweep.config import Config, as_config
+from sweep.config import ConfigLike, load_config
 from sweep.grid import Grid
-from sweep.models import TIERS
 from sweep.results import dataset
 
 
-def predict(config: Config | str | Path, **overrides: Any) -> xr.Dataset:
+def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """The predictions alone, of the paper and of the linear theory, on the grid of `config`.
 
     Parameters
     ----------
-    config : a configuration or the path of one
+    config : a configuration, a mapping that says what its file would, or the path of a file
     overrides : values that replace those of the file, such as ``mu=60``
 
     Raises
@@ -27,6 +25,6 @@ def predict(config: Config | str | Path, **overrides: Any) -> xr.Dataset:
     ConfigError
         if the configuration cannot be used.
     """
-    config = as_config(config, overrides)
+    config = load_config(config, overrides)
     grid = Grid.of(config)
-    return dataset.label(config, grid, dataset.predicted(prediction.predict(TIERS[config.model], grid)), {})
+    return dataset.label(config, grid, dataset.predicted(prediction.predict(config.tier, grid)), {})

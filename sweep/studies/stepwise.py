@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sweep.config import Config, ConfigError, Fault
+from sweep.config import Config, ConfigError
 from sweep.kernels.methods import METHODS, PLAIN
 from sweep.models import MODELS
 
@@ -21,7 +21,7 @@ def stepwise(config: Config) -> Config:
     """
     if config.model not in MODELS:
         message = f"the {config.model} model is not simulated; allowed: {', '.join(MODELS)}"
-        raise ConfigError([Fault("config", None, None, ("model",), message)])
+        raise ConfigError([config.fault(("model",), message)])
     method = METHODS.get(config.integrator.method)
     if method and method.stops_anywhere:
         return config

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from math import prod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError, Fault, as_config
+from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
+from sweep.config.faults import suggestion
+from sweep.config.scenes import impossible
+from sweep.config.schema import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS
 from sweep.engine.plan import plan
@@ -25,14 +27,14 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import RUNNING
-from sweep.models import MODELS, TIERS
 from sweep.models.linear import fastest_motion
-from sweep.models.model import Columns, Model
+from sweep.models.model import Columns, Model, Tier
 from sweep.parameters import PARAMETERS
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.rounds import Simulations
 from sweep.studies.stepwise import stepwise
+from sweep.variables import Variable
 
 SAMPLES_A_RADIAN = 3
 """Samples per radian of the fastest motion: nearly twenty per period."""
@@ -43,11 +45,16 @@ _BLOCKS, _MARKS = 8, 2048
 # Samples whose images are held at a time (about 100 MB).
 _SAMPLES = 200_000
 
+# Times that differ relatively by less than this are the same one.
+_SAME = 1e-12
+
 # Blocks of steps: as many as are needed.
 _UNTIL_ALL_STOP = 2**40
 
 MAX_TRAJECTORIES = 1000
 """Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
+
+_TIME = ("1", "time, in sqrt(c/g)")
 
 # name: units, long_name
 SERIES: dict[str, tuple[str, str]] = {
@@ -72,11 +79,11 @@ SERIES: dict[str, tuple[str, str]] = {
 
 
 def trajectory(
-    config: Config | str | Path,
+    config: ConfigLike,
     *,
     every: float | None = None,
     reporter: Reporter | None = None,
-    **at: float | Sequence[float],
+    **at: Any,
 ) -> xr.Dataset:
     """Follow the cells of `config` picked by their parameters, such as ``mu=60, n0=[0.02, 0.05]``.
 
@@ -85,18 +92,18 @@ def trajectory(
 
     Parameters
     ----------
-    config : a configuration or the path of one
-    every : time between samples, in sqrt(c/g), rounded to whole steps; by default nearly twenty
-        per period of the fastest motion
+    config : as `sweep.config.load_config` takes it
+    every : time between samples, in sqrt(c/g), rounded to whole steps if all trajectories have the same; by default
+        nearly twenty per period of the fastest motion
     reporter : receives progress, counted in time, and messages; by default there are none
-    at : values by parameter; each combination is one trajectory.  An axis of `config` that is not
-        named takes its first value
+    at : a number, or several as an axis of a configuration has them, by parameter; each combination is one
+        trajectory.  An axis of `config` that is not named takes its first value
 
     Returns
     -------
-    Dataset over (trajectory, sample): `time` and the series that the model can show, NaN after the
-    end of a trajectory.  Over (trajectory): all that a sweep gives for the cell, from the very same
-    steps, which the sampling does not change.
+    Dataset over (trajectory, time): the series that the model can show, NaN after the end of a trajectory.  Over
+    (trajectory): all that a sweep gives for the cell, from the very same steps, which the sampling does not change.
+    Samples of trajectories whose steps differ lie between steps: each is one shorter step away from the last one.
 
     Raises
     ------
@@ -120,27 +127,31 @@ def trajectory(
     if halvings.any():
         marks = _run(part.kernel, cells_of([job], part.method, part.kernel, part.images).start(halvings), settles)
     labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
-    summary = labelled.reset_coords(drop=False)
     interval = np.full(job.grid.size, every) if every else _intervals(part.kernel.model, job.grid.columns())
     series = [_series(part.kernel, *found) for found in _sample(part.kernel, marks, part.images, interval)]
-    length = max(len(s["time"]) for s in series)
-    variables: dict[str, Any] = {}
-    for name in series[0]:
-        units, words = ("1", "time, in sqrt(c/g)") if name == "time" else SERIES[name]
-        padded = np.full((len(series), length), np.nan)
+    flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
+    index = ("trajectory", np.arange(job.grid.size), {"units": "1", "long_name": "number of the trajectory"})
+    return flat.assign_coords(trajectory=index).assign(_side_by_side(series, chosen.units))
+
+
+def _side_by_side(series: list[dict[str, Array]], system: str) -> xr.Dataset:
+    """The series of all trajectories over (trajectory, time), NaN after the end of each."""
+    times = max((one["time"] for one in series), key=len)
+    known = {name: Variable("float64", *words) for name, words in {"time": _TIME, **SERIES}.items()}
+    found: dict[str, Any] = {"time": ("time", times, dataset.described(known["time"], system))}
+    for name in filter(SERIES.__contains__, series[0]):
+        padded = np.full((len(series), len(times)), np.nan)
         for row, one in zip(padded, series, strict=True):
             row[: len(one[name])] = one[name]
-        variables[name] = (("trajectory", "sample"), padded, {"units": units, "long_name": words})
-    flat = summary.rename({"case": "trajectory"})
-    index = ("trajectory", flat["trajectory"].values, {"units": "1", "long_name": "number of the trajectory"})
-    return flat.drop_vars("trajectory").assign(variables).assign_coords(trajectory=index)
+        found[name] = (("trajectory", "time"), padded, dataset.described(known[name], system))
+    return xr.Dataset(found)
 
 
-def estimate(config: Config, at: Mapping[str, float | Sequence[float]]) -> str:
+def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
     """Trajectories, steps, samples and time, a line each; parameters and errors as of `trajectory`."""
     chosen = choose(config, at)
     columns, integrator = Grid.of(chosen).columns(), chosen.integrator
-    model, step = MODELS[chosen.model], integrator.step
+    model, step = chosen.equations, integrator.step
     steps = np.full(len(columns["a"]), integrator.t_end)
     steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
     samples = (integrator.t_end / _intervals(model, columns)).sum()
@@ -157,44 +168,38 @@ def estimate(config: Config, at: Mapping[str, float | Sequence[float]]) -> str:
     )
 
 
-def choose(config: Config | str | Path, at: Mapping[str, float | Sequence[float]]) -> Config:
+def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
-    wanted = {name: np.atleast_1d(values).astype(float).tolist() for name, values in at.items()}
-    return _choose(stepwise(as_config(config)), wanted)
-
-
-def _choose(config: Config, at: dict[str, list[float]]) -> Config:
-    """`config` with the cells picked by `at` as its cases; `ConfigError` if they cannot be run."""
+    config = stepwise(load_config(config))
+    wanted = _numbers(config.tier, at)
+    if (count := prod(map(len, wanted.values()))) > MAX_TRAJECTORIES:
+        raise ConfigError([Fault("", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
         constants |= {name: column[0] for name, column in config.cases.items()}
-    faults = [
-        Fault("--at", None, None, (name,), message)
-        for name, values in at.items()
-        if (message := _wrong(config, name, values))
-    ]
-    if faults:
-        raise ConfigError(faults)
-    if (count := prod(map(len, at.values()))) > MAX_TRAJECTORIES:
-        raise ConfigError([Fault("--at", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
-    combinations = list(product(*at.values())) if at else [()]
-    cases = {
-        name: tuple(dict(zip(at, values, strict=True)).get(name, constant) for values in combinations)
-        for name, constant in constants.items()
-    }
+    cells = [dict(zip(wanted, values, strict=True)) for values in product(*wanted.values())]
+    cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)
-    if beyond := off_the_body(chosen):
-        raise ConfigError([Fault("--at", None, None, (), beyond)])
+    if beyond := impossible(chosen) or off_the_body(chosen):
+        raise ConfigError([Fault("", None, None, (), beyond)])
     return chosen
 
 
-def _wrong(config: Config, name: str, values: list[float]) -> str:
-    """What is wrong with the values asked for a parameter; "" if nothing is."""
-    model = TIERS[config.model]
-    if name not in model.parameters:
-        return f"no parameter of the {model.name} model; allowed: {', '.join(model.parameters)}"
-    wrong = [v for v in values if not (np.isfinite(v) and PARAMETERS[name].allows(v))]
-    return f"{wrong[0]:g}; allowed: {PARAMETERS[name].allowed}" if wrong else ""
+def _numbers(model: Tier, at: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
+    """The numbers asked for each parameter; `ConfigError` with a fault for each that cannot be run."""
+    numbers, faults = {}, []
+    for name, value in at.items():
+        if name not in model.parameters:
+            message = f"no parameter of the {model.name} model{suggestion(name, model.parameters)}"
+            faults.append(Fault("", None, None, (name,), f"{message}; allowed: {', '.join(model.parameters)}"))
+            continue
+        try:
+            numbers[name] = numbers_of(PARAMETERS[name], value)
+        except ConfigError as error:
+            faults += error.faults
+    if faults:
+        raise ConfigError(faults)
+    return numbers
 
 
 Marks = list[Array]
@@ -218,25 +223,58 @@ def _run(
 
 
 def _sample(kernel: Kernel, marks: Marks, ends: Array, intervals: Array) -> Iterator[tuple[Array, Array]]:
-    """For each trajectory the numbers of the sampled steps, shape (samples,), and its images there.
+    """For each trajectory the sampled times, shape (samples,), and its images there.
 
     Each is stepped again from the mark before to the samples, and stops at each of them.  The steps are the sweep's
     own, and so equal to the last bit.  All stretches between two marks are stepped side by side, on all threads.
     """
     table, marked = kernel.table(ends), np.array([kernel.table(mark)["done"] for mark in marks])
     some: list[Array] = []
-    for i, (step, steps, interval) in enumerate(zip(table["step"], table["done"].astype(int), intervals, strict=True)):
-        stride = max(1, round(interval / step))
-        some.append(np.unique([*range(0, steps, stride), steps]))
+    times = _times(table["step"], table["done"], intervals)
+    for i in range(len(ends)):
+        some.append(times[i])
         if i + 1 == len(ends) or sum(map(len, some)) > _SAMPLES:
             first = i + 1 - len(some)
+            steps = [_steps_before(each, table["step"][first + j]) for j, each in enumerate(some)]
             # Of each sample of these trajectories: its trajectory, and the last mark before it.
             which = np.repeat(np.arange(first, i + 1), [len(each) for each in some])
-            before = [np.searchsorted(marked[:, first + j], each, "right") - 1 for j, each in enumerate(some)]
-            images = _advance(kernel, marks, which, np.concatenate(before), np.concatenate(some))
+            before = [np.searchsorted(marked[:, first + j], each, "right") - 1 for j, each in enumerate(steps)]
+            images = _advance(kernel, marks, which, np.concatenate(before), np.concatenate(steps))
+            _go_on(kernel, images, np.concatenate(some))
             parts = np.split(images, np.cumsum([len(each) for each in some])[:-1])
             yield from zip(some, parts, strict=True)
             some = []
+
+
+def _times(steps: Array, done: Array, intervals: Array) -> list[Array]:
+    """The times at which each trajectory is sampled: the same ones for all, among them those at which one ends."""
+    ends = steps * done
+    interval = intervals.min()
+    if np.ptp(steps) == 0:
+        interval = max(1, round(interval / steps[0]))
+        common = np.union1d(np.arange(0, done.max(), interval), done) * steps[0]
+    else:
+        common = np.union1d(np.arange(0, ends.max(), interval), ends)
+        common = common[np.diff(common, prepend=-1) > _SAME * ends.max()]  # the same end, rounded in other ways
+    return [common[common <= end * (1 + _SAME)] for end in ends]
+
+
+def _steps_before(times: Array, step: float) -> Array:
+    """How many whole steps end before, or at, each of these times."""
+    return np.floor(times / step * (1 + _SAME)).astype(int)
+
+
+def _go_on(kernel: Kernel, images: Array, times: Array) -> None:
+    """Take `images`, of samples between two steps, on to their `times`, in place, by one shorter step."""
+    table = kernel.table(images)
+    rest = times - table["done"] * table["step"]
+    between = rest > 1e-9 * table["step"]
+    if between.any():
+        step, goal = table["step"][between], table["goal"][between]
+        table["step"][between], table["goal"][between] = rest[between], table["done"][between] + 1
+        table["status"][between] = RUNNING
+        kernel.advance(images, np.flatnonzero(between), _UNTIL_ALL_STOP, False)
+        table["step"][between], table["goal"][between] = step, goal
 
 
 def _advance(kernel: Kernel, marks: Marks, which: Array, before: Array, steps: Array) -> Array:
@@ -255,18 +293,18 @@ def _advance(kernel: Kernel, marks: Marks, which: Array, before: Array, steps: A
     return samples
 
 
-def _series(kernel: Kernel, steps: Array, images: Array) -> dict[str, Array]:
-    """The series of a trajectory, each of shape (samples,), from its images after `steps`."""
+def _series(kernel: Kernel, times: Array, images: Array) -> dict[str, Array]:
+    """The series of a trajectory, each of shape (samples,), from its images at `times`."""
     model = kernel.model
     states, constants = kernel.unpack(images)
     spin, rattle, inertia = model.energy(states, constants)
-    series = {"time": steps * kernel.table(images)["step"], "spin": spin, **model.observe(states, constants)}
+    series = {"time": times, "spin": spin, **model.observe(states, constants)}
     if kernel.follows_ripple:
         series["ripple_free_spin"] = kernel.steady_spin(images)
     if "energy_error" in kernel.measure:
         series["energy"] = rattle + 0.5 * inertia * spin**2
         series["dissipated"] = images[:, kernel.row("work")]
-    return {name: np.broadcast_to(values, steps.shape) for name, values in series.items()}
+    return {name: np.broadcast_to(values, times.shape) for name, values in series.items()}
 
 
 def _intervals(model: Model, columns: Columns) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -37,6 +38,26 @@ def start(*arguments: str | Path) -> subprocess.Popen[str]:
     """`python -m sweep ARGUMENTS`, which tells of each module on stderr as soon as it is loaded."""
     command = [sys.executable, "-X", "importtime", "-m", "sweep", *map(str, arguments)]
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+COMPLETED = {
+    "run c.yaml --set integrator.t": ["integrator.tolerance=", "integrator.t_end="],
+    "run c.yaml --set friction": ["friction.mu="],
+    "trajectory c.yaml --at d": ["delta="],
+    "run c.yaml --dry": ["--dry-run"],
+    "traj": ["trajectory"],
+}
+"""What is typed, and how the shell may go on."""
+
+
+@pytest.mark.parametrize("typed", COMPLETED)
+def test_the_shell_completes_and_loads_nothing_heavy(typed: str) -> None:
+    words = f"sweep {typed}".split(" ")
+    asked = {"_SWEEP_COMPLETE": "bash_complete", "COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1)}
+    command = [sys.executable, "-X", "importtime", "-m", "sweep"]
+    done = subprocess.run(command, cwd=ROOT, env=os.environ | asked, capture_output=True, text=True, check=True)
+    assert [line.removeprefix("plain,") for line in done.stdout.split()] == COMPLETED[typed]
+    assert {name.partition(".")[0] for name in _IMPORT.findall(done.stderr)} & HEAVY == set()
 
 
 def loaded(*arguments: str | Path) -> tuple[int, set[str]]:
@@ -79,11 +100,12 @@ def test_options_are_refused_as_early(arguments: list[str], write: Write) -> Non
 def test_the_package_loads_what_is_asked_for() -> None:
     program = (
         "import sys, sweep\n"
-        "assert {'run', 'critical', '__all__'} <= set(dir(sweep))\n"
+        "assert dir(sweep) == sorted(sweep.__all__)\n"
+        "sweep.run\n"
         "print('numpy' in sys.modules)\n"
         "sweep.load_config\n"
         "print('numpy' in sys.modules, 'xarray' in sys.modules)\n"
-        "sweep.run\n"
+        "sweep.predict\n"
         "print('xarray' in sys.modules)\n"
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)

@@ -32,7 +32,7 @@ from sweep.parameters import PARAMETERS
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.identity import Identity
 from sweep.results.store import StoreError
-from sweep.studies.trajectory import _choose
+from sweep.studies.trajectory import choose
 
 from .text import KEYS, ODD, block, damage, near_valid, tree
 
@@ -41,9 +41,15 @@ class Violation(AssertionError):
     """An input that was neither accepted nor properly refused."""
 
 
+PHRASES = ("input should", "should be", "a valid ", "pydantic", "instance of", "field required", "extra inputs")
+"""Words of pydantic's."""
+
+
 def check_refusal(error: Exception, *files: str) -> None:
     """Every line of a refusal names a file, is short and printable, and says more than the name."""
     text = str(error)
+    if spoken := [phrase for phrase in PHRASES if phrase in text.lower()]:
+        raise Violation(f"a library's words, {spoken[0]!r}: {text!r:.500}")
     for line in text.split("\n"):
         named = [file for file in files if line.startswith(file)] or ([] if not line.startswith("  ") else [""])
         if not named or not line.isprintable() or not 0 < len(line) - len(named[0]) < 1500 or ": " not in line + ": ":
@@ -146,14 +152,11 @@ def at(random: Random, folder: Path) -> bool:
     if random.random() < 0.3:
         texts.append(damage(random, texts.pop().encode()).decode("utf-8", "surrogateescape"))
 
-    def choose() -> Any:
-        pairs: dict[str, list[float]] = {}
-        for name, number in (cli._parse_pair(text, "--at") for text in texts):
-            pairs.setdefault(name, []).append(number)
-        known = {name: numbers for name, numbers in pairs.items() if name in PARAMETERS}
-        return _choose(_config_at(folder / "base.yaml"), known)
+    def pick() -> Any:
+        with cli._of_option("--at"):
+            return choose(_config_at(folder / "base.yaml"), cli._cells(tuple(texts)))
 
-    return _refused(choose, "--at") is not None
+    return _refused(pick, "--at") is not None
 
 
 CELLS = (

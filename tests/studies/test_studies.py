@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from scipy.interpolate import CubicSpline
 
 import sweep
 from sweep import ConfigError
@@ -25,10 +26,38 @@ def test_sampling_does_not_touch_the_steps(write: Write) -> None:
     np.testing.assert_array_equal(followed.spin_final, swept.spin_final)
     np.testing.assert_array_equal(followed.energy_error, swept.energy_error)
     for i in range(2):
-        last = followed.isel(trajectory=i).dropna("sample")
+        last = followed.isel(trajectory=i).dropna("time")
         assert float(last.spin[-1]) == float(swept.spin_final[i])
         assert float(last.time[-1]) == pytest.approx(float(swept.t_stop[i]), rel=1e-15)
         assert float(last.time[0]) == 0
+
+
+def test_trajectories_of_different_steps_are_sampled_at_the_same_times(write: Write) -> None:
+    config = sweep.load_config(write(STANDARD), {"t_end": 60.0})
+    both = sweep.trajectory(config, mu=[60, 300], every=0.7)
+    assert both.step[0] != both.step[1]
+    assert both.spin.dims == ("trajectory", "time")
+    np.testing.assert_allclose(both.time, np.append(np.arange(0, 60, 0.7), 60), atol=1e-11)
+    for i, mu in enumerate((60, 300)):
+        one = sweep.trajectory(config, mu=mu, every=1e-6).isel(trajectory=0)  # every step
+        for name in ("spin", "contact_x", "dissipated", "ripple_free_spin"):
+            expected = np.asarray(CubicSpline(one.time, one[name])(both.time))
+            np.testing.assert_allclose(both[name][i], expected, rtol=0, atol=3e-7 * np.abs(expected).max())
+
+
+def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
+    both = sweep.trajectory(sweep.load_config(write(STANDARD), {"t_end": 8000.0}), n0=[0.001, 0.05], every=5.0)
+    assert both.t_stop[0] < both.t_stop[1] - 5
+    for i in range(2):
+        np.testing.assert_array_equal(np.isfinite(both.spin[i]), both.time <= both.t_stop[i] * (1 + 1e-12))
+    assert np.isclose(both.time, both.t_stop[0]).any()
+
+
+def test_a_saved_trajectory_is_plotted_over_time(write: Write, tmp_path: Path) -> None:
+    sweep.trajectory(sweep.load_config(write(STANDARD), {"t_end": 20.0}), mu=60).to_netcdf(tmp_path / "t.nc")
+    (line,) = xr.open_dataset(tmp_path / "t.nc").spin.plot()
+    assert line.axes.get_xlabel().startswith("time")
+    assert line.get_xdata()[-1] == pytest.approx(20)
 
 
 def test_trajectory_shows_the_motion(write: Write) -> None:
@@ -61,8 +90,8 @@ def test_trajectories_of_every_model(model: str, write: Write) -> None:
 @pytest.mark.parametrize(
     ("at", "said"),
     [
-        ({"mu": -1}, "mu: -1; allowed"),
-        ({"nu": 1}, "no parameter"),
+        ({"mu": -1}, "mu: -1 is out of bounds; allowed"),
+        ({"nu": 1}, "nu: unknown key"),
         ({"x0": 20}, "off the ellipsoid"),
         ({"n0": np.nan}, "nan"),
     ],

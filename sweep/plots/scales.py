@@ -1,0 +1,140 @@
+"""Colour scales: what colour a value has, and what stands beside the bar.
+
+All maps get steadily lighter or, about zero, steadily darker on both sides, so that they can be read in grey.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize
+
+from sweep.grid import Array
+
+Limits = tuple[float, float]
+
+SEQUENTIAL, DIVERGING = "viridis", "PuOr_r"
+
+_MAX_COUNTS = 24
+"""Colours of a scale of counts; neighbours of more would look the same."""
+
+_MAX_DIFFERENCES = 10
+"""Colours on each side of zero of a scale of differences."""
+
+_MAX_TICKS = 12
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Colours of values, and the labels of the bar."""
+
+    colours: Colormap
+    norm: Normalize
+    labels: list[str] | None = None
+    """For each colour, what it stands for; None for a continuous scale."""
+
+    def rgba(self, values: Array) -> Array:
+        return np.asarray(self.colours(self.norm(values)))
+
+    def lightness(self, values: Array) -> Array:
+        """Luma of the colour of each value, from 0 to 1."""
+        return np.asarray(self.rgba(values)[..., :3] @ [0.299, 0.587, 0.114])
+
+    def mappable(self) -> ScalarMappable:
+        return ScalarMappable(self.norm, self.colours)
+
+    def label(self, bar: Colorbar) -> None:
+        """Write the labels beside the bar of a scale of steps."""
+        if not isinstance(self.norm, BoundaryNorm) or self.labels is None:
+            return
+        boundaries = np.asarray(self.norm.boundaries)
+        every = -(-len(self.labels) // _MAX_TICKS)
+        # Of differences, zero is always labelled.
+        first = self.labels.index("0") % every if "0" in self.labels else 0
+        at = slice(first, None, every)
+        bar.set_ticks(((boundaries[:-1] + boundaries[1:]) / 2)[at].tolist(), labels=self.labels[at])
+        bar.ax.tick_params(which="minor", length=0)
+
+
+def colour_map(name: str) -> Colormap:
+    """A colour map of matplotlib; `ValueError` if there is none of that name."""
+    if name not in mpl.colormaps:
+        raise ValueError(f"no colour map {name}; allowed: those of matplotlib, such as viridis, cividis, gray, magma")
+    return mpl.colormaps[name]
+
+
+def counts(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
+    """A colour for each count; where there are many, the higher ones share colours in ranges that widen steadily.
+
+    Parameters
+    ----------
+    values : integers
+    limits : lowest and highest count with colours of their own; all beyond share one on either side
+    """
+    low, high = (round(limit) for limit in limits) if limits else (int(values.min()), int(values.max()))
+    steps = low + _steps(high - low, _MAX_COUNTS)
+    return _stepped(
+        steps, colour_map(name or SEQUENTIAL), bool((values < low).any()), bool((values >= steps[-1]).any())
+    )
+
+
+def differences(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
+    """A diverging scale of integers, the same on both sides of zero, which has a colour of its own."""
+    top = max(round(max(map(abs, limits))) if limits else int(np.abs(values).max(initial=0)), 1)
+    side = 1 + _steps(top - 1, _MAX_DIFFERENCES)
+    steps = np.concatenate([1 - side[::-1], side])
+    return _stepped(
+        steps, colour_map(name or DIVERGING), bool((values < steps[0]).any()), bool((values >= steps[-1]).any())
+    )
+
+
+def continuous(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
+    """A scale of real numbers: about zero if they have both signs, logarithmic if they span orders of magnitude."""
+    finite = values[np.isfinite(values)]
+    low, high = limits or ((float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0))
+    if low < 0 < high:
+        high = max(-low, high)
+        return Scale(colour_map(name or DIVERGING), Normalize(-high, high))
+    norm = LogNorm(low, high) if low > 0 and high > 100 * low else Normalize(low, high)
+    return Scale(colour_map(name or SEQUENTIAL), norm)
+
+
+def flags(present: list[int], name: str | None = None) -> Scale:
+    """A colour for each of the values that occur, in increasing order, from light to dark."""
+    shades = colour_map(name or SEQUENTIAL)(np.linspace(0.95, 0.05, len(present)))
+    bounds = [present[0] - 0.5, *((a + b) / 2 for a, b in pairwise(present)), present[-1] + 0.5]
+    return Scale(ListedColormap(shades), BoundaryNorm(bounds, len(present)))
+
+
+def _steps(top: int, most: int) -> Array:
+    """Where the ranges of the counts 0 to `top` begin, and the last one ends: at most `most` ranges, wider upwards."""
+    for percent in range(200):
+        steps = [0]
+        while steps[-1] <= top:
+            steps.append(steps[-1] + max(1, steps[-1] * percent // 100))
+        if len(steps) - 1 <= most:
+            break
+    return np.array(steps)
+
+
+def _stepped(steps: Array, colours: Colormap, below: bool, above: bool) -> Scale:
+    """A colour for each of the ranges of integers that begin at `steps`."""
+    number = len(steps) - 1 + below + above
+    ends: Literal["both", "min", "max", "neither"] = (
+        "both" if below and above else "min" if below else "max" if above else "neither"
+    )
+    norm = BoundaryNorm(steps - 0.5, number, extend=ends)
+    labels = [_integers(first, last - 1) for first, last in pairwise(steps.tolist())]
+    return Scale(colours.resampled(number), norm, labels)
+
+
+def _integers(first: int, last: int) -> str:
+    if first == last:
+        return f"{first}".replace("-", "−")
+    return f"{first}–{last}" if first >= 0 else f"{first} … {last}".replace("-", "−")

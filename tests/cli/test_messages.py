@@ -1,0 +1,187 @@
+"""What commands say: what was meant, what was written and kept, and nothing more than one line when one is enough."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from support import ROOT
+from support.cli import invoke, refused
+from support.runs import Stop
+
+import sweep
+from sweep.config import load_config
+from sweep.config.document import parse_value
+from sweep.engine.reporter import Progress
+from sweep.progress import Terminal
+
+Write = Callable[..., Path]
+
+TEXT = "name: quick\nmodel: averaged\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
+
+MEANT = {
+    "rnu": "Did you mean 'run'?",
+    "run c.yaml --outptu x": "Did you mean '--output'?",
+    "run c.yaml --set fricton.mu=3": "--set fricton.mu: fricton: unknown key (did you mean friction?); allowed: name",
+    "run c.yaml --set body.detla=3": "--set body.detla: unknown key (did you mean delta?); allowed: a, b, c, delta",
+    "run c.yaml --set mux=3": "--set mux: unknown key (did you mean friction.mu?)",
+    "run c.yaml --set model=sllip": "--set model: 'sllip' (did you mean slip?); allowed: slip",
+    "run c.yaml --set method=ADAM": "--set method: 'ADAM' (did you mean adams?); allowed: dopri5",
+    "run c.yaml --set measure=[noise_limit]": "(did you mean noise_limited?); allowed: reversals",
+    "trajectory c.yaml --at mux=3": "--at mux=3: unknown parameter (did you mean mu?); allowed: a, b",
+    "trajectory c.yaml --at mu=-3 --dry-run": "--at mu: -3 is out of bounds; allowed",
+    "trajectory c.yaml --at mu=3 --at mu=-3": "--at mu[1]: -3 is out of bounds; allowed",
+    "run c.yaml --set mu=20..60:0": "--set mu.num: 0; allowed: a whole number >= 1",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("command", MEANT)
+def test_a_refusal_says_what_may_be_meant(command: str, write: Write) -> None:
+    result = invoke(*command.replace("c.yaml", str(write(TEXT))).split())
+    assert (result.exit_code, MEANT[command] in result.stderr) == (2, True), result.output
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        ("mu: 60\n", 1, "mu: unknown key (did you mean friction.mu?); allowed: name"),
+        ("friction: {mu: 60}\nt_end: 3\n", 2, "t_end: unknown key (did you mean integrator.t_end?)"),
+        ("friction: {mu: 60, b: 3}\n", 1, "friction.b: unknown key (did you mean body.b?); allowed: mu"),
+        ("friction: {mu: 60}\nBody: {a: 9}\n", 2, "Body: unknown key (did you mean body?)"),
+    ],
+)
+def test_a_key_of_another_section_is_found(text: str, line: int, said: str, write: Write) -> None:
+    path = write(text)
+    refused(invoke("run", path), f"{path}:{line}:", said)
+
+
+def test_nothing_close_is_not_suggested(write: Write) -> None:
+    assert "did you mean" not in invoke("run", write(TEXT), "--set", "colour=3").stderr
+
+
+RANGES = {
+    "20..60:41": (20, 60, 41), "-0.1..1e-1:3": (-0.1, 0.1, 3), ".5..1.:2": (0.5, 1, 2), "1e1..25:1e3": (10, 25, 1000),
+    "-3..-1:5": (-3, -1, 5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", RANGES)
+def test_a_range_is_set_in_short(text: str) -> None:
+    assert parse_value(text, "") == dict(zip(("start", "stop", "num"), RANGES[text], strict=True))
+
+
+@pytest.mark.parametrize("text", ["20..60", "20.60:41", "a..b:3", "20..60:41:2", "20...:3", "'20..60:41'"])
+def test_other_words_are_no_range(text: str) -> None:
+    assert parse_value(text, "") == text.strip("'")
+
+
+def test_a_range_may_be_set_and_help_says_so(write: Write) -> None:
+    result = invoke("run", write(TEXT), "--set", "friction.mu=20..60:41", "--dry-run")
+    assert "41 (mu 41)" in result.stdout
+    assert "START..STOP:NUM" in invoke("run", "--help").stdout.replace("\n", " ")
+
+
+@pytest.mark.parametrize("number", ["3", "3.0", "3e0", "+3.", "30e-1"])
+def test_a_whole_number_may_be_written_as_any_number(number: str, write: Write) -> None:
+    text = f"friction: {{mu: {{start: 1, stop: 2, num: {number}}}}}\nrefine: {number}\n"
+    config = load_config(write(f"{text}measure: [reversals, {{reversal_times: {number}}}]\n"))
+    assert (len(config.axes["mu"]), config.refine, config.measure) == (3, 3, ("reversals", "reversal_times=3"))
+    assert "refine: 3\n" in config.to_yaml()
+
+
+def start(*arguments: str | Path, **environment: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "sweep", *map(str, arguments)]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, cwd=ROOT, env=os.environ | environment, stdout=pipe, stderr=pipe, text=True)
+
+
+@pytest.mark.parametrize("verb", ["run", "trajectory", "critical"])
+def test_uncompiled_kernels_are_refused_in_one_line(verb: str, write: Write) -> None:
+    with start(verb, write(TEXT), "--output", write().parent / "out", NUMBA_DISABLE_JIT="1") as process:
+        out, err = process.communicate()
+    assert (process.returncode, out) == (2, "")
+    assert err == "NUMBA_DISABLE_JIT is set, but kernels have to be compiled; allowed: unset, or 0\n"
+
+
+@pytest.mark.parametrize("command", ["info quick.nc", "run quick.yaml --output .", "run quick.yaml --dry-run"])
+def test_a_closed_pipe_ends_a_command_silently(command: str, tmp_path: Path) -> None:
+    """As `… | head` does once it has what it wants."""
+    (tmp_path / "quick.yaml").write_text(TEXT, encoding="utf-8")
+    sweep.run(tmp_path / "quick.yaml", tmp_path)
+    words = [str(tmp_path / word) if word[0] in ".q" else word for word in command.split()]
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "sweep", *words],
+        cwd=ROOT,
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(writing)
+    assert done.returncode == 141
+    assert [line for line in done.stderr.splitlines() if "already complete" not in line] == []
+
+
+def test_a_run_ends_with_the_pipe_of_its_progress(tmp_path: Path) -> None:
+    """As `run … 2>&1 | head`; what it has done is kept."""
+    (tmp_path / "quick.yaml").write_text(TEXT, encoding="utf-8")
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "sweep", "run", str(tmp_path / "quick.yaml"), "--output", str(tmp_path)]
+    for _ in range(2):
+        done = subprocess.run(command, cwd=ROOT, stdout=writing, stderr=writing, check=False)
+        assert done.returncode == 141
+    os.close(writing)
+
+
+def test_a_command_tells_what_it_wrote(write: Write, tmp_path: Path) -> None:
+    command, out = ("run", write(TEXT), "--output", tmp_path / "out"), tmp_path / "out" / "quick"
+    assert invoke(*command).stdout.endswith(f"\nwrote {out}.nc and .png\n")
+    again = invoke(*command)
+    assert again.stdout.endswith("\nnothing was written\n")
+    assert "already complete, nothing to compute" in again.stderr
+    out.with_suffix(".png").unlink()
+    assert invoke(*command).stdout.endswith(f"\nwrote {out}.png\n")
+    assert invoke(*command, "--fresh").stdout.endswith(f"\nwrote {out}.nc and .png\n")
+
+
+def test_a_search_tells_what_it_wrote(write: Write, tmp_path: Path) -> None:
+    command = ("critical", write(TEXT), "--set", "mu=60", "--width", "0.5", "--output", tmp_path)
+    assert invoke(*command).stdout.endswith(f"wrote {tmp_path / 'quick_critical'}.nc and .png\n")
+    assert invoke(*command).stdout.endswith("nothing was written\n")
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_a_resumed_run_tells_how_many_cells_are_kept(write: Write, tmp_path: Path) -> None:
+    stopped = Stop(3)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(write(), tmp_path / "out", reporter=stopped)
+    assert not any("resuming" in note for note in stopped.notes)
+    again = Stop(1000)
+    sweep.run(write(), tmp_path / "out", reporter=again)
+    assert again.notes == ["resuming an earlier run: 0 of 12 cells finished, 12 under way"]
+
+
+@pytest.mark.parametrize("unit", ["cells", "bodies", "sqrt(c/g)"])
+@pytest.mark.parametrize("width", [30, 40, 60, 79, 80, 200])
+def test_a_terminal_of_any_width_keeps_the_bar(width: int, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    screen = io.StringIO()
+    terminal = Terminal(unit=unit)
+    assert terminal.console.width == width
+    terminal.chunk(Progress(6072, 3036, 0, 0, 10.0))
+    terminal._bar.stop()
+    Console(file=screen, width=width).print(terminal._bar.get_renderable())
+    (line,) = screen.getvalue().splitlines()
+    assert len(line) <= width
+    assert "3036/6072" in line
+    assert 2 <= line.count("━") < 40
+    assert (unit in line) == (width >= 80)

@@ -1,0 +1,121 @@
+"""Which kind each cell of a dataset is of, and the words for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sweep.kernels.status import DIVERGED, LIFT_OFF, SETTLED, TIME_LIMIT
+from sweep.parameters import PARAMETERS
+from sweep.plots import labels
+from sweep.plots.labels import STATUS_WORDS
+from sweep.plots.marks import WORDS, blank, field, in_words, legend, marks
+from sweep.results.dataset import STATUSES, VARIABLES, described
+
+STATUS = [SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, 0, SETTLED]
+
+
+@pytest.fixture
+def cells() -> xr.Dataset:
+    """Six cells along mu, of all kinds; the last one without a reversal."""
+    values = {
+        "status": STATUS,
+        "reversals": [3, 4, 99, 99, 99, 0],
+        "reversals_predicted": [3, 6, 5, 5, 5, 1],
+        "t_last_reversal": [10, 20, np.nan, np.nan, np.nan, np.nan],
+        "spin_final": [0.1, 0.2, np.nan, np.nan, np.nan, 0.1],
+        "noise_limited": [1, 0, 1, 0, 0, 0],
+        "window_dependent": [0, 1, 1, 0, 0, 0],
+        "sensitive": [1, 0, 0, 0, 0, 0],
+    }
+    specs = {name: VARIABLES[name] for name in values}
+    variables = {name: ("mu", np.array(values[name], s.dtype), described(s)) for name, s in specs.items()}
+    mu = xr.Variable("mu", np.arange(6.0), {"long_name": PARAMETERS["mu"].long_name, "units": "1"})
+    return xr.Dataset(variables, {"mu": mu})
+
+
+def test_the_kinds_of_a_count(cells: xr.Dataset) -> None:
+    kinds = {kind: where.values.nonzero()[0].tolist() for kind, where in marks(cells, "reversals").items()}
+    assert kinds == {
+        "not_run": [4],
+        "failed": [2, 3],
+        "no_value": [],
+        "time_limit": [1],
+        "inferred": [],
+        "noise_limited": [0],
+        "uncertain": [0, 1],
+    }
+    assert list(kinds) == list(WORDS)
+
+
+def test_a_prediction_cannot_fail_and_a_status_tells_itself(cells: xr.Dataset) -> None:
+    for name in ("reversals_predicted", "status"):
+        assert not any(where.any() for where in marks(cells, name).values())
+
+
+def test_a_missing_value_of_a_sound_run_is_no_failure(cells: xr.Dataset) -> None:
+    kinds = marks(cells, "t_last_reversal")
+    assert kinds["no_value"].values.nonzero()[0].tolist() == [5]
+    assert "no reversal (1 of 6)" in legend(cells, "t_last_reversal").values()
+    np.testing.assert_array_equal(blank(kinds), cells["t_last_reversal"].isnull())
+
+
+def test_a_final_spin_is_no_lower_bound(cells: xr.Dataset) -> None:
+    words = legend(cells, "spin_final")
+    assert words["time_limit"] == "not settled: ended at the time limit (1 of 6)"
+    assert "uncertain" not in words
+
+
+def test_a_legend_says_how_trajectories_failed(cells: xr.Dataset) -> None:
+    words = legend(cells, "reversals")
+    assert words["failed"] == "failed: 1 lifted off the table, 1 diverged (2 of 6)"
+    assert words["time_limit"].startswith("lower bound")
+    assert "inferred" not in words
+
+
+def test_inferred_cells(cells: xr.Dataset) -> None:
+    spin = cells["spin_final"].where([False, True, True, True, True, True])
+    refined = cells.assign(inferred=("mu", [1, 0, 0, 0, 0, 0]), spin_final=spin)
+    assert marks(refined, "reversals")["inferred"].values.tolist() == [True] + 5 * [False]
+    assert not marks(refined, "reversals_predicted")["inferred"].any()
+    # Its final spin was not simulated, which is another thing than a missing value.
+    assert not marks(refined, "spin_final")["no_value"].any()
+    assert legend(refined, "spin_final")["inferred"] == "not simulated: only counts are inferred (1 of 6)"
+
+
+def test_the_difference(cells: xr.Dataset) -> None:
+    assert field(cells, "difference").values[[0, 1, 5]].tolist() == [0, -2, -1]
+    assert marks(cells, "difference")["failed"].equals(marks(cells, "reversals")["failed"])
+    with pytest.raises(ValueError, match=r"no variable difference; allowed: .*spin_final"):
+        field(cells.drop_vars("reversals_predicted"), "difference")
+
+
+def test_a_dataset_of_predictions_has_no_marks(cells: xr.Dataset) -> None:
+    assert not legend(cells[["reversals_predicted"]], "reversals_predicted")
+
+
+def test_every_status_has_words(cells: xr.Dataset) -> None:
+    assert set(STATUS_WORDS) == set(STATUSES)
+    assert in_words(cells, "status").values[:2].tolist() == ["settled", "ended at the time limit"]
+    assert labels.flag_words(cells, "window_dependent") == {0: "no", 1: "yes"}
+    assert not labels.flag_words(cells, "reversals")
+
+
+def test_labels(cells: xr.Dataset) -> None:
+    assert labels.label(cells, "mu") == "friction μ (1/√(g c))"
+    assert labels.label(cells, "spin_final") == "final spin n (√(g/c))"
+    assert labels.label(cells, "reversals") == "spin reversals, simulated"
+    plain = xr.Dataset({"torque": ((), 1.0, {"long_name": "torque about the axis, in m g c", "units": "1"})})
+    assert labels.label(plain, "torque") == "torque about the axis (m g c)"
+    plain["torque"].attrs = {"long_name": "torque, in all", "units": "N m"}
+    assert labels.label(plain, "torque") == "torque, in all (N m)"
+    assert labels.label(xr.Dataset({"other_thing": 1.0}), "other_thing") == "other thing"
+
+
+def test_no_variable_keeps_its_scale_in_its_words() -> None:
+    """A scale that is not understood would stand in the label twice or never."""
+    for name, spec in VARIABLES.items():
+        dataset = xr.Dataset({name: ((), 0, described(spec))})
+        assert ("sqrt" in spec.long_name) == bool(labels.unit(dataset, name)), name
+        assert ", in" not in labels.words(dataset, name), name

@@ -1,0 +1,121 @@
+"""The figures of single trajectories and of critical spins, and what is said of their files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+from support.cli import invoke, refused
+
+from sweep.plots import picture, trajectories
+from sweep.results.dataset import VARIABLES
+
+Write = Callable[..., Path]
+SERIES = ("contact_x", "contact_y", "v0_rate_1", "slip_rate_1", "energy", "dissipated")
+CRITICAL = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
+
+
+def made(mu: list[float], **given: Any) -> xr.Dataset:
+    """Trajectories with the same spins at different frictions; their critical spins fall with the friction."""
+    time = np.linspace(0, 100, 201)
+    series = np.outer(np.ones(len(mu)), np.cos(time / 10))
+    bodies = np.asarray(mu, float)
+    values = dict.fromkeys(("spin", *SERIES), (("trajectory", "time"), series))
+    of_bodies = dict(zip(CRITICAL, (1 / bodies, -1 / bodies, 2 / bodies, -2 / bodies), strict=True))
+    constants = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "n0": 0.05, "t_stop": 100.0} | given
+    each = {name: ("trajectory", np.broadcast_to(v, len(mu))) for name, v in constants.items()}
+    each |= {name: ("trajectory", v) for name, v in {"mu": bodies, **of_bodies}.items()}
+    dataset = xr.Dataset({**values, **each, "reversals": ("trajectory", np.full(len(mu), 3))}, {"time": time})
+    dataset["time"].attrs = {"long_name": "time, in sqrt(c/g)", "units": "1"}
+    dataset["spin"].attrs = {"long_name": "spin about the upward normal, in sqrt(g/c)", "units": "1"}
+    return dataset
+
+
+def entries(figure: Figure) -> list[str]:
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+
+
+def test_every_curve_is_in_a_legend() -> None:
+    figure = trajectories.draw(made([60, 100]))
+    assert entries(figure)[:2] == ["μ = 60: 3 reversals", "μ = 100: 3 reversals"]
+    colours = {handle.get_label(): handle.get_color() for handle in figure.legends[0].legend_handles}
+    for axes in figure.axes:
+        lines = [line for line in axes.lines if line.get_gid() in ("spin", *SERIES)]
+        assert lines
+        assert all(line.get_color() == colours[line.get_label()] for line in lines)
+        # Where a panel has several series, its own legend tells them apart by their shade.
+        shades = {line.get_alpha() for line in lines}
+        if len({line.get_gid() for line in lines}) > 1:
+            assert {handle.get_alpha() for handle in axes.get_legend().legend_handles} == shades
+            assert len(shades) == 2
+
+
+@pytest.mark.parametrize(("mu", "sets"), [([60], 1), ([60, 60], 1), ([60, 100], 2)])
+def test_a_set_of_critical_lines_for_each_body(mu: list[float], sets: int) -> None:
+    axes = trajectories.draw(made(mu)).axes[0]
+    lines = [line for line in axes.lines if line.get_gid() in ("n_c1", "n_c2")]
+    assert sorted(line.get_ydata()[0] for line in lines) == sorted(s / m for m in set(mu) for s in (-2, -1, 1, 2))
+    assert len({line.get_color() for line in lines}) == sets
+    if sets == 2:
+        curves = {line.get_label().split(":")[0]: line.get_color() for line in axes.lines if line.get_gid() == "spin"}
+        assert {line.get_color() for line in lines} == set(curves.values())
+
+
+def test_axes_have_plain_names() -> None:
+    figure = trajectories.draw(made([60]))
+    assert figure.axes[0].get_ylabel() == "spin n (√(g/c))"
+    assert figure.axes[-1].get_xlabel() == "time t (√(c/g))"
+    assert "b = 3" in figure.get_suptitle()
+
+
+def test_one_series_is_drawn_alone() -> None:
+    (axes,) = picture.draw(made([60, 100]), "energy").axes
+    assert {line.get_gid() for line in axes.lines} == {"energy"}
+    with pytest.raises(ValueError, match="no series reversals; allowed: spin, contact_x"):
+        picture.draw(made([60]), "reversals")
+
+
+def test_a_page_of_all_series_fits_a_screen() -> None:
+    assert trajectories.draw(made([60])).get_size_inches()[1] * 110 < 1200
+
+
+def test_plot_and_info_know_the_file_of_a_trajectory(write: Write, tmp_path: Path) -> None:
+    options = ("--at", "mu=60", "--at", "mu=75", "--set", "t_end=50", "--output", tmp_path)
+    assert invoke("trajectory", write(), *options).exit_code == 0
+    drawn = (tmp_path / "small_trajectory.png").read_bytes()
+    (tmp_path / "small_trajectory.png").unlink()
+    assert invoke("plot", tmp_path / "small_trajectory.nc").exit_code == 0
+    assert (tmp_path / "small_trajectory.png").read_bytes() == drawn
+    told = invoke("info", tmp_path / "small_trajectory.nc").stdout
+    assert "2 trajectories" in told
+    assert "mu = 75, n0 = 0.02, x0 = 0.01, y0 = 0.01: time_limit at t = 50, 0 reversals" in told
+    refused(invoke("plot", tmp_path / "small_trajectory.nc", "--x", "mu"), "not for a figure of single trajectories")
+
+
+def test_plot_and_info_know_the_file_of_critical_spins(write: Write, tmp_path: Path) -> None:
+    settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--width", "0.1", "--output", tmp_path)
+    assert invoke("critical", write(), *settings).exit_code == 0
+    drawn = (tmp_path / "small_critical.png").read_bytes()
+    (tmp_path / "small_critical.png").unlink()
+    assert invoke("plot", tmp_path / "small_critical.nc").exit_code == 0
+    assert (tmp_path / "small_critical.png").read_bytes() == drawn
+    told = invoke("info", tmp_path / "small_critical.nc")
+    assert told.exit_code == 0
+    assert "critical spins of 2 bodies (mu 2)" in told.stdout
+    assert "n_c1_plus: 1 no friction, 1 found; 0.0024" in told.stdout
+    assert invoke("plot", tmp_path / "small_critical.nc", "--var", "n_c2_plus_simulated").exit_code == 0
+    figure = picture.plot(tmp_path / "small_critical.nc")
+    assert sum(line.get_gid() in VARIABLES for line in figure.axes[0].lines if line.get_gid()) == 10
+    assert not figure.axes[0].get_legend()
+    assert "simulation" in entries(figure)
+
+
+@pytest.mark.parametrize("verb", ["plot", "info"])
+def test_a_file_of_predictions_is_known(verb: str, small: xr.Dataset, tmp_path: Path) -> None:
+    small[["reversals_predicted", "form_factor"]].to_netcdf(tmp_path / "p.nc")
+    assert invoke(verb, tmp_path / "p.nc").exit_code == 0

@@ -1,0 +1,307 @@
+"""What Python may hand in, what it is told, and what it gets back."""
+
+from __future__ import annotations
+
+import sys
+import types
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from support.runs import same_numbers
+
+import sweep
+from sweep.config import ConfigError, load_config, schema
+from sweep.config.plain import plain
+from sweep.parameters import PARAMETERS
+
+Write = Callable[..., Path]
+
+TEXT = "name: quick\nmodel: averaged\nbody: {b: [2, 3]}\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
+SAID = {
+    "name": "quick", "model": "averaged", "body": {"b": [2, 3]}, "friction": {"mu": [40, 60]},
+    "integrator": {"t_end": 40},
+}  # fmt: skip
+"""What `TEXT` says."""
+
+AXES = {
+    "list": [40, 60],
+    "tuple": (40.0, 60),
+    "range": range(40, 61, 20),
+    "array": np.array([40, 60], np.int16),
+    "numbers of an array": [np.float32(40), np.int64(60)],
+    "DataArray": xr.DataArray([40, 60], dims="mu"),
+    "Series": pd.Series([40.0, 60.0]),
+    "mapping": {"start": np.int8(40), "stop": 60, "num": 2.0},
+}
+
+
+@pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
+def test_an_axis_may_be_any_sequence(axis: Any, write: Write) -> None:
+    as_override, in_mapping = load_config(write(TEXT), {"mu": axis}), load_config({**SAID, "friction": {"mu": axis}})
+    assert as_override.axes == in_mapping.axes == {"mu": (40, 60), "b": (2, 3)}
+    assert all(type(number) is float for number in as_override.axes["mu"])
+
+
+def test_a_mapping_a_path_and_a_config_are_one_configuration(write: Write) -> None:
+    path = write(TEXT)
+    given = [path, str(path), SAID, sweep.load_config(path), types.MappingProxyType(SAID)]
+    assert len({load_config(each).fingerprint() for each in given}) == 1
+    first, *others = [sweep.run(each) for each in given]
+    for other in others:
+        same_numbers(first, other)
+    same_numbers(sweep.predict(SAID), sweep.predict(path))
+
+
+def test_a_mapping_is_left_as_it_was() -> None:
+    said = {"friction": {"mu": 60}}
+    load_config(said, {"b": 2, "mu": 3})
+    assert said == {"friction": {"mu": 60}}
+
+
+WRONG: dict[str, tuple[dict[str, Any], str]] = {
+    "a word": ({"mu": "x"}, "mu: 'x' is not a number; allowed: a finite number >= 0"),
+    "an entry": ({"mu": [1, "x"]}, "mu[1]: 'x' is not a number"),
+    "of an array": ({"mu": np.array([1.0, np.nan])}, "mu[1]: nan is out of bounds"),
+    "a key of a range": ({"mu": {"strat": 1, "stop": 2, "num": 3}}, "mu.strat: unknown key (did you mean start?)"),
+    "two dimensions": ({"mu": np.ones((2, 2))}, "mu[0]: [1.0, 1.0] is not a number"),
+    "another type": ({"mu": 1j}, "mu: 1j is not a number"),
+    "by path": ({"friction.mu": -1}, "friction.mu: -1 is out of bounds"),
+    "misspelt": ({"t_edn": 3}, "t_edn: unknown key (did you mean integrator.t_end?); allowed: name, model"),
+    "of the integrator": ({"t_end": -1}, "t_end: -1; allowed: a number > 0"),
+    "a section": ({"friction": {}}, "friction.mu: missing; allowed: a finite number >= 0"),
+    "a measurement": ({"measure": ["reversal"]}, "measure[0]: 'reversal' is not a measurement (did you mean rev"),
+    "a measurement alone": ({"measure": "reversals"}, "measure: 'reversals'; allowed: a list of reversals"),
+    "a model": ({"model": "no_slip"}, "model: 'no_slip' (did you mean noslip?); allowed: slip, noslip"),
+    "a method": ({"method": "dopri"}, "method: 'dopri' (did you mean dopri5?); allowed: dopri5"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", WRONG)
+@pytest.mark.parametrize("function", [sweep.run, sweep.predict, sweep.critical, load_config])
+def test_a_wrong_argument_is_called_by_its_name(function: Callable[..., Any], kind: str, write: Write) -> None:
+    arguments, said = WRONG[kind]
+    for config in (write(TEXT), SAID, load_config(SAID)):
+        with pytest.raises(ConfigError) as refusal:
+            function(config, arguments) if function is load_config else function(config, **arguments)
+        assert str(refusal.value).startswith(said)
+        assert "\n" not in str(refusal.value)
+
+
+def test_faults_of_a_mapping_have_its_path_and_those_of_a_file_their_line(write: Write) -> None:
+    with pytest.raises(ConfigError) as refusal:
+        load_config({"body": {"a": -1}, "friction": {"mu": [20, "x"]}})
+    assert str(refusal.value).splitlines() == [
+        "body.a: -1 is out of bounds; allowed: a finite number > 0 and < 1e+06",
+        "friction.mu[1]: 'x' is not a number; allowed: a finite number >= 0 and < 1e+12",
+    ]
+    path = write("friction: {mu: x}\n")
+    with pytest.raises(ConfigError, match=f"^{path}:1:16: friction.mu: 'x'"):
+        sweep.run(path)
+
+
+@pytest.mark.parametrize(("mu", "said"), [("x", "mu: 'x' is not"), (-1, "mu: -1 is out"), ([], "mu: an empty axis")])
+def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name(mu: Any, said: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{said}"):
+        sweep.trajectory(SAID, mu=mu)
+
+
+def test_a_cell_has_no_parameter_that_its_model_lacks() -> None:
+    with pytest.raises(ConfigError, match=r"^mu: no parameter of the noslip model; allowed: a, b"):
+        sweep.trajectory({"model": "noslip"}, mu=60)
+
+
+def test_faults_come_in_the_order_of_lines(write: Write) -> None:
+    text = "colour: red\nintegrator: {t_end: -1}\nstart: {n0: x}\nmeasure: [spin]\nfriction: {nu: 3}\nbody: {a: 0}\n"
+    with pytest.raises(ConfigError) as refusal:
+        load_config(write(text))
+    assert [fault.line for fault in refusal.value.faults] == [1, 2, 3, 4, 5, 6]
+    assert [int(line.split(":")[1]) for line in str(refusal.value).splitlines()] == [1, 2, 3, 4, 5, 6]
+
+
+def test_overrides_of_a_config_act_as_on_its_file(write: Write) -> None:
+    """Also on what was filled in by default, here the method and the cells that are verified."""
+    path = write("friction: {mu: {start: 20, stop: 200, num: 600}}\n")
+    config = load_config(path)
+    assert (config.integrator.method, config.verify) == ("auto", 0.002)
+    for overrides in ({"step": 0.01}, {"model": "analytic"}, {"mu": 60}, {"friction.mu": [3, 4], "name": "x"}):
+        assert load_config(config, overrides) == load_config(path, overrides)
+    assert load_config(load_config(config, {"mu": 60}), {"b": 2}) == load_config(path, {"mu": 60, "b": 2})
+    assert config == load_config(path)
+
+
+def test_overrides_of_a_changed_config_keep_the_change() -> None:
+    changed = replace(load_config(SAID), max_failed_fraction=0.5)
+    again = load_config(changed, {"mu": 50})
+    assert (again.max_failed_fraction, again.axes) == (0.5, {"b": (2, 3)})
+
+
+def test_overrides_of_a_config_keep_its_table(write: Write, tmp_path: Path) -> None:
+    table = tmp_path / "cells.csv"
+    table.write_text("mu\n40\n60\n", encoding="utf-8")
+    config = load_config(write("cases: cells.csv\n"))
+    changed = replace(config, max_failed_fraction=0.5)
+    table.unlink()
+    for each in (config, changed):
+        assert load_config(each, {"b": 2}).cases == {"mu": (40.0, 60.0)}
+
+
+def test_a_trajectory_takes_cells_and_settings() -> None:
+    found = sweep.trajectory(SAID, mu=(50, 70), b=np.array([3.0]), t_end=30)
+    assert found.mu.values.tolist() == [50, 70]
+    assert float(found.time.max()) == 30
+    with pytest.raises(ConfigError, match=r"^muu: unknown key \(did you mean friction\.mu\?\)"):
+        sweep.trajectory(SAID, muu=60)
+
+
+def test_open_takes_what_sweep_wrote_and_nothing_else(tmp_path: Path) -> None:
+    written = sweep.run(SAID, tmp_path)
+    xr.testing.assert_identical(sweep.open(tmp_path / "quick.nc"), written)
+    with sweep.open(str(tmp_path / "quick.nc"), load=False) as lazy:
+        assert not lazy.reversals._in_memory
+    xr.Dataset({"status": 1}).to_netcdf(tmp_path / "other.nc")
+    with pytest.raises(sweep.StoreError, match=r"other\.nc: not a dataset of sweep"):
+        sweep.open(tmp_path / "other.nc")
+    with pytest.raises(sweep.StoreError, match="no such file"):
+        sweep.open(tmp_path / "none.nc")
+
+
+def test_a_bar_is_shown_where_it_is_asked_for(capfd: pytest.CaptureFixture[str]) -> None:
+    sweep.run(SAID)
+    assert tuple(capfd.readouterr()) == ("", "")
+    sweep.run(SAID, progress=True)
+    out, err = capfd.readouterr()
+    assert (out, "4/4 cells" in err) == ("", True)
+
+
+@pytest.fixture
+def notebook(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """As in a notebook: what is displayed there, with what takes its place."""
+    shown: list[str] = []
+
+    class Handle:
+        def __init__(self) -> None:
+            self.place = len(shown) - 1
+
+        def update(self, html: str) -> None:
+            shown[self.place] = html
+
+    def display(html: str, *, display_id: bool) -> Handle:
+        assert display_id
+        shown.append(html)
+        return Handle()
+
+    ipython, inside = types.ModuleType("IPython"), types.ModuleType("IPython.display")
+    ipython.get_ipython = lambda: types.SimpleNamespace(kernel=None)  # type: ignore[attr-defined]
+    inside.HTML, inside.display = str, display  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    monkeypatch.setitem(sys.modules, "IPython.display", inside)
+    return shown
+
+
+def test_a_notebook_shows_a_bar_unasked(notebook: list[str], capfd: pytest.CaptureFixture[str]) -> None:
+    sweep.run(SAID, progress=False)
+    assert notebook == []
+    sweep.run(SAID)
+    (shown,) = notebook
+    assert '<progress value="4" max="4">' in shown
+    assert "4/4 cells · 0 failed" in shown
+    sweep.trajectory(SAID)
+    assert "sqrt(c/g)" in notebook[1]
+    assert tuple(capfd.readouterr()) == ("", "")
+
+
+def test_a_python_prompt_is_no_notebook(notebook: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["IPython"], "get_ipython", lambda: types.SimpleNamespace())
+    sweep.run(SAID)
+    assert notebook == []
+
+
+HALVES: dict[str, list[dict[str, Any]]] = {
+    "mu": [{"mu": [40, 60]}, {"mu": [80]}],
+    "n0, on which no body depends": [{"n0": [0.02]}, {"n0": [0.05, 0.1]}],
+    "mu and b": [{"mu": mu, "b": b} for mu in ([40, 60], [80]) for b in ([2], [3, 4])],
+    "mu, verified": [{"mu": [40, 60], "verify": 0.9}, {"mu": [80], "verify": 0.5}],
+}
+"""Runs that together cover a grid."""
+
+
+@pytest.mark.parametrize("parts", HALVES.values(), ids=HALVES)
+def test_parts_of_a_grid_are_combined_without_loss(parts: list[dict[str, Any]], tmp_path: Path) -> None:
+    """By the call that `docs/how-to/python.md` shows; integers stay integers, also from files."""
+    whole: dict[str, Any] = {}
+    for part in parts:
+        whole |= {name: sorted({*whole.get(name, ()), *axis}) for name, axis in part.items() if name != "verify"}
+    for i, part in enumerate(parts):
+        sweep.run(SAID, tmp_path / str(i), **part)
+    runs = [
+        sweep.open(tmp_path / str(i) / "quick.nc").drop_dims("verified", errors="ignore") for i in range(len(parts))
+    ]
+    combined = xr.combine_by_coords(runs[::-1], data_vars="minimal", compat="equals", combine_attrs="drop_conflicts")
+    assert isinstance(combined, xr.Dataset)
+    same_numbers(combined.transpose(*(wanted := sweep.run(SAID, **whole)).dims), wanted)
+    assert (combined.reversals.dtype, combined.status.dtype) == (np.int16, np.int8)
+    assert combined.attrs["Conventions"] == "CF-1.11"
+    assert "wall_time" not in combined.attrs
+
+
+@pytest.mark.filterwarnings("ignore:In a future version of xarray:FutureWarning")
+def test_variables_of_the_same_cells_are_merged_without_loss() -> None:
+    """With xarray's own defaults."""
+    counts, energy = (sweep.run(SAID, measure=["reversals", *more]) for more in ([], ["energy_error"]))
+    merged = xr.merge([counts, energy, sweep.predict(SAID)])
+    same_numbers(merged[list(energy.variables)], energy)
+    assert merged.reversals.dtype == np.int16
+
+
+NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([10**400, 1, 2.0, 1e3, 60, -1, 1e13, 1e-15]))
+WORDS = st.one_of(st.text(max_size=5), st.sampled_from(["auto", "slip", "adams", "reversals", "a/b", "\ud800"]))
+LEAF = st.one_of(NUMBERS, WORDS, st.none(), st.booleans(), st.binary(max_size=2))
+FIELDS = {model: tuple(model.model_fields) for model in (schema.Schema, schema.Integrator, schema.Range)}
+KEY = st.sampled_from((*PARAMETERS, "nu", *(key for keys in FIELDS.values() for key in keys)))
+VALUE = st.recursive(
+    LEAF,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3),
+        st.dictionaries(KEY, inner, max_size=3),
+        st.fixed_dictionaries({"start": inner, "stop": inner, "num": inner}),
+    ),
+    max_leaves=6,
+)
+SECTIONS = {
+    "integrator": FIELDS[schema.Integrator],
+    **{section: [p.name for p in PARAMETERS.values() if p.section == section] for section in schema.SECTIONS},
+}
+DOCUMENT = st.one_of(
+    st.dictionaries(KEY, VALUE, max_size=3),
+    st.fixed_dictionaries(
+        {},
+        optional={key: VALUE for key in FIELDS[schema.Schema] if key not in ("cases", *SECTIONS)}
+        | {name: st.fixed_dictionaries({}, optional=dict.fromkeys(keys, VALUE)) for name, keys in SECTIONS.items()},
+    ),
+)
+
+
+@given(DOCUMENT)
+def test_no_library_speaks_in_a_refusal(said: dict[str, Any]) -> None:
+    """Whatever the values, a message never has pydantic's text, and no other error comes."""
+    said.pop("cases", None)
+    try:
+        load_config(said)
+    except ConfigError as refusal:
+        spoken = str(refusal)
+    else:
+        return
+    try:
+        schema.Schema.model_validate(plain(said))
+    except ValidationError as error:
+        theirs = [e["msg"] for e in error.errors() if e["type"] != "value"]
+        assert [text for text in theirs if text.lower() in spoken.lower()] == []
