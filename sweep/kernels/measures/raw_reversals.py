@@ -25,7 +25,8 @@ class RawReversals(Measurement):
     }
 
     def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
-        return {"earlier_spin": columns["n0"]}
+        spin, _, _ = model.energy(model.start(columns), model.constants.of(columns))
+        return {"earlier_spin": spin}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
         COUNT, EARLIER = map(layout.at, self.rows)
