@@ -43,6 +43,7 @@ nb_merge_streams = True
 default_role = "code"
 add_module_names = False
 autodoc_member_order = "bysource"
+autodoc_mock_imports = ["bokeh"]  # of the extra `explore`
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
 

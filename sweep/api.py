@@ -43,6 +43,7 @@ def run(
     output: str | Path | None = None,
     *,
     fresh: bool = False,
+    rerun: str | None = None,
     progress: bool | None = None,
     reporter: Reporter | None = None,
     cluster: Cluster | None = None,
@@ -50,12 +51,17 @@ def run(
 ) -> xr.Dataset:
     """Run a sweep.
 
+    If `output` holds the dataset of a smaller run, of fewer cells or to an earlier `t_end`, only what it lacks is
+    simulated.  The dataset is the same, bit for bit, as that of a run of all cells at once.
+
     Parameters
     ----------
     config : path of a configuration, what its file would say as a mapping, or a `Config`
     output : folder for the dataset and its maps; until they are finished it holds a checkpoint, from which the same
         call resumes.  By default nothing is written
     fresh : discard what an earlier run left in `output`
+    rerun : "failed" or "limit": simulate again just those cells of the dataset in `output` that failed, or that
+        reached the time limit, with the settings of the integrator as they are now; the others stay as they are
     progress : whether to show a bar; by default in notebooks alone
     reporter : receives progress and messages in place of a bar
     cluster : processes to run the cells in; by default the threads of this one
@@ -77,7 +83,7 @@ def run(
 
     checked = load_config(config, overrides)
     with shown(progress, reporter) as told:
-        return run(checked, output, fresh=fresh, reporter=told, cluster=cluster)
+        return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, cluster=cluster)
 
 
 def critical(

@@ -291,8 +291,11 @@ def plot(
 
         interrupt.raise_again()
         target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
+        if picture.suffix(target) == "html":
+            _plot_page(file, target, variable, x, y, sel, limits, cmap)
+            return
         if picture.suffix(target) not in picture.FORMATS:
-            _refuse(f"--output {target}", f"unknown format; allowed: {picture.ALLOWED}")
+            _refuse(f"--output {target}", f"unknown format; allowed: {picture.ALLOWED}, .html")
         dataset = _open(file)
         with _about(file):
             for name, taken in panels.nearest(dataset, sel).items():
@@ -312,6 +315,54 @@ def info(file: Path) -> None:
         with _about(file):
             text = "\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)])
         _say(text)
+
+
+@main.command()
+@FILE
+@click.option("--port", type=click.IntRange(1, 65535), help="Port of the page [default: the first free from 5006].")
+@click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
+def explore(file: Path, port: int | None, no_browser: bool) -> None:
+    """Explore the maps of a dataset in the browser.
+
+    A click on a cell runs its trajectory.  The page is served to this machine alone, until Ctrl-C.
+    """
+    with _explained():
+        with _needs_bokeh("explore"):
+            from sweep.explore.server import serve
+        from sweep.explore.slices import open_source
+
+        with _about(file):
+            source = open_source(file)
+        serve(source, port, browser=not no_browser, say=_say)
+        _say("stopped")
+        sys.stdout.flush()
+        os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it
+
+
+def _plot_page(
+    file: Path, target: Path, variable: str | None, x: str | None, y: str | None, sel: dict[str, float],
+    limits: str | None, cmap: str | None,
+) -> None:  # fmt: skip
+    """Draw a map as a page of its own."""
+    with _needs_bokeh("--output"):
+        from sweep.explore.page import save_html
+    for option, value in (("--limits", limits), ("--cmap", cmap)):
+        if value is not None:
+            _refuse(option, "not for a page; allowed: with a png, pdf or svg")
+    with _about(file):
+        save_html(_open(file), target, variable, x, y, sel)
+    _say(f"wrote {target}")
+
+
+@contextmanager
+def _needs_bokeh(what: str) -> Iterator[None]:
+    """Make a missing Bokeh a fault that tells how to install it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name not in ("bokeh", "tornado"):
+            raise
+        _refuse(what, "needs Bokeh, which is not installed: pip install 'rattleback-sweep[explore]'")
 
 
 def _open(file: Path) -> xr.Dataset:

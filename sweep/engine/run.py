@@ -27,7 +27,7 @@ from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
-from sweep.results.identity import Identity, not_replaced
+from sweep.results.identity import Identity, not_resumed
 from sweep.results.memory import Memory
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
@@ -52,34 +52,7 @@ def run(
     cluster: Cluster | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
-    """Run a sweep.
-
-    If `output` holds the dataset of a smaller run, of fewer cells or to an earlier `t_end`, only what it lacks is
-    simulated.  The dataset is the same, bit for bit, as that of a run of all cells at once.
-
-    Parameters
-    ----------
-    config : a configuration or the path of one
-    output : folder for the dataset and its maps; until they are finished it holds a checkpoint, from
-        which the same call resumes.  By default nothing is written
-    fresh : discard what an earlier run left in `output`
-    rerun : "failed" or "limit": simulate again just those cells of the dataset in `output` that failed, or that
-        reached the time limit, with the settings of the integrator as they are now; the others stay as they are
-    reporter : receives progress and messages; by default there are none
-    cluster : processes to run the cells in; by default the threads of this one
-    overrides : values that replace those of the file, such as ``mu=60`` or ``t_end=1000``
-
-    Returns
-    -------
-    Dataset over the axes of the configuration; the `long_name` of a variable says what it means.
-    If `output` is given and there are more than `LARGE` cells, values are read from the file when
-    they are asked for.
-
-    Raises
-    ------
-    ConfigError, StoreError
-        if the configuration, or what `output` holds, cannot be used.
-    """
+    """As `sweep.api.run`; what there is to tell goes to `reporter` alone."""
     config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun {rerun!r}; allowed: {', '.join(RERUN)}")
@@ -116,7 +89,7 @@ def _earlier(config: Config, identity: Identity, files: RunFiles, rerun: str | N
         found, there = files.identity(), open_dataset(files.dataset)
         assert found is not None
         if reason := reason_against(config, found, identity, there, rerun):
-            raise not_replaced(files.dataset, reason)
+            raise not_resumed(files.dataset, reason)
         files.keep_earlier()
     elif rerun and not files.earlier.exists():
         raise StoreError(f"{files.dataset}: no such file; --rerun needs the dataset of an earlier run")

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sweep.plots import labels, legends, theory
+from sweep.plots.axes import set_scale
 from sweep.plots.maps import arrangement
-from sweep.plots.panels import MAX_PANELS, heading, indices, is_logarithmic, title
+from sweep.plots.panels import MAX_PANELS, heading, indices, title
 
 _COLOURS = {"n_c1": "C0", "n_c2": "C1"}
 
@@ -37,8 +38,7 @@ def draw(dataset: xr.Dataset) -> Figure:
         chosen = dataset.isel(panel)
         at = np.atleast_1d(chosen[x].values) if x else np.zeros(1)
         order = np.argsort(at)
-        if is_logarithmic(at[order]):
-            axes.set_xscale("log")
+        set_scale(axes, "x", at[order])
         for name, colour in _COLOURS.items():
             for side in ("plus", "minus"):
                 for suffix, (_, style) in _SOURCES.items():

@@ -14,9 +14,10 @@ from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
 from sweep.plots import labels, legends, theory
+from sweep.plots.axes import set_scale
 from sweep.plots.maps import arrangement
 from sweep.plots.marks import blank, legend, marks
-from sweep.plots.panels import Panels, heading, is_logarithmic, title
+from sweep.plots.panels import Panels, heading, title
 from sweep.plots.scales import Limits
 
 _STYLES: dict[str, dict[str, Any]] = {
@@ -64,8 +65,7 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str | None) -> d
     """Draw one panel; returns the entries for the legend."""
     entries: dict[str, Artist] = {}
     at = np.atleast_1d(chosen[x].values) if x else np.zeros(1)
-    if is_logarithmic(at):
-        axes.set_xscale("log")
+    set_scale(axes, "x", at)
     for name in names:
         kinds = marks(chosen, name)
         empty = np.atleast_1d(blank(kinds).values)

@@ -14,8 +14,9 @@ from matplotlib.patches import Patch
 
 from sweep.grid import Array
 from sweep.plots import cells, labels, legends, scales, theory
+from sweep.plots.axes import set_scale
 from sweep.plots.marks import blank, legend, marks
-from sweep.plots.panels import Panels, edges, heading, is_logarithmic, title
+from sweep.plots.panels import Panels, edges, heading, title
 from sweep.plots.scales import Limits, Scale
 
 _MAX_VALUES = 1000
@@ -95,10 +96,8 @@ def _map(
     empty = blank(kinds).transpose(down, right).values | field.isnull().values
     values = field.values
     around = edges(chosen[down].values), edges(chosen[right].values)
-    if is_logarithmic(chosen[right].values):
-        axes.set_xscale("log")
-    if is_logarithmic(chosen[down].values):
-        axes.set_yscale("log")
+    set_scale(axes, "x", chosen[right].values)
+    set_scale(axes, "y", chosen[down].values)
     axes.pcolormesh(
         around[1], around[0], np.ma.masked_where(empty, values),
         cmap=scale.colours, norm=scale.norm, rasterized=values.size > 5000,

@@ -86,7 +86,7 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset, across: tuple[str, str], la
             if "n0" in across:
                 seen = _curve(axes, dataset, values, across, name)
             else:
-                seen = _contour(axes, dataset, values, across, name, side)
+                seen = _contour(axes, dataset, values, across, name)
             if seen is not None:
                 entries[name] = entry(name, source, over_n0="n0" in across)
                 # Over n0 the lines of n_c1 are too close to those of n_c2 for a label of their own.
@@ -112,13 +112,9 @@ def _curve(axes: Axes, dataset: xr.Dataset, values: xr.DataArray, across: tuple[
     return points[within]
 
 
-def _contour(
-    axes: Axes, dataset: xr.Dataset, values: xr.DataArray, across: tuple[str, str], name: str, side: str
-) -> Array | None:
+def _contour(axes: Axes, dataset: xr.Dataset, values: xr.DataArray, across: tuple[str, str], name: str) -> Array | None:
     """Where a critical spin equals the n0 of the map; its points, None if it does nowhere."""
     n0 = float(dataset["n0"]) if "n0" in dataset.coords and dataset["n0"].ndim == 0 else 0.0
-    if (n0 <= 0) if side == "plus" else (n0 >= 0):
-        return None
     if set(values.dims) - set(across):
         return None
     down, right = across
@@ -137,10 +133,14 @@ def _contour(
 def _label(axes: Axes, points: Array, name: str, side: str, across: tuple[str, str]) -> None:
     """The symbol of a critical spin beside its line, on the side of the larger spins or on the roomier one."""
     place_on_map = axes.transData + axes.transAxes.inverted()
-    if name == "n_c1":  # the lines are farthest apart at the ends nearer the middle
-        x, y = min(points[[0, -1]], key=lambda point: float(np.hypot(*(place_on_map.transform(point) - 0.5))))
+    last = len(points) - 1
+    if name == "n_c1":  # the lines are farthest apart near the ends that are closer to the middle
+        x, y = min(
+            points[[last // 8, last - last // 8]],
+            key=lambda point: float(np.hypot(*(place_on_map.transform(point) - 0.5))),
+        )
     else:
-        x, y = points[int(0.6 * (len(points) - 1))]
+        x, y = points[int(0.6 * last)]
     outwards = 1 if side == "plus" else -1
     if across[0] == "n0":
         place: dict[str, Any] = {"xytext": (0, 4 * outwards), "ha": "center", "va": "bottom" if outwards > 0 else "top"}

@@ -54,16 +54,12 @@ class Identity:
 def require_same(path: Path, found: Identity, wanted: Identity) -> None:
     """Raise `StoreError` if the file at `path`, whose identity is `found`, is not of the run `wanted`."""
     if reason := found.difference(wanted):
-        raise StoreError(
-            f"{path}: not resumed, it comes from {reason}\n"
-            "  allowed: the same configuration, another --output, or --fresh to discard that run"
-        )
+        raise not_resumed(path, reason)
 
 
-def not_replaced(path: Path, reason: str) -> StoreError:
-    """The error of a dataset at `path` that another run would replace, although results would be lost."""
+def not_resumed(path: Path, reason: str) -> StoreError:
+    """The error of a file that a run cannot go on from, because it comes from `reason`."""
     return StoreError(
-        f"{path}: not replaced, it comes from {reason}\n"
-        "  allowed: the same configuration; more values, a later t_end or more measurements;"
-        " another --output; or --fresh to discard that run"
+        f"{path}: not resumed, it comes from {reason}\n"
+        "  allowed: the same configuration or a larger one, another --output, or --fresh to discard that run"
     )

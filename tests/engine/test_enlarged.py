@@ -115,7 +115,7 @@ def test_an_interrupted_enlargement_goes_on(write: Write, tmp_path: Path) -> Non
 def test_no_result_is_lost(write: Write, tmp_path: Path, change: tuple[str, str], said: str) -> None:
     grown(write, tmp_path / "out", ONE)
     before = (tmp_path / "out" / "small.nc").read_bytes()
-    with pytest.raises(StoreError, match="not replaced") as caught:
+    with pytest.raises(StoreError, match="not resumed") as caught:
         grown(write, tmp_path / "out", ONE.replace(*change))
     assert said in str(caught.value)
     assert (tmp_path / "out" / "small.nc").read_bytes() == before
@@ -124,7 +124,7 @@ def test_no_result_is_lost(write: Write, tmp_path: Path, change: tuple[str, str]
 def test_nothing_is_taken_from_other_sources(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     grown(write, tmp_path / "out", ONE)
     monkeypatch.setattr("sweep.results.provenance.sources", lambda: ("other", "versions"))
-    with pytest.raises(StoreError, match="not replaced"):
+    with pytest.raises(StoreError, match="not resumed"):
         grown(write, tmp_path / "out", MORE)
 
 

@@ -269,9 +269,9 @@ def test_in_other_processes(file: Path, refined: xr.Dataset) -> None:
 @pytest.mark.parametrize(
     ("text", "place", "said"),
     [
-        (MAP.replace("refine: 2", "refine: -1"), "6:9: refine", "greater than or equal to 0"),
-        (MAP.replace("refine: 2", "refine: 1.5"), "6:9: refine", "1.5: "),
-        (MAP.replace("refine: 2", "refine: 25"), "6:9: refine", "less than or equal to 24"),
+        (MAP.replace("refine: 2", "refine: -1"), "6:9: refine", "-1; allowed: a whole number >= 0"),
+        (MAP.replace("refine: 2", "refine: 1.5"), "6:9: refine", "1.5; allowed: a whole number"),
+        (MAP.replace("refine: 2", "refine: 25"), "6:9: refine", "25; allowed: a whole number >= 0 and <= 24"),
         (MAP + "verify: 0.1\n", "7:9: verify", "allowed: 0"),
         (MAP + "measure: [energy_error]\n", "7:10: measure", "allowed: reversals among them"),
         (MAP + "model: analytic\n", "6:9: refine", "allowed: 0"),

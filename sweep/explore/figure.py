@@ -1,0 +1,229 @@
+"""The map of a slice as a Bokeh figure: one image, patterns that the browser draws over it, and hover by index.
+
+There is no glyph per cell: an image and a table of bits are sent as binary arrays, so that a million cells stay fluid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from bokeh.models import (
+    BasicTicker,
+    ColorBar,
+    ColumnDataSource,
+    CustomJS,
+    CustomJSHover,
+    FixedTicker,
+    HoverTool,
+    LinearColorMapper,
+    LogColorMapper,
+    Range1d,
+)  # fmt: skip
+from bokeh.plotting import figure
+
+from sweep.explore.colours import Scale, scale
+from sweep.explore.lines import Lines
+from sweep.explore.slices import DIFFERENCE, Axis, Slice, Source, plain
+from sweep.grid import Array
+from sweep.plots import labels, marks
+
+HEIGHT = 480
+"""Of the map, in pixels."""
+
+_SHORT = {"reversals": "simulated", "reversals_predicted": "predicted", DIFFERENCE: "difference", "status": "end"}
+"""What these are called under the pointer, where the table must not hide the map."""
+
+_TICKS = 12
+"""On an axis whose values are listed one by one, at most."""
+
+DASHES = {"n_c1": "dotted", "n_c2": "solid"}
+"""Of the lines of theory."""
+
+_BAR = {
+    "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": "#1b2733",
+    "bar_line_color": "#8a949e", "major_label_text_font_size": "12px", "background_fill_color": None,
+    "title_text_font_style": "normal",
+}  # fmt: skip
+
+_STYLE = {
+    "axis_line_color": "#8a949e", "major_tick_line_color": "#8a949e", "minor_tick_line_color": None,
+    "axis_label_text_font_style": "normal", "axis_label_text_font_size": "13px", "major_label_text_font_size": "12px",
+}  # fmt: skip
+
+
+class Map:
+    """The map over two axes, which shows one slice after another.
+
+    The models stay the same from slice to slice: a browser does not forget models that are replaced.
+
+    Parameters
+    ----------
+    probe, request : where the browser writes which cell is under the pointer, and which one is to be run; None on a
+        page without a server
+    """
+
+    def __init__(
+        self, source: Source, x: Axis, y: Axis, probe: ColumnDataSource | None = None,
+        request: ColumnDataSource | None = None,
+    ) -> None:  # fmt: skip
+        self._source, self._place = source, _place(x.edges, y.edges)
+        self.axes = (x.name, y.name)
+        self.figure = plot = _frame(source, x, y)
+        self._cells = ColumnDataSource({"image": [np.zeros((1, 1), "uint8")], **self._place})
+        # Two images, because an image goes on with the mapper that it was made with.
+        self._images = [
+            plot.image(image="image", x="x", y="y", dw="dw", dh="dh", source=self._cells, color_mapper=mapper)
+            for mapper in (LinearColorMapper(palette=["black"]), LogColorMapper(palette=["black"]))
+        ]
+        overlay = ColumnDataSource({"image": [np.zeros((2, 2), "uint32")], **self._place}, syncable=False)
+        plot.image_rgba(image="image", x="x", y="y", dw="dw", dh="dh", source=overlay)
+        self._lines = {name: _line(plot, dash) for name, dash in DASHES.items()}
+        self.cursor, self.pins = _cursor(plot), _pins(plot)
+        self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
+        plot.add_tools(self._hover)
+        self._kinds = ColumnDataSource({"kinds": [np.zeros((1, 1), "uint8")]})
+        _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "names": list(marks.WORDS),
+                 "overlay": overlay, "ex": x.edges, "ey": y.edges, "cursor": self.cursor, "probe": probe,
+                 "request": request})  # fmt: skip
+
+    def show(self, part: Slice, columns: Mapping[str, Any], lines: Sequence[Lines] = ()) -> Scale:
+        """Show a slice; returns how its values become colours.
+
+        Parameters
+        ----------
+        columns : what the pointer shows of a cell beside its place: tables of shape (y, x) by their variables
+        lines : of theory, drawn over the map
+        """
+        colours = scale(part)
+        tables = {name: [plain(table)] for name, table in columns.items()}
+        for image in self._images:
+            image.visible = (image is self._images[1]) == colours.logarithmic
+        mapper = self._images[colours.logarithmic].glyph.color_mapper
+        mapper.update(palette=colours.palette, low=colours.low, high=colours.high)
+        self._cells.data = {"image": [plain(part.values)], **self._place, **tables}
+        self._kinds.data = {"kinds": [part.kinds]}
+        drawn = {each.name: each.parts for each in lines}
+        for name, source in self._lines.items():
+            parts = drawn.get(name, [])
+            source.data = {"xs": [x for x, _ in parts], "ys": [y for _, y in parts]}
+        self.figure.title.text = self._source.label(part.name)
+        unit = labels.unit(self._source.dataset, part.name) if part.name in part.dataset else ""
+        ticker = BasicTicker() if colours.ticks is None else FixedTicker(ticks=colours.ticks, minor_ticks=[])
+        # A new bar, because an old one leaves out ticks beyond its first scale.
+        self.figure.right = [
+            ColorBar(
+                color_mapper=mapper, ticker="auto" if colours.logarithmic else ticker, title=unit or None,
+                major_label_overrides=colours.words, **_BAR,
+            )
+        ]  # fmt: skip
+        tip, formatters = _tip(self._source, part, list(columns))
+        self._hover.update(tooltips=tip, formatters=formatters)
+        return colours
+
+
+def _place(x: Array, y: Array) -> dict[str, list[float]]:
+    """Where an image between the first and the last edges lies."""
+    return {"x": [x[0]], "y": [y[0]], "dw": [x[-1] - x[0]], "dh": [y[-1] - y[0]]}
+
+
+def _line(plot: Any, dash: str) -> ColumnDataSource:
+    """A line that is seen on every colour."""
+    source = ColumnDataSource({"xs": [], "ys": []})
+    plot.multi_line("xs", "ys", source=source, color="white", width=3.5)
+    plot.multi_line("xs", "ys", source=source, color="black", width=1.5, dash=dash)
+    return source
+
+
+def _cursor(plot: Any) -> ColumnDataSource:
+    """The outline of the chosen cell."""
+    source = ColumnDataSource({key: [] for key in ("left", "right", "bottom", "top", "i", "j")}, name="cursor")
+    for colour, width in (("black", 4), ("white", 2)):
+        plot.quad(source=source, fill_color=None, line_color=colour, line_width=width)
+    return source
+
+
+def _pins(plot: Any) -> ColumnDataSource:
+    """The cells whose trajectories are drawn, each with its number."""
+    source = ColumnDataSource({key: [] for key in ("x", "y", "colour", "number", "alpha")}, name="pins")
+    plot.scatter(
+        "x", "y", source=source, size=17, fill_color="colour", line_color="white", line_width=1.5, alpha="alpha"
+    )
+    plot.text("x", "y", "number", source=source, text_color="white", text_font_size="11px", text_font_style="bold",
+              text_align="center", text_baseline="middle", alpha="alpha")  # fmt: skip
+    return source
+
+
+def _frame(source: Source, across: Axis, up: Axis) -> Any:
+    """The empty figure, with axes that suit the spacing of the values."""
+    x, y = across.edges, up.edges
+    plot = figure(
+        height=HEIGHT if up.name else 240,
+        sizing_mode="stretch_width", min_width=240,
+        x_range=Range1d(x[0], x[-1], bounds=(x[0], x[-1])),
+        y_range=Range1d(y[0], y[-1], bounds=(y[0], y[-1])),
+        x_axis_type="log" if across.spacing == "log" else "linear",
+        y_axis_type="log" if up.spacing == "log" else "linear",
+        x_axis_label=source.label(across.name),
+        y_axis_label=source.label(up.name) if up.name else None,
+        tools="pan,box_zoom,wheel_zoom,reset,save", active_drag="box_zoom", toolbar_location="above",
+        background_fill_color="#e8ebee",
+    )  # fmt: skip
+    plot.toolbar.logo = None
+    plot.grid.visible = False
+    for axis in plot.axis:
+        axis.update(**_STYLE)
+    plot.title.update(text_font_size="14px", text_font_style="bold")
+    plot.yaxis.visible = bool(up.name)
+    for axis, drawn in ((across, plot.xaxis[0]), (up, plot.yaxis[0])):
+        if axis.spacing == "list":
+            _list_ticks(axis, drawn)
+    return plot
+
+
+def _list_ticks(axis: Axis, drawn: Any) -> None:
+    ticks = [float(t) for t in range(0, len(axis.values), -(-len(axis.values) // _TICKS))]
+    drawn.ticker = FixedTicker(ticks=ticks, minor_ticks=[])
+    drawn.major_label_overrides = {t: f"{axis.values[int(t)]:g}" for t in ticks}
+
+
+def _tip(source: Source, part: Slice, columns: list[str]) -> tuple[str, dict[str, CustomJSHover]]:
+    """A table of the cell under the pointer, and what looks its numbers up by the index of the cell."""
+    rows, formatters = [], dict[str, Any]()
+    for axis, variable, index in ((part.x, "$x", "i"), (part.y, "$y", "j")):
+        if axis.name:
+            rows.append((labels.symbol(axis.name), f"{variable}{{custom}}"))
+            code = f"return Number(values[special_vars.image_index.{index}].toPrecision(6)).toString()"
+            formatters[variable] = CustomJSHover(args={"values": axis.values}, code=code)
+    for name in columns:
+        rows.append((_SHORT.get(name) or source.words(name), f"@{{{name}}}{{custom}}"))
+        flags = {} if name == DIFFERENCE else labels.flag_words(source.dataset, name)
+        code = "return words[value] ?? (Number.isFinite(value) ? Number(value.toPrecision(6)).toString() : 'none')"
+        formatters[f"@{{{name}}}"] = CustomJSHover(args={"words": {str(k): w for k, w in flags.items()}}, code=code)
+    table = "".join(
+        f'<tr><td style="color:#5b6875;padding-right:10px">{_escaped(words)}</td><td><b>{value}</b></td></tr>'
+        for words, value in rows
+    )
+    return f'<table style="font-size:12px">{table}</table>', formatters
+
+
+def _escaped(text: str) -> str:
+    """Text for a tooltip: neither markup nor one of Bokeh's placeholders."""
+    for character, entity in (("&", "&amp;"), ("<", "&lt;"), ("@", "&#64;"), ("$", "&#36;"), ("{", "&#123;")):
+        text = text.replace(character, entity)
+    return text
+
+
+def _connect(plot: Any, kinds: ColumnDataSource, models: dict[str, Any]) -> None:
+    """Let the browser paint the patterns whenever the view changes, and answer pointer and clicks."""
+    repaint = CustomJS(args={"map": models}, code="sweep.use(map)")
+    kinds.js_on_change("data", repaint)
+    for span in (plot.x_range, plot.y_range):
+        span.js_on_change("start", repaint)
+        span.js_on_change("end", repaint)
+    for size in ("inner_width", "inner_height"):
+        plot.js_on_change(size, repaint)
+    plot.js_on_event("tap", CustomJS(code="sweep.tap(cb_obj)"))
+    plot.js_on_event("mousemove", CustomJS(code="sweep.point(cb_obj)"))
+    plot.js_on_event("mouseleave", CustomJS(code="sweep.point(null)"))

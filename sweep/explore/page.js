@@ -1,0 +1,254 @@
+// What the page does by itself, without asking the server: patterns over the map, the cell under the pointer,
+// keys, and playing trajectories.  The callbacks of the Bokeh models call these functions.
+"use strict"
+
+const sweep = (() => {
+  // ---- cells and edges
+
+  /** Index of the cell whose edges enclose `at`, or -1. */
+  function cell(edges, at) {
+    let low = 0
+    let high = edges.length - 1
+    if (!(at >= edges[low] && at <= edges[high])) return -1
+    while (high - low > 1) {
+      const middle = (low + high) >> 1
+      if (edges[middle] <= at) low = middle
+      else high = middle
+    }
+    return low
+  }
+
+  /** For each of `count` pixels along an axis, the index of its cell or -1. */
+  function cells(edges, range, log, count) {
+    const found = new Int32Array(count)
+    const [start, end] = log ? [Math.log(range.start), Math.log(range.end)] : [range.start, range.end]
+    for (let k = 0; k < count; k++) {
+      const at = start + ((k + 0.5) / count) * (end - start)
+      found[k] = cell(edges, log ? Math.exp(at) : at)
+    }
+    return found
+  }
+
+  // ---- patterns over cells that are not plain results, drawn in screen pixels at every zoom
+
+  const WHITE = 0xc8ffffff, BLACK = 0x90000000, DARK = 0xff474340, LIGHT = 0xffa8a39e // ABGR
+
+  const ALONG = (x, y) => (x + y) % 10
+  const BACK = (x, y) => (((x - y) % 10) + 10) % 10
+
+  /** The colour of a pixel for each kind of cell, 0 where the pattern leaves the map to be seen. */
+  const PATTERNS = {
+    not_run: () => LIGHT,
+    failed: (x, y) => (ALONG(x, y) === 0 || BACK(x, y) === 0 ? LIGHT : DARK),
+    no_value: () => LIGHT,
+    time_limit: (x, y) => [WHITE, BLACK][ALONG(x, y)] ?? 0,
+    inferred: (x, y) => (x % 6 < 2 && y % 6 === 0 ? WHITE : x % 6 < 2 && y % 6 === 1 ? BLACK : 0),
+    noise_limited: (x, y) => [WHITE, BLACK][y % 8] ?? 0,
+    uncertain: (x, y) => [WHITE, BLACK][x % 8] ?? 0,
+  }
+
+  function paint({figure, kinds, names, overlay, ex, ey}) {
+    const width = Math.round(figure.inner_width), height = Math.round(figure.inner_height)
+    const table = kinds.data.kinds[0]
+    if (!(width > 1 && height > 1)) return
+    const [x, y] = [figure.x_range, figure.y_range]
+    const columns = cells(ex, x, figure.x_scale.type === "LogScale", width)
+    const rows = cells(ey, y, figure.y_scale.type === "LogScale", height)
+    const patterns = names.map((name) => PATTERNS[name])
+    const across = ex.length - 1
+    const out = new Uint32Array(width * height)
+    for (let r = 0; r < height; r++) {
+      if (rows[r] < 0) continue
+      for (let c = 0; c < width; c++) {
+        const bits = columns[c] < 0 ? 0 : table[rows[r] * across + columns[c]]
+        if (!bits) continue
+        for (let k = 0; k < patterns.length; k++) {
+          if (bits & (1 << k)) {
+            const colour = patterns[k](c, r)
+            if (colour) {
+              out[r * width + c] = colour
+              break
+            }
+          }
+        }
+      }
+    }
+    const NDArray = overlay.data.image[0].constructor
+    overlay.data = {image: [new NDArray(out, [height, width])], x: [x.start], y: [y.start],
+                    dw: [x.end - x.start], dh: [y.end - y.start]}
+  }
+
+  const due = new Map()
+
+  /** Paint once before the next frame, however many things changed. */
+  function repaint(map) {
+    if (due.has(map.figure.id)) return
+    due.set(map.figure.id, requestAnimationFrame(() => {
+      due.delete(map.figure.id)
+      paint(map)
+    }))
+  }
+
+  // ---- the chosen cell, the one under the pointer, and requests to the server
+
+  let current = null
+
+  /** Take note of the map that is shown; called for every new figure. */
+  function use(map) {
+    current = map
+    repaint(map)
+  }
+
+  function choose(i, j) {
+    const {cursor, ex, ey} = current
+    const [left, right, bottom, top] = [ex[i], ex[i + 1], ey[j], ey[j + 1]]
+    cursor.data = {left: [left], right: [right], bottom: [bottom], top: [top], i: [i], j: [j]}
+  }
+
+  function ask(request, i, j, add) {
+    request.data = {i: [i], j: [j], add: [add], count: [request.data.count[0] + 1]}
+  }
+
+  function tap(event) {
+    const i = cell(current.ex, event.x), j = cell(current.ey, event.y)
+    if (i < 0 || j < 0) return
+    choose(i, j)
+    if (current.request) ask(current.request, i, j, Boolean(event.modifiers?.shift))
+  }
+
+  let last = ""
+  let waiting = 0
+
+  /** Tell the server which cell is under the pointer: at most twenty times a second, and the last one for certain. */
+  function point(event) {
+    const {probe, ex, ey} = current
+    if (!probe) return
+    const i = event ? cell(ex, event.x) : -1, j = event ? cell(ey, event.y) : -1
+    clearTimeout(waiting)
+    waiting = setTimeout(() => {
+      if (last !== `${i},${j}`) {
+        last = `${i},${j}`
+        probe.data = {i: [i], j: [j]}
+      }
+    }, 50)
+  }
+
+  const STEPS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}
+
+  function key(event) {
+    if (!current || event.ctrlKey || event.altKey || event.metaKey) return
+    const {cursor, request, probe, ex, ey} = current
+    const clamp = (at, edges) => Math.max(0, Math.min(edges.length - 2, at))
+    const [i, j] = [cursor.data.i[0] ?? -1, cursor.data.j[0] ?? -1]
+    if (event.key in STEPS) {
+      const [di, dj] = STEPS[event.key]
+      const stride = event.shiftKey ? 10 : 1
+      const chosen = i < 0 ? [0, 0] : [clamp(i + stride * di, ex), clamp(j + stride * dj, ey)]
+      choose(...chosen)
+      if (probe) probe.data = {i: [chosen[0]], j: [chosen[1]]}
+    } else if (event.key === "Enter" && request && i >= 0) {
+      ask(request, i, j, event.shiftKey)
+    } else {
+      return
+    }
+    event.preventDefault()
+  }
+
+  // ---- playing
+
+  let player = null
+
+  /** Show the trajectories at a moment: the line in the curves, and the path of the last while. */
+  function moment({curves, trails, points, line, window, clock}, time) {
+    line.location = time
+    clock.text = `t = ${time.toFixed(time < 100 ? 1 : 0)} √(c/g)`
+    curves.forEach((curve, k) => {
+      const {time: t, x, y} = curve.data
+      const end = before(t, time), begin = before(t, time - window.value)
+      const some = t.length > 0 && time <= t[t.length - 1]
+      trails[k].data = {x: Array.from(x.slice(begin, end + 1)), y: Array.from(y.slice(begin, end + 1))}
+      points[k].data = end >= 0 && t.length ? {x: [x[end]], y: [y[end]], alpha: [some ? 1 : 0.35]} : {x: [], y: [], alpha: []}
+    })
+  }
+
+  /** Index of the last sample not after `time`. */
+  function before(t, time) {
+    let low = 0, high = t.length - 1
+    while (low < high) {
+      const middle = (low + high + 1) >> 1
+      if (t[middle] <= time) low = middle
+      else high = middle - 1
+    }
+    return low
+  }
+
+  function play(models, active) {
+    cancelAnimationFrame(player)
+    if (!active) return
+    const {slider, speed, button} = models
+    if (slider.value >= slider.end) slider.value = slider.start
+    let then = performance.now()
+    const frame = (now) => {
+      const next = slider.value + ((now - then) / 1000) * (slider.end / Number(speed.value))
+      then = now
+      slider.value = Math.min(next, slider.end)
+      if (slider.value < slider.end) player = requestAnimationFrame(frame)
+      else button.active = false
+    }
+    player = requestAnimationFrame(frame)
+  }
+
+  // ---- address, downloads, pictures
+
+  function address(query) {
+    history.replaceState(null, "", `?${query}`)
+  }
+
+  function notice(text) {
+    document.querySelector("#notice").classList.toggle("silent", !text)
+  }
+
+  function save(bytes, name, type) {
+    const link = document.createElement("a")
+    link.href = URL.createObjectURL(new Blob([bytes], {type}))
+    link.download = name
+    link.click()
+    setTimeout(() => URL.revokeObjectURL(link.href), 10_000)
+  }
+
+  /** The figures that can be seen, one below the other, with the page's title over them, as one PNG. */
+  async function picture(figures, name) {
+    const views = figures.map((figure) => Bokeh.index.find_one(figure)).filter((view) => view?.el.offsetParent)
+    const layers = views.map((view) => view.export("png", true).canvas)
+    const scale = window.devicePixelRatio
+    const canvas = document.createElement("canvas")
+    const head = 56 * scale
+    canvas.width = Math.max(...layers.map((layer) => layer.width))
+    canvas.height = layers.reduce((sum, layer) => sum + layer.height, head)
+    const pen = canvas.getContext("2d")
+    pen.fillStyle = "white"
+    pen.fillRect(0, 0, canvas.width, canvas.height)
+    pen.fillStyle = "#1b2733"
+    pen.font = `600 ${15 * scale}px system-ui, sans-serif`
+    pen.fillText(document.querySelector("h1").textContent, 12 * scale, 22 * scale)
+    pen.font = `${12 * scale}px system-ui, sans-serif`
+    pen.fillText(document.querySelector("#constants").textContent, 12 * scale, 42 * scale)
+    let y = head
+    for (const layer of layers) {
+      pen.drawImage(layer, 0, y)
+      y += layer.height
+    }
+    canvas.toBlob((blob) => save(blob, name, "image/png"))
+  }
+
+  async function copy(button) {
+    await navigator.clipboard.writeText(location.href)
+    const label = button.label
+    button.label = "Copied"
+    setTimeout(() => { button.label = label }, 1500)
+  }
+
+  document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
+
+  return {address, copy, cell, moment, notice, paint, picture, play, point, repaint, save, tap, use}
+})()

@@ -1,0 +1,49 @@
+"""A small sweep with cells of many kinds, for the explorer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import sweep
+from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
+
+TEXT = """\
+name: tiny
+body: {a: 10.0, b: {start: 2, stop: 5, num: 4}, delta: 0.03}
+friction: {mu: {start: 40, stop: 80, num: 5}}
+start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
+integrator: {method: dopri5, t_end: 1500}
+"""
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset over mu (5), b (4) and n0 (2).
+
+    At n0 = 0.05 the cell (0, 0) is made one that lifted off, (1, 0) one that settled, (2, 0) a lower bound, and (3, 0)
+    one limited by round-off.
+    """
+    folder = tmp_path_factory.mktemp("tiny")
+    config = folder / "tiny.yaml"
+    config.write_text(TEXT, encoding="utf-8")
+    dataset = sweep.run(config)
+    status = dataset["status"].values
+    status[:3, 0, 1] = LIFT_OFF, 1, TIME_LIMIT
+    noise = np.zeros(dataset["status"].shape, "int8")
+    noise[3, 0, 1] = 1
+    status[3, 0, 1] = 1
+    words = {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes", "long_name": "noise", "units": "1"}
+    dataset["noise_limited"] = (dataset["status"].dims, noise, words)
+    path = folder / "tiny.nc"
+    dataset.to_netcdf(path)
+    return path
+
+
+@pytest.fixture
+def opened(tiny: Path) -> xr.Dataset:
+    with xr.open_dataset(tiny, decode_times=False) as dataset:
+        return dataset.load()

@@ -1,0 +1,510 @@
+"""What a person does on the page, in chromium: the extra `browser` and Debian's chromium have to be there.
+
+python -m pytest -m browser -n0
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import ROOT
+
+import sweep
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Download, Locator, Page
+
+pytestmark = pytest.mark.browser
+
+CHROMIUM = "/usr/bin/chromium"
+"""Debian's: playwright's own is downloaded from a place that many machines do not reach."""
+
+TIMEOUT = 8_000
+"""Milliseconds: no test waits longer for anything; the kernel is compiled before."""
+
+N0 = 1
+"""Index of the slice with cells of many kinds."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def served(tiny: Path) -> Iterator[str]:
+    """The address of the explorer, run as a user runs it; it has to end with one line at Ctrl-C."""
+    with explorer(tiny) as process:
+        assert process.stdout
+        line = process.stdout.readline()
+        found = re.search(r"http://localhost:\d+/", line)
+        assert found, line
+        yield found[0]
+        process.send_signal(signal.SIGINT)
+        said, complaints = process.communicate(timeout=20)
+        assert (process.returncode, said, complaints) == (0, "stopped\n", "")
+
+
+def explorer(*arguments: str | Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "sweep", "explore", *map(str, arguments), "--no-browser"]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.fixture
+def visit(browser: Browser, served: str) -> Iterator[Callable[..., Page]]:
+    """Opens the page at a query; errors on its console fail the test."""
+    complaints = list[str]()
+    context = browser.new_context(viewport={"width": 1400, "height": 950}, accept_downloads=True)
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+
+    def open_page(query: str = "", ready: bool = True) -> Page:
+        page = context.new_page()
+        page.set_default_timeout(TIMEOUT)
+        page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(f"{served}?{query}" if query else served)
+        if ready:
+            settle(page)
+        return page
+
+    yield open_page
+    context.close()
+    assert not complaints
+
+
+def settle(page: Page) -> None:
+    """Wait until the map and its patterns are drawn."""
+    page.wait_for_function("document.querySelector('#map canvas, #map *') && window.Bokeh?.documents[0]?.is_idle")
+    page.wait_for_function(f"{MAP}.inner_width > 10 && {MAP}.renderers[2].data_source.data.image[0].length > 4")
+
+
+NAMED = "Bokeh.documents[0].get_model_by_name"
+
+MAP = f"{NAMED}('map').children[0]"
+
+
+def found(name: str) -> str:
+    """JavaScript for the model of this name, of which "map figure" is always the one that is shown."""
+    return MAP if name == "map figure" else f"{NAMED}('{name}')"
+
+
+def model(page: Page, name: str, expression: str) -> Any:
+    """The value of a JavaScript expression on the model `m` of this name."""
+    return page.evaluate(f"(() => {{ const m = {found(name)}; return {expression} }})()")
+
+
+def text(page: Page, name: str) -> str:
+    """What can be read in the widget of this name."""
+    return str(model(page, name, "Bokeh.index.find_one(m).shadow_el.querySelector('.bk-clearfix').innerText"))
+
+
+def wait(page: Page, name: str, expression: str) -> None:
+    """Wait until an expression on the model `m` of this name is true."""
+    page.wait_for_function(f"(() => {{ const m = {found(name)}; return m && ({expression}) }})()")
+
+
+def place(page: Page, i: float, j: float) -> tuple[float, float]:
+    """The middle of the cell in column i and row j of the map, in pixels of the window."""
+    spot = page.evaluate(
+        f"""([i, j]) => {{
+            const map = {MAP}, view = Bokeh.index.find_one(map), image = map.renderers[0].data_source.data
+            const [rows, columns] = image.image[0].shape
+            const at = (range, scale, k, n) => scale.compute(range.start + ((k + 0.5) / n) * (range.end - range.start))
+            const box = view.canvas_view.el.getBoundingClientRect(), frame = view.frame
+            return [box.x + at(map.x_range, frame.x_scale, i, columns),
+                    box.y + at(map.y_range, frame.y_scale, j, rows)]
+        }}""",
+        [i, j],
+    )
+    return spot[0], spot[1]
+
+
+def curves(page: Page) -> list[str]:
+    """What the legend says of the curves that are drawn."""
+    return list(model(page, "curve legend", "m.items.filter((i) => i.visible).map((i) => i.label.value)"))
+
+
+def wait_for_curves(page: Page, count: int) -> None:
+    test = f"m.items.filter((i) => i.visible && /reversals$/.test(i.label.value)).length === {count}"
+    wait(page, "curve legend", test)
+
+
+def pixels(page: Page, i: float, j: float, columns: int = 5, rows: int = 4) -> np.ndarray:
+    """The colours in the inner part of a cell of the map, shape (pixels, 3)."""
+    from PIL import Image
+
+    x, y = place(page, i, j)
+    size = model(page, "map figure", "[m.inner_width, m.inner_height]")
+    width, height = 0.7 * size[0] / columns, 0.7 * size[1] / rows
+    clip = {"x": x - width / 2, "y": y - height / 2, "width": width, "height": height}
+    picture = Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB")
+    return np.asarray(picture).reshape(-1, 3)
+
+
+def colour_in_palette(page: Page, count: int) -> list[int]:
+    """The colour that the bar has for a count."""
+    text = model(page, "map figure", f"m.renderers[0].glyph.color_mapper.palette[{count} - Math.ceil("
+                 "m.renderers[0].glyph.color_mapper.low)]")  # fmt: skip
+    return [int(text[k : k + 2], 16) for k in (1, 3, 5)]
+
+
+def select(page: Page, name: str, words: str) -> None:
+    control(page, name, "select").select_option(label=words)
+
+
+def control(page: Page, name: str, kind: str) -> Locator:
+    """The element of this kind in the widget of this name."""
+    marker = f"sweep-{re.sub('[^a-z0-9]', '-', name.lower())}"
+    page.evaluate(
+        f"""(() => {{
+            const m = {found(name)}
+            Bokeh.index.find_one(m).el.classList.add('{marker}')
+        }})()"""
+    )
+    return page.locator(f".{marker} {kind}").first
+
+
+# ---- opening and reading
+
+
+def test_the_map_shows_the_dataset(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    page = visit("n0=0.05")
+    assert page.title() == opened.attrs["title"]
+    image = model(page, "map figure", "[...m.renderers[0].data_source.data.image[0]]")
+    counts = opened["reversals"].isel(n0=N0).transpose("b", "mu").values
+    assert image == counts.ravel().tolist()
+    settled = [(i, j) for i, j in np.ndindex(5, 4) if opened["status"].values[i, j, N0] == 1 and (i, j) != (3, 0)]
+    for i, j in settled:
+        colours = np.unique(pixels(page, i, j), axis=0)
+        assert colours.tolist() == [colour_in_palette(page, int(counts[j, i]))], (i, j)
+
+
+def test_cells_of_other_kinds_have_patterns(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    page = visit("n0=0.05")
+    failed, settled, bound, noisy = (pixels(page, i, 0) for i in range(4))
+    under = colour_in_palette(page, int(opened["reversals"][2, 0, N0]))
+    assert len(np.unique(settled, axis=0)) == 1
+    # Lines over the colour of the count, and no such colour where there is no count.
+    for pattern in (bound, noisy):
+        share = (pattern == under).all(axis=1).mean()
+        assert 0.6 < share < 0.95
+    assert not (failed == colour_in_palette(page, int(opened["reversals"][0, 0, N0]))).all(axis=1).any()
+    legend = text(page, "legend")
+    for words in ("lower bound", "failed: 1 lifted off the table", "limited by round-off"):
+        assert words in legend
+
+
+def test_patterns_follow_the_view(visit: Callable[..., Page]) -> None:
+    """Lines keep their distance in pixels when the map is enlarged."""
+    page = visit("n0=0.05")
+    before = pixels(page, 2, 0)
+    page.evaluate(f"{MAP}.x_range.setv({{start: 55, end: 65}}); {MAP}.y_range.setv({{start: 1.5, end: 2.5}})")
+    page.wait_for_timeout(300)
+    assert model(page, "map figure", "(({x, dw}) => [x[0], dw[0]])(m.renderers[2].data_source.data)") == [55, 10]
+    after = pixels(page, 2, 1.5, 1, 1)
+    lines = [1 - max(np.unique(part, axis=0, return_counts=True)[1]) / len(part) for part in (before, after)]
+    assert lines[0] == pytest.approx(lines[1], abs=0.06)
+
+
+def test_the_pointer_tells_all_of_a_cell(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    page = visit("n0=0.05")
+    page.mouse.move(*place(page, 2, 1))
+    page.mouse.move(*place(page, 2, 0))
+    tip = page.locator(".bk-tooltip-content").first
+    page.locator("#cell").get_by_text("μ = 60, b = 2, n₀ = 0.05").wait_for()
+    told = text(page, "cell")
+    cell = opened.isel(mu=2, b=0, n0=N0)
+    assert "lower bound" in told
+    for name in ("spin_final", "t_stop", "n_c1_plus_linear", "form_factor", "energy_error"):
+        assert f"{cell[name].item():.6g}" in told
+    assert "ended at the time limit" in told
+    near = tip.text_content() or ""
+    assert re.search(rf"simulated\s*{int(cell['reversals'])}predicted", near), near
+    assert re.search(rf"predicted\s*{int(cell['reversals_predicted'])}end", near), near
+    assert re.search(r"end\s*ended at the time limit", near), near
+
+
+def test_axes_variable_and_selection_change(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    page = visit()
+    assert "x=mu&y=b&show=reversals&n0=0.02" in page.url
+    select(page, "y", "start spin n₀")
+    page.wait_for_url(re.compile("x=mu&y=n0"))
+    settle(page)
+    assert model(page, "map figure", "m.left[0].axis_label") == "start spin n₀ (√(g/c))"
+    page.get_by_role("button", name="3", exact=True).click()
+    page.wait_for_url(re.compile("b=3"))
+    page.get_by_role("button", name="difference").click()
+    page.wait_for_url(re.compile("show=difference"))
+    settle(page)
+    difference = (opened["reversals"] - opened["reversals_predicted"]).isel(b=1).transpose("n0", "mu").values
+    assert model(page, "map figure", "[...m.renderers[0].data_source.data.image[0]]") == difference.ravel().tolist()
+    for i, j in [(0, 0), (1, 1), (4, 0)]:
+        if opened["status"].values[i, 1, j] == 1:
+            colours = np.unique(pixels(page, i, j, rows=2), axis=0)
+            assert colour_in_palette(page, int(difference[j, i])) in colours.tolist(), (i, j)
+    mapper = model(page, "map figure", "(({low, high}) => [low, high])(m.renderers[0].glyph.color_mapper)")
+    assert mapper[0] == -mapper[1]
+    select(page, "show", "final spin n")
+    page.wait_for_url(re.compile("show=spin_final"))
+    select(page, "x", "start spin n₀")
+    page.wait_for_url(re.compile("x=n0&y=mu"))
+
+
+# ---- trajectories
+
+
+def test_a_click_runs_the_cell(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    page = visit("n0=0.05")
+    page.mouse.click(*place(page, 3, 2))
+    wait_for_curves(page, 1)
+    cell = opened.isel(mu=3, b=2, n0=N0)
+    assert curves(page) == [f"1: μ = 70, b = 4, n₀ = 0.05, {int(cell['reversals'])} reversals"]
+    time, spin = model(page, "spin", "['x', 'y'].map((k) => [...m.renderers[0].data_source.data[k]])")
+    assert time[-1] == pytest.approx(float(cell["t_stop"]), rel=1e-6)
+    assert spin[0] == pytest.approx(0.05)
+    assert spin[-1] == pytest.approx(float(cell["spin_final"]), rel=1e-6)
+    energy, lost = model(page, "energies", "m.renderers.slice(0, 2).map((r) => [...r.data_source.data.y])")
+    np.testing.assert_allclose(np.array(energy)[[0, -1]] + np.array(lost)[[0, -1]], energy[0], rtol=1e-5)
+    assert page.url.endswith("cell=b:4,mu:70,n0:0.05")
+
+
+def test_cells_are_overlaid_and_removed(visit: Callable[..., Page]) -> None:
+    page = visit("n0=0.05")
+    page.mouse.click(*place(page, 1, 1))
+    wait_for_curves(page, 1)
+    page.keyboard.down("Shift")
+    page.mouse.click(*place(page, 3, 2))
+    page.keyboard.up("Shift")
+    wait_for_curves(page, 2)
+    assert page.url.count("cell=") == 2
+    control(page, "remove 1", "button").click()
+    wait_for_curves(page, 1)
+    assert curves(page)[0].startswith("1: μ = 70")
+    page.mouse.click(*place(page, 2, 2))
+    wait(page, "curve legend", "/μ = 60/.test(m.items[0].label.value)")
+    assert page.url.count("cell=") == 1
+
+
+def test_parameters_leave_the_grid(visit: Callable[..., Page]) -> None:
+    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
+    wait_for_curves(page, 1)
+    field = control(page, "parameter mu", "input")
+    field.fill("63.5")
+    field.press("Enter")
+    page.wait_for_url(re.compile("mu:63.5"))
+    wait(page, "curve legend", "/μ = 63.5.*reversals/.test(m.items[0].label.value)")
+    curve = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=63.5, b=4, n0=0.05)
+    spin = model(page, "spin", "[...m.renderers[0].data_source.data.y]")
+    assert spin[100] == pytest.approx(float(curve["spin"][0, 100]), abs=0.02)
+    handle = control(page, "drag b", "[role=slider]")
+    handle.focus()
+    before = page.url
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function(f"location.href !== {before!r}")
+    wait_for_curves(page, 1)
+    field.fill("-5")
+    field.press("Enter")
+    page.get_by_text("allowed: a finite number >= 0").wait_for()
+    assert "mu:63.5" in page.url
+
+
+def test_the_trajectory_is_played(visit: Callable[..., Page]) -> None:
+    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
+    wait_for_curves(page, 1)
+    control(page, "play", "button").click()
+    wait(page, "time", "m.value > 0.02 * m.end")
+    control(page, "play", "button").click()
+    moment = model(page, "time", "m.value")
+    page.wait_for_timeout(300)
+    assert model(page, "time", "m.value") == moment
+    assert model(page, "spin", "m.center.filter((c) => c.type === 'Span' && c.dimension === 'height')[0].location") == (
+        moment
+    )
+    trail = model(
+        page, "contact path", "[m.renderers[1].data_source.data.x.length, m.renderers[0].data_source.data.x.length]"
+    )
+    assert 20 < trail[0] < trail[1]
+
+
+def test_a_link_reopens_the_page(visit: Callable[..., Page]) -> None:
+    page = visit("n0=0.05")
+    select(page, "show", "final spin n")
+    page.wait_for_url(re.compile("show=spin_final"))
+    settle(page)
+    page.mouse.click(*place(page, 3, 2))
+    wait_for_curves(page, 1)
+    page.get_by_role("button", name="Copy link").click()
+    page.get_by_role("button", name="Copied").wait_for()
+    link = page.evaluate("navigator.clipboard.readText()")
+    assert link == page.url
+    said = curves(page)
+    image = model(page, "map figure", "[...m.renderers[0].data_source.data.image[0]]")
+    other = visit(link.partition("?")[2])
+    wait_for_curves(other, 1)
+    assert curves(other) == said
+    assert model(other, "map figure", "[...m.renderers[0].data_source.data.image[0]]") == image
+    assert other.url == link
+
+
+def test_a_wrong_link_is_told_and_harmless(visit: Callable[..., Page]) -> None:
+    page = visit("show=<img src=x onerror=alert(1)>&n0=9&cell=mu:-3&file=/etc/passwd")
+    said = text(page, "notice")
+    for words in ("<img src=x onerror=alert(1)>: no variable", "n0=9: not on the axis", "cell=mu:-3", "file: unknown"):
+        assert words in said
+    assert page.locator("#notice img").count() == 0
+    assert "show=reversals" in page.url
+
+
+# ---- the keyboard, and narrow windows
+
+
+def test_everything_can_be_done_with_the_keyboard(visit: Callable[..., Page]) -> None:
+    page = visit("n0=0.05")
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "map":
+            break
+    else:
+        pytest.fail("the map cannot be reached with the Tab key")
+    assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    for key in ("ArrowRight", "ArrowRight", "ArrowRight", "ArrowUp", "ArrowRight", "ArrowLeft"):
+        page.keyboard.press(key)
+    page.locator("#cell").get_by_text("μ = 60, b = 3, n₀ = 0.05").wait_for()
+    page.keyboard.press("Enter")
+    wait_for_curves(page, 1)
+    assert curves(page)[0].startswith("1: μ = 60, b = 3, n₀ = 0.05")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Shift+Enter")
+    wait_for_curves(page, 2)
+
+
+@pytest.mark.parametrize("width", [1400, 900, 400])
+def test_nothing_runs_out_of_the_window(width: int, visit: Callable[..., Page]) -> None:
+    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
+    wait_for_curves(page, 1)
+    page.set_viewport_size({"width": width, "height": 800})
+    page.wait_for_function(f"{MAP}.outer_width <= {width}")
+    page.wait_for_timeout(300)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for name in ("map figure", "spin", "energies", "contact path"):
+        assert 200 < model(page, name, "m.outer_width") <= width
+    # The patterns are painted for the new size.
+    shape = model(page, "map figure", "m.renderers[2].data_source.data.image[0].shape")
+    assert abs(shape[1] - model(page, "map figure", "m.inner_width")) <= 1
+
+
+# ---- files
+
+
+def saved(page: Page, button: str) -> Download:
+    with page.expect_download() as download:
+        page.get_by_role("button", name=button, exact=True).click()
+    return download.value
+
+
+def test_what_is_seen_is_saved(visit: Callable[..., Page], opened: xr.Dataset, tmp_path: Path) -> None:
+    from PIL import Image
+
+    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
+    wait_for_curves(page, 1)
+    assert saved(page, "netCDF").suggested_filename == "tiny_explored.nc"
+    saved(page, "netCDF").save_as(tmp_path / "a.nc")
+    with xr.open_dataset(tmp_path / "a.nc", decode_times=False) as part:
+        xr.testing.assert_equal(part.load(), opened.isel(n0=N0))
+    with xr.open_dataset(tmp_path / "a.nc", group="trajectory_1", decode_times=False) as dense:
+        assert dense["spin"].values[0] == pytest.approx(0.05)
+    saved(page, "YAML").save_as(tmp_path / "a.yaml")
+    config = sweep.load_config(tmp_path / "a.yaml")
+    assert config.parameters["n0"].numbers == (0.05,)
+    saved(page, "PNG").save_as(tmp_path / "a.png")
+    picture = np.asarray(Image.open(tmp_path / "a.png").convert("RGB"))
+    assert picture.shape[0] > 1000
+    colours = np.unique(picture.reshape(-1, 3), axis=0).tolist()
+    shown = opened["reversals"].isel(n0=N0).values[1, 0]
+    for colour in (colour_in_palette(page, int(shown)), [0, 0x72, 0xB2]):
+        assert colour in colours
+
+
+def test_a_map_is_one_file_that_needs_no_network(browser: Browser, opened: xr.Dataset, tmp_path: Path) -> None:
+    from sweep.explore.page import save_html
+
+    save_html(opened, tmp_path / "map.html", "reversals", at={"n0": 0.05})
+    context = browser.new_context(offline=True, viewport={"width": 1000, "height": 800})
+    context.set_offline(True)
+    page = context.new_page()
+    asked = list[str]()
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((tmp_path / "map.html").as_uri())
+    settle(page)
+    page.mouse.move(*place(page, 2, 1))
+    page.mouse.move(*place(page, 2, 0))
+    tip = page.locator(".bk-tooltip-content").first
+    tip.wait_for()
+    cell = opened.isel(mu=2, b=0, n0=N0)
+    near = tip.text_content() or ""
+    assert f"{float(cell['spin_final']):.6g}"[:7] in near
+    assert "ended at the time limit" in near
+    assert "lower bound" in text(page, "legend")
+    assert len(np.unique(pixels(page, 2, 0), axis=0)) > 1
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    context.close()
+
+
+# ---- who may come in
+
+
+@pytest.mark.parametrize(
+    ("origin", "status"), [("localhost", 101), ("evil.example", 403), ("localhost.evil.example", 403)]
+)
+def test_other_origins_are_refused(origin: str, status: int, served: str) -> None:
+    port = int(served.rsplit(":", 1)[1].strip("/"))
+    page = ask(port, f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\nConnection: close\r\n\r\n")
+    found = re.search(r'"token":"([^"]+)"', page)
+    assert found
+    answer = ask(port, (
+        f"GET /ws HTTP/1.1\r\nHost: localhost:{port}\r\nOrigin: http://{origin}:{port}\r\nUpgrade: websocket\r\n"
+        f"Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+        f"Sec-WebSocket-Protocol: bokeh, {found[1]}\r\n\r\n"
+    ), first=True)  # fmt: skip
+    assert int(answer.split()[1]) == status
+
+
+def ask(port: int, request: str, *, first: bool = False, host: str = "127.0.0.1") -> str:
+    """The answer to a request, or its first packet."""
+    with socket.create_connection((host, port), timeout=20) as connection:
+        connection.sendall(request.encode())
+        parts = [connection.recv(65536)]
+        while not first and parts[-1]:
+            parts.append(connection.recv(65536))
+    return b"".join(parts).decode(errors="replace")
+
+
+def test_only_this_machine_is_served(served: str) -> None:
+    port = int(served.rsplit(":", 1)[1].strip("/"))
+    tables = [path.read_text(encoding="ascii") for path in Path("/proc/net").glob("tcp*")]
+    listening = [line.split()[1] for table in tables for line in table.splitlines() if line.split()[3] == "0A"]
+    assert [at for at in listening if int(at.rsplit(":", 1)[1], 16) == port] == [f"0100007F:{port:04X}"]
+
+
+def test_a_port_in_use_is_one_line(tiny: Path, served: str) -> None:
+    port = served.rsplit(":", 1)[1].strip("/")
+    with explorer(tiny, "--port", port) as process:
+        said, complaints = process.communicate(timeout=60)
+    assert (process.returncode, said) == (2, "")
+    assert complaints == f"port {port}: Address already in use\n"

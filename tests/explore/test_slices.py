@@ -1,0 +1,93 @@
+"""Slices of a dataset: the same numbers as xarray's own selection, whatever the axes, and what is told of a cell."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sweep.explore import slices
+from sweep.explore.slices import Axis, Source, open_source
+from sweep.plots import marks
+from sweep.results.store import StoreError
+
+
+@pytest.mark.parametrize(("x", "y"), list(permutations(("mu", "b", "n0"), 2)))
+@pytest.mark.parametrize("name", ["reversals", "difference", "spin_final", "n_c1_plus", "status"])
+def test_a_slice_is_the_selection(name: str, x: str, y: str, tiny: Path, opened: xr.Dataset) -> None:
+    (rest,) = {"mu", "b", "n0"} - {x, y}
+    whole = opened["reversals"] - opened["reversals_predicted"] if name == "difference" else opened[name]
+    expected = whole.broadcast_like(opened["status"]).isel({rest: 1}).transpose(y, x).values
+    part = open_source(tiny).slice(name, x, y, {rest: 1})
+    np.testing.assert_array_equal(part.values, expected)
+
+
+def test_kinds_are_those_of_the_figures(tiny: Path, opened: xr.Dataset) -> None:
+    part = open_source(tiny).slice("reversals", "mu", "b", {"n0": 1})
+    for k, (kind, where) in enumerate(marks.marks(opened.isel(n0=1), "reversals").items()):
+        np.testing.assert_array_equal(part.kinds >> k & 1, where.transpose("b", "mu").values, kind)
+    assert part.kinds[0, 0]
+    assert len(part.shown) == 19
+
+
+def test_descending_axes_are_turned(opened: xr.Dataset) -> None:
+    turned = Source(opened.isel(mu=slice(None, None, -1)))
+    straight = Source(opened)
+    for each in (turned, straight):
+        assert (np.diff(each.axes["mu"].values) > 0).all()
+    index = {"mu": 1, "b": 2, "n0": 0}
+    assert turned.describe(index) == straight.describe(index)
+
+
+SPACINGS = {
+    "linear": ([1, 2, 3], [0.5, 1.5, 2.5, 3.5]),
+    "log": ([1, 100, 10000], [0.1, 10, 1000, 100000]),
+    "list": ([1, 2, 10], [-0.5, 0.5, 1.5, 2.5]),
+}
+
+
+@pytest.mark.parametrize(("spacing", "values", "edges"), [(k, *v) for k, v in SPACINGS.items()], ids=SPACINGS)
+def test_cells_end_half_way_between_values(spacing: str, values: list[float], edges: list[float]) -> None:
+    axis = Axis("mu", np.array(values, float))
+    assert axis.spacing == spacing
+    np.testing.assert_allclose(axis.edges, edges)
+    assert [axis.place(v) for v in values] == list(axis.places)
+
+
+def test_a_cell_is_told_in_words(tiny: Path, opened: xr.Dataset) -> None:
+    source = open_source(tiny)
+    told = [source.describe({"mu": k, "b": 0, "n0": 1}) for k in range(4)]
+    ends = [each["how the trajectory ended"] for each in told]
+    assert ends == ["lifted off the table", "settled", "ended at the time limit", "settled"]
+    assert "note" not in told[1]
+    assert "lower bound" in told[2]["note"]
+    assert "round-off" in told[3]["note"]
+    cell = opened.isel(mu=1, b=0, n0=1)
+    assert told[1]["spin reversals, simulated"] == str(int(cell["reversals"]))
+    assert told[1]["time of the end"] == f"{float(cell['t_stop']):.6g} √(c/g)"
+    assert len(told[1]) == len([n for n, v in opened.data_vars.items() if v.dims]) + 1
+
+
+def test_a_large_dataset_is_read_slice_by_slice(tiny: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(slices, "IN_MEMORY", 10)
+    source = open_source(tiny)
+    assert not source.dataset["reversals"].variable._in_memory
+    part = source.slice("reversals", "mu", "b", {"n0": 1})
+    np.testing.assert_array_equal(part.values, open_source(tiny).slice("reversals", "mu", "b", {"n0": 1}).values)
+    assert not source.dataset["reversals"].variable._in_memory
+
+
+def test_one_axis_is_a_row(opened: xr.Dataset) -> None:
+    source = Source(opened.isel(b=0, n0=0))
+    part = source.slice("reversals", "mu", "", {})
+    np.testing.assert_array_equal(part.values, opened["reversals"].isel(b=0, n0=0).values[None])
+
+
+@pytest.mark.parametrize("dims", [(), ("trajectory", "sample")])
+def test_what_has_no_map_is_refused(dims: tuple[str, ...]) -> None:
+    dataset = xr.Dataset({"status": (dims, np.zeros([2] * len(dims), "int8"))})
+    with pytest.raises(StoreError, match="allowed: a dataset of run"):
+        Source(dataset, "x.nc")

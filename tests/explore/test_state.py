@@ -1,0 +1,90 @@
+"""The address of the explorer: what is written there opens the same page, and nothing else gets through."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from urllib.parse import parse_qs
+
+import pytest
+
+from sweep.explore import state
+from sweep.explore.cells import Setup
+from sweep.explore.slices import Source, open_source
+from sweep.explore.state import State
+
+HOSTILE = {
+    "no variable": ("show=../../etc/passwd", "show"),
+    "markup for a variable": ("show=<script>alert(1)</script>", "show"),
+    "no axis": ("x=delta", "x"),
+    "an unknown key": ("file=/etc/passwd", "file"),
+    "not a number": ("n0=nan", "n0"),
+    "infinite": ("n0=1e999", "n0"),
+    "off the axis": ("n0=7", "n0"),
+    "a very long number": ("n0=" + "1" * 5000, "n0"),
+    "a cell with an unknown parameter": ("cell=__class__:1", "cell"),
+    "a cell out of bounds": ("cell=mu:-1", "cell"),
+    "a cell with words for numbers": ("cell=mu:sixty", "cell"),
+    "a cell that is not finite": ("cell=mu:inf", "cell"),
+    "an empty cell": ("cell=:", "cell"),
+}
+
+
+@pytest.fixture(scope="module")
+def source(tiny: Path) -> Source:
+    return open_source(tiny)
+
+
+@pytest.fixture(scope="module")
+def base(source: Source) -> state.Cell:
+    return Setup(source).base
+
+
+def read(query: str, source: Source, base: state.Cell) -> tuple[State, list[str]]:
+    return state.read(parse_qs(query, keep_blank_values=True), source, base)
+
+
+def test_the_longest_axes_are_shown_first(source: Source) -> None:
+    shown = state.first(source)
+    assert (shown.x, shown.y, shown.show) == ("mu", "b", "reversals")
+
+
+def test_what_is_written_is_read_again(source: Source, base: state.Cell) -> None:
+    cells = ({**base, "mu": 47.123456789, "b": 3.0}, {**base, "delta": -0.25})
+    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, cells)
+    again, faults = read(state.write(shown, source, base), source, base)
+    assert not faults
+    assert again == shown
+
+
+def test_a_cell_in_the_address_names_no_more_than_it_has_to(source: Source, base: state.Cell) -> None:
+    shown = State("mu", "b", "reversals", {"n0": 1}, ({**base, "mu": 47.0},))
+    assert state.write(shown, source, base).endswith("cell=b:2,mu:47,n0:0.02")
+
+
+@pytest.mark.parametrize(("query", "key"), HOSTILE.values(), ids=HOSTILE)
+def test_nothing_else_gets_through(query: str, key: str, source: Source, base: state.Cell) -> None:
+    shown, faults = read(query, source, base)
+    assert shown == state.first(source)
+    assert len(faults) == 1
+    assert key in faults[0]
+    assert "allowed" in faults[0]
+    assert len(faults[0]) < 600
+
+
+def test_no_more_cells_than_colours(source: Source, base: state.Cell) -> None:
+    query = "&".join(f"cell=mu:{50 + k}" for k in range(state.MAX_CELLS + 3))
+    shown, faults = read(query, source, base)
+    assert len(shown.cells) == state.MAX_CELLS
+    assert "9 cells" in faults[0]
+
+
+def test_without_a_configuration_no_cell_is_taken(source: Source) -> None:
+    shown, faults = read("cell=mu:50", source, {})
+    assert not shown.cells
+    assert "no configuration" in faults[0]
+
+
+@pytest.mark.parametrize(("x", "y"), [("mu", "mu"), ("b", "b")])
+def test_an_axis_chosen_twice_changes_places(x: str, y: str, source: Source) -> None:
+    shown = state.first(source).with_axes(x, y)
+    assert (shown.x, shown.y) == ("b", "mu")
