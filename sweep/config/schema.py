@@ -355,7 +355,7 @@ class Config:
     def axes(self) -> dict[str, tuple[float, ...]]:
         return {name: v.numbers for name, v in self.parameters.items() if v.is_axis}
 
-    @cached_property
+    @property
     def tier(self) -> Tier:
         """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
         return tier_of(self.model, self.law, self.units, (*self.parameters, *(self.cases or ())))

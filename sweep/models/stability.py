@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from sweep.models.linear import growth_rate, jacobian
-from sweep.models.model import Array, Columns, Model, take
+from sweep.models.model import Array, Columns, Model, stack, take
 
 SPIN_LIMIT = 10.0
 """Largest |spin| examined, in sqrt(g/c), fifty times what a hand gives: upright spin that is stable up to here is
@@ -54,7 +54,8 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     -------
     Shape (6, cells), in sqrt(g/c): the lower and the upper end of each range, as `Kernel.images` takes them.
     Infinite where a range does not end within `SPIN_LIMIT`; NaN where there is no such range, and for all of a body
-    whose rattle does not decay at rest (no friction, or no dissipation in the model).
+    whose rattle does not decay at rest (no friction, or no dissipation in the model), or whose third axis is no axis of
+    inertia, so that it cannot spin upright.
 
     Raises
     ------
@@ -64,7 +65,8 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     constants, limits = model.constants.of(columns), SPIN_LIMIT * model.spin_unit(columns)
     rest = np.zeros_like(constants[0])
     ranges = np.full((6, len(rest)), np.nan)
-    cells = np.flatnonzero(growth_rate(model, constants, rest) < _DECAYS)
+    steady = _is_steady(model, constants, model.spin_unit(columns))
+    cells = np.flatnonzero((growth_rate(model, constants, rest) < _DECAYS) & steady)
     if len(cells):
         constants = take(constants, cells)
         changes = _possible_changes(*_polynomial(model, constants))
@@ -73,6 +75,13 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
             for row, end in zip(rows, ends, strict=True):
                 ranges[row, cells] = sign * end
     return ranges
+
+
+def _is_steady(model: Model, constants: Any, spin: Array) -> Array:
+    """Whether no rattle arises from upright `spin` by itself, shape (cells,)."""
+    slopes, _ = model.rhs(tuple(stack(model.upright(spin))), constants)
+    arising = np.abs(np.delete(stack(slopes), model.spin_state, axis=0)).max(axis=0)
+    return np.asarray(arising <= 1e-12 * spin**2)
 
 
 def _polynomial(model: Model, constants: Any) -> tuple[Array, Array, Array]:

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import STANDARD, columns, newton
 
-from sweep.models import find, linear, noslip, rocking, slip, solid, steady
+from sweep.models import find, linear, noslip, rocking, slip, solid, stability, steady
 from sweep.models.general import strongest_grip, variant
 from sweep.models.laws import LAWS, tanh_ratio
 from sweep.models.model import LINEAR, SETTLES, take
@@ -283,6 +283,15 @@ def test_what_variants_offer() -> None:
     assert find("noslip+solid").offers & {LINEAR, SETTLES} == {LINEAR}
     assert {LINEAR, SETTLES} <= find("noslip+solid+sigma").offers
     assert noslip.MODEL.offers & {LINEAR, SETTLES} == set()
+
+
+def test_a_body_that_cannot_spin_upright_has_no_critical_spins() -> None:
+    for model in (find("slip+viscous"), find("noslip+solid+sigma")):
+        straight, skew = (
+            stability.stable_ranges(model, cells(**body, mu=20, sigma=1e-4)) for body in (KANE_LEVINSON, SKEW)
+        )
+        assert np.isfinite(straight[:2]).all()
+        assert np.isnan(skew).all()
 
 
 def test_every_law_is_viscous_to_the_linear_theory() -> None:
