@@ -10,7 +10,7 @@ from sweep.grid import Array, Grid
 from sweep.kernels.stability import stable_ranges
 from sweep.models import analytic, stability
 from sweep.models.linear import fastest_spin
-from sweep.models.model import FORMULAS, LINEAR, SETTLES, Model, Tier
+from sweep.models.model import FORMULAS, LINEAR, Model, Tier
 from sweep.models.scene import PAPERS
 
 
@@ -32,9 +32,8 @@ class Stability:
     """n_c1+ and n_c1- of the linear theory, over the bodies: infinite where the rattle decays at every spin, NaN where
     it does not decay at rest.  NaN too for a model to which the linear theory does not apply."""
     ranges: Array
-    """Ranges of spin in which a trajectory may settle, because the rattle decays, shape (6, cells), as
-    `stability.stable_ranges` gives them: all those that the trajectory of the cell can reach.  NaN for a model whose
-    trajectories do not settle."""
+    """Ranges of spin in which the rattle decays, shape (6, cells), as `stability.stable_ranges` gives them: all those
+    that the trajectory of the cell can reach."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +57,7 @@ def predict(tier: Tier, grid: Grid) -> Prediction:
     if LINEAR not in tier.offers:
         nothing = np.full(grid.bodies()[0].size, np.nan)
         return replace(prediction, stability=Stability((nothing, nothing), np.full((6, grid.size), np.nan)))
-    stability = _stability(tier, grid)
-    if SETTLES not in tier.offers:
-        stability = replace(stability, ranges=np.full_like(stability.ranges, np.nan))
-    return replace(prediction, stability=stability)
+    return replace(prediction, stability=_stability(tier, grid))
 
 
 def _stability(model: Model, grid: Grid) -> Stability:

@@ -18,7 +18,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.coefficients import coefficients, normal_coordinates
-from sweep.models.model import COUNT, ENERGY, FORMULAS, LINEAR, SETTLES, SPIN, Array, Columns, Model
+from sweep.models.model import COUNT, ENERGY, FORMULAS, LINEAR, SPIN, Array, Columns, Model
 from sweep.models.rocking import slower_period
 
 
@@ -74,7 +74,7 @@ MODEL = Model(
     states=("A", "B", "n"),
     spin_state=2,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
-    offers=frozenset({COUNT, SPIN, ENERGY, FORMULAS, LINEAR, SETTLES}),
+    offers=frozenset({COUNT, SPIN, ENERGY, FORMULAS, LINEAR}),
     constants=Constants,
     start=start,
     slower_period=slower_period,

@@ -38,7 +38,7 @@ from sweep.jit import inline
 from sweep.models import noslip, slip, solid, starts, steady
 from sweep.models.couples import COUPLES, Couple, nothing
 from sweep.models.laws import LAWS, Law
-from sweep.models.model import COUNT, ENERGY, LINEAR, SETTLES, SPIN, Array, Columns, Model, Ripple, named
+from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.solid import contact, gyroscopic
 
 BASES = ("slip", "noslip")
@@ -152,15 +152,19 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
     def fastest_decay(columns: Columns) -> Array:
         return np.asarray(law.strongest(columns) * strongest_grip(columns) + _couples_decay(couples, columns))
 
-    linear = law.linear and all(couple.linear for couple in couples)
+    def more(columns: Columns) -> tuple[Array, ...]:
+        faint = () if law.linear_to is None else (_faint(law.linear_to(columns), columns),)
+        return (*(columns[each] for each in law.parameters), *values(columns), *faint)
+
+    fields = (*law.parameters, *names, *(() if law.linear_to is None else ("faint",)))
     return Model(
         name=name,
         summary=f"{slip.MODEL.summary}, for any body",
         states=slip.MODEL.states,
         spin_state=slip.MODEL.spin_state,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=_offers(couples, linear=linear),
-        constants=_record((*law.parameters, *names), lambda c: (*(c[each] for each in law.parameters), *values(c))),
+        offers=_offers(couples, dissipates=True),
+        constants=_record(fields, more),
         start=starts.slipping,
         slower_period=solid.slower_period,
         fastest_decay=fastest_decay,
@@ -171,7 +175,8 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         tilt=slip.MODEL.tilt,
         observe=observe,
         spin_unit=solid.spin_unit,
-        extremes=(lambda columns: (columns,)) if law.linear else _with_and_without(law),
+        faint="" if law.linear_to is None else "faint",
+        extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
     )
 
 
@@ -227,7 +232,7 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         states=noslip.MODEL.states,
         spin_state=noslip.MODEL.spin_state,
         parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=_offers(couples, linear=bool(couples) and all(couple.linear for couple in couples)),
+        offers=_offers(couples, dissipates=bool(couples)),
         constants=_record(names, values),
         start=starts.rolling,
         slower_period=solid.slower_period,
@@ -243,10 +248,25 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
     )
 
 
-def _offers(couples: Sequence[Couple], *, linear: bool) -> frozenset[str]:
+def _offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
     """A couple that is not linear has no Jacobian that is quadratic in the spin, which the linear theory needs."""
-    theory = {LINEAR} if all(couple.linear for couple in couples) else set()
-    return frozenset({COUNT, SPIN, ENERGY} | theory | ({SETTLES} if linear else set()))
+    theory = {LINEAR} if dissipates and all(couple.linear for couple in couples) else set()
+    return frozenset({COUNT, SPIN, ENERGY} | theory)
+
+
+def _faint(speed: Array, columns: Columns) -> Array:
+    """Energy of a rattle whose slip velocity is below `speed`, per unit mass, shape (cells,).
+
+    With ω = n u + o the slip v_p = v_g - x_p × o - n x_p × u is at most sqrt(2 E G) + |n| ρ.  G is the largest
+    eigenvalue of 1 - [x_p] J⁻¹ [x_p], and ρ <= (a²/c) sqrt(2 E / (g k)) the distance of the contact point from the
+    vertical through G, with the stiffness k.  Spins up to sqrt(g/c) are allowed for.
+    """
+    c, g = columns["c"], solid.gravity(columns)
+    inverse = np.linalg.eigvalsh(solid.matrix(solid.inverse(solid.inertia(columns))))[:, -1]
+    grip = 1 + (c - solid.offset(columns)) ** 2 * inverse
+    arm = np.maximum(columns["a"], columns["b"]) ** 2 / c
+    per_root = np.sqrt(2 * grip) + np.sqrt(g / c) * arm * np.sqrt(2 / (g * np.minimum(*solid.stiffness(columns))))
+    return np.asarray((speed / per_root) ** 2)
 
 
 def _seen(rhs: Any, y: Array, p: Any) -> dict[str, Array]:

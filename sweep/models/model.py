@@ -36,11 +36,11 @@ Columns = Mapping[str, Array]
 
 
 COUNT, SPIN, ENERGY, MODES, FORMULAS = "count", "spin", "energy", "modes", "formulas"
-LINEAR, SETTLES = "linear", "settles"
+LINEAR = "linear"
 """What a model may offer: a number of reversals; the spin as a function of time; an energy that only friction changes;
 two rocking modes that the linear theory of the slip model describes; Takano's formulas for the critical spins and the
-number of reversals; spins between which a tiny rattle decays, by the eigenvalues of its Jacobian; and that its
-trajectories settle at such spins, because friction resists a large rattle as it does a tiny one."""
+number of reversals; and the spins between which a tiny rattle decays, by the eigenvalues of its Jacobian, at which
+trajectories may settle."""
 
 
 @inline
@@ -134,6 +134,9 @@ class Model(Tier):
     spin_unit: Callable[[Columns], Array] = lambda columns: np.ones_like(columns["a"])
     """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
     largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""
+    faint: str = ""
+    """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
+    rattle below it may settle."""
     extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
     """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005

@@ -12,7 +12,7 @@ from support import STANDARD, columns, newton
 from sweep.models import find, linear, noslip, rocking, slip, solid, stability, steady
 from sweep.models.general import strongest_grip, variant
 from sweep.models.laws import LAWS, tanh_ratio
-from sweep.models.model import LINEAR, SETTLES, take
+from sweep.models.model import LINEAR, take
 
 BODY = {"a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 0.7, "gravity": 9.81}
 KANE_LEVINSON = BODY | {"mass": 1.0, "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5}
@@ -276,13 +276,28 @@ def test_narrower_regularisations_meet_dry_friction() -> None:
         assert off[1] < (1e-12 if power == np.inf else 1.1 * 10**-power * off[0])
 
 
-def test_what_variants_offer() -> None:
-    assert {LINEAR, SETTLES} <= find("slip+viscous+sigma").offers
-    assert find("slip+coulomb-tanh").offers & {LINEAR, SETTLES} == {LINEAR}
-    assert not find("slip+viscous+rolling").offers & {LINEAR, SETTLES}
-    assert find("noslip+solid").offers & {LINEAR, SETTLES} == {LINEAR}
-    assert {LINEAR, SETTLES} <= find("noslip+solid+sigma").offers
-    assert noslip.MODEL.offers & {LINEAR, SETTLES} == set()
+def test_to_which_variants_the_linear_theory_applies() -> None:
+    for name in ("slip+viscous+sigma", "slip+coulomb-tanh", "noslip+solid+sigma"):
+        assert LINEAR in find(name).offers
+    for name in ("slip+viscous+rolling", "noslip+solid"):
+        assert LINEAR not in find(name).offers
+    assert LINEAR not in noslip.MODEL.offers
+
+
+def test_a_faint_rattle_slips_slowly() -> None:
+    """Of all rattles of that energy none slips faster than the speed up to which the law counts as linear."""
+    body = KANE_LEVINSON | {"mu": 0.5, "speed": 0.01}
+    model, constants = one("slip+coulomb-sqrt", body)
+    random, fastest = np.random.default_rng(5), 0.0
+    for _ in range(3000):
+        y = random.normal(size=7) * [1e-4, 1e-4, 1e-2, 1e-2, 0, 1e-3, 1e-3]
+        u = np.array([y[0], y[1], -1.0])
+        spin = random.uniform(-20, 20)
+        y[4] = (spin - y[:2] @ (y[2:4] + spin * y[:2])) / -1.0
+        y[2:4] += spin * u[:2]
+        rattle = model.energy(tuple(y), constants)[1]
+        fastest = max(fastest, np.hypot(y[5], y[6]) * np.sqrt(constants.faint / rattle))
+    assert 0.03 * 0.1 * body["speed"] < fastest <= 0.1 * body["speed"]
 
 
 def test_a_body_that_cannot_spin_upright_has_no_critical_spins() -> None:
