@@ -362,5 +362,8 @@ def strongest_grip(columns: Columns) -> Array:
         x_p[:, 2] -= below
         X = np.cross(np.eye(3), x_p[:, None, :])
         G = X @ inverse @ np.swapaxes(X, 1, 2)
-        worst = np.maximum(worst, R * (1 + np.linalg.eigvalsh(G)[:, -1]))
+        # One eigenvalue is zero, along x_p; the larger of the others follows from the traces of G and G².
+        trace, squares = np.trace(G, axis1=1, axis2=2), (G * G).sum(axis=(1, 2))
+        largest = 0.5 * (trace + np.sqrt(np.maximum(2 * squares - trace**2, 0)))
+        worst = np.maximum(worst, R * (1 + largest))
     return worst
