@@ -176,7 +176,8 @@ class View:
             return
         cell = {**self.state.cells[self._active], name: value}
         if fault := states.wrong_value(name, value):
-            self._say([fault])
+            self._faults = [fault]
+            self._draw_progress()
             return
         cells = list(self.state.cells)
         cells[self._active] = cell
@@ -201,6 +202,7 @@ class View:
 
     def _submit(self, key: int, cell: Cell) -> None:
         if self._setup:
+            self._faults = []
             self._running[key] = News()
             self._runner.submit((id(self), key), self._setup, cell, partial(self._tell, key))
 
@@ -214,7 +216,7 @@ class View:
         self._running[key] = news
         if news.curve or news.fault:
             del self._running[key]
-            self._faults = [news.fault] if news.fault else []
+            self._faults = [news.fault] if news.fault else self._faults
         if news.curve:
             self._curves[self._keys.index(key)] = news.curve
             self._draw_curves()
