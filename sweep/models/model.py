@@ -6,7 +6,8 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 
 1. Choose the states, in such a way that all but one vanish in upright spin; the remaining one carries the spin
    (`states`, `spin_state`).  A rattle then keeps its relative precision however small it becomes.
-2. Compute the coefficients and the starts of many cells at once, from arrays of parameters (`constants`, `start`).
+2. Compute the coefficients, the starts and the period of the slower rocking of many cells at once, from arrays of
+   parameters (`constants`, `start`, `slower_period`).
 3. Write `rhs`, `energy` and `upright` for one trajectory, on scalars.
 4. Say what the model depends on and what can be asked of it (`parameters`, `offers`).
 5. If friction or anything else makes the model stiff, bound its fastest decay (`fastest_decay`).
@@ -15,7 +16,8 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 again at every look.  The linear theory of `sweep.models.linear` calls `upright` and `rhs`, the latter with complex
 states.
 
-Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.
+Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.  Equations that hold in any units say what
+sqrt(g/c) is in theirs (`spin_unit`).
 """
 
 from __future__ import annotations
