@@ -171,7 +171,7 @@ def trajectory(
         from sweep.studies.trajectory import trajectory as follow
 
         interrupt.raise_again()
-        with Terminal(quiet, "sqrt(c/g)") as terminal, _of_option("--at"):
+        with Terminal(quiet, "s" if checked.units == "SI" else "sqrt(c/g)") as terminal, _of_option("--at"):
             result = follow(checked, reporter=terminal, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
         files.save_result(result, plots.draw(result))

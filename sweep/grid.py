@@ -11,7 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.parameters import START
+from sweep.models.starts import point
+from sweep.parameters import PARAMETERS, START
 
 Array = NDArray[Any]
 
@@ -129,7 +130,9 @@ class Grid:
 _TILE = 1 << 18
 """Cells examined at a time, when all cells are."""
 
-BODY = ("a", "b", "c", "delta")
+BODY = tuple(p.name for p in PARAMETERS.values() if p.section in ("body", ""))
+"""Names of the parameters of the body, gravity among them."""
+
 _PLACE = (*BODY, "x0", "y0")
 
 
@@ -147,12 +150,11 @@ def distinct(grid: Grid, names: tuple[str, ...]) -> Iterator[dict[str, Array]]:
 def _off_the_body(p: Mapping[str, Array]) -> str:
     if "x0" not in p:
         return ""
-    cos, sin = np.cos(p["delta"]), np.sin(p["delta"])
     with np.errstate(over="ignore"):  # infinity lies off the body as well
-        x, y = p["x0"] * cos - p["y0"] * sin, p["x0"] * sin + p["y0"] * cos
+        x, y = point(p)
         outside = np.flatnonzero((x / p["a"]) ** 2 + (y / p["b"]) ** 2 >= 1)
     if not len(outside):
         return ""
     i = outside[0]
-    at = ", ".join(f"{name}={p[name][i]:g}" for name in ("x0", "y0", "a", "b", "delta"))
+    at = ", ".join(f"{name}={p[name][i]:g}" for name in ("x0", "y0", "a", "b", "delta") if name in p)
     return f"start point off the ellipsoid at {at}; allowed: (x/a)² + (y/b)² < 1 in the body's axes"

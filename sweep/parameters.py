@@ -15,9 +15,11 @@ class Parameter:
 
     name: str
     section: str
-    """Section of the configuration in which it stands."""
+    """Section of the configuration in which it stands; "" for the top."""
     units: str
+    """CF unit in the paper's units."""
     long_name: str
+    """Meaning, with the paper's unit as its last words where the number is no pure one (`sweep.variables.in_si`)."""
     default: float | None
     """Value of the paper's standard case; None if the configuration has to give one."""
     above: float = -inf
@@ -28,8 +30,13 @@ class Parameter:
     """Inclusive lower bound."""
 
     @property
+    def place(self) -> tuple[str, ...]:
+        """Keys from the top of a configuration."""
+        return (self.section, self.name) if self.section else (self.name,)
+
+    @property
     def path(self) -> str:
-        return f"{self.section}.{self.name}"
+        return ".".join(self.place)
 
     def allows(self, value: float) -> bool:
         return self.above < value < self.below and value >= self.at_least
@@ -48,21 +55,79 @@ class Parameter:
 PARAMETERS: dict[str, Parameter] = {
     p.name: p
     for p in (
-        Parameter("a", "body", "1", "semi-axis of the ellipsoid along x (long axis), in c", 10.0, above=0, below=1e6),
-        Parameter("b", "body", "1", "semi-axis of the ellipsoid along y (short axis), in c", 3.0, above=0, below=1e6),
-        Parameter("c", "body", "1", "semi-axis of the ellipsoid along z, the unit of length", 1.0, above=0, below=1e6),
+        Parameter(
+            "a", "body", "1", "semi-axis of the ellipsoid along x (long axis), in c", 10.0, above=0, below=1e6
+        ),
+        Parameter(
+            "b", "body", "1", "semi-axis of the ellipsoid along y (short axis), in c", 3.0, above=0, below=1e6
+        ),
+        Parameter(
+            "c", "body", "1", "semi-axis of the ellipsoid along z, the unit of length", 1.0, above=0, below=1e6
+        ),
         Parameter(
             "delta", "body", "radian", "angle from the ellipsoid's axes to the axes of inertia",
             0.03, above=-pi / 2, below=pi / 2,
         ),
-        Parameter("mu", "friction", "1", "viscous friction coefficient, in 1/sqrt(g c)", None, at_least=0, below=1e12),
-        Parameter("n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05, above=-1e3, below=1e3),
+        Parameter("offset", "body", "1", "depth of the centre of mass below the ellipsoid's centre, in c", 0.0),
+        Parameter("mass", "body", "1", "mass, in m", None, above=0, below=1e12),
+        *(
+            Parameter(f"I{i}{i}", "body", "1", f"central moment of inertia about {i}, in m c^2", None,
+                      above=0, below=1e24)
+            for i in "xyz"
+        ),
+        *(
+            Parameter(f"I{i}{j}", "body", "1", f"element {i}{j} of the central matrix of inertia, in m c^2", 0.0,
+                      above=-1e24, below=1e24)
+            for i, j in ("xy", "xz", "yz")
+        ),
+        Parameter("gravity", "", "1", "acceleration of free fall, in g", 9.80665, above=0, below=1e6),
+        Parameter(
+            "mu", "friction", "1", "viscous friction coefficient, in 1/sqrt(g c)", None, at_least=0, below=1e12
+        ),
+        Parameter(
+            "speed", "friction", "1", "slip velocity from which on friction is that of slipping, in sqrt(g c)", None,
+            above=0, below=1e6,
+        ),
+        Parameter("mu_static", "friction", "1", "coefficient of friction at no slip", None, at_least=0, below=1e6),
+        Parameter(
+            "speed_stick", "friction", "1", "slip velocity over which static friction sets in, in sqrt(g c)", None,
+            above=0, below=1e6,
+        ),
+        Parameter(
+            "mu_viscous", "friction", "1", "viscous part of the coefficient of friction, in 1/sqrt(g c)", 0.0,
+            at_least=0, below=1e12,
+        ),
+        Parameter("sigma", "friction", "1", "couple per angular velocity that opposes it, in m c sqrt(g c)", 0.0,
+                  at_least=0, below=1e12),
+        Parameter("mu_rolling", "friction", "1", "coefficient of rolling friction", None, at_least=0, below=1e6),
+        Parameter("radius", "friction", "1", "contact radius of rolling friction, in c", None, above=0, below=1e6),
+        Parameter(
+            "speed_rolling", "friction", "1", "angular velocity below which rolling friction fades, in sqrt(g/c)", None,
+            above=0, below=1e6,
+        ),
+        Parameter(
+            "n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05, above=-1e3, below=1e3
+        ),
         Parameter("x0", "start", "1", "start contact point along x, in c", 0.01),
         Parameter("y0", "start", "1", "start contact point along y, in c", 0.01),
+        Parameter("roll", "start", "radian", "start angle about x", 0.0, above=-pi / 2, below=pi / 2),
+        Parameter("pitch", "start", "radian", "start angle about y, after roll", 0.0, above=-pi / 2, below=pi / 2),
+        *(
+            Parameter(f"omega{i}", "start", "1", f"start angular velocity about {axis}, in sqrt(g/c)", 0.0,
+                      above=-1e3, below=1e3)
+            for i, axis in ((1, "x"), (2, "y"), (3, "z"))
+        ),
+        Parameter("slip1", "start", "1", "start slip along the ground, at heading zero along x, in sqrt(g c)", 0.0,
+                  above=-1e6, below=1e6),
+        Parameter("slip2", "start", "1", "start slip along the ground, at heading zero along y, in sqrt(g c)", 0.0,
+                  above=-1e6, below=1e6),
     )
 }  # fmt: skip
 
-SECTIONS: tuple[str, ...] = tuple(dict.fromkeys(p.section for p in PARAMETERS.values()))
+PAPER: dict[str, Parameter] = {name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")}
+"""The parameters of the paper's model.  Their defaults are in the paper's units, and they have none in SI."""
+
+SECTIONS: tuple[str, ...] = tuple(dict.fromkeys(p.section for p in PARAMETERS.values() if p.section))
 
 START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")
 """Names of the parameters of the start, on which the critical spins and the form factor do not depend."""

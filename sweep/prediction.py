@@ -10,7 +10,8 @@ from sweep.grid import Array, Grid
 from sweep.kernels.stability import stable_ranges
 from sweep.models import analytic, stability
 from sweep.models.linear import fastest_spin
-from sweep.models.model import FORMULAS, Model, Tier
+from sweep.models.model import FORMULAS, LINEAR, Model, Tier
+from sweep.models.scene import PAPERS
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Stability:
 
     n_c1: tuple[Array, Array]
     """n_c1+ and n_c1- of the linear theory, over the bodies: infinite where the rattle decays at every spin, NaN where
-    it does not decay at rest.  NaN too for a model without formulas."""
+    it does not decay at rest.  NaN too for a model to which the linear theory does not apply."""
     ranges: Array
     """Ranges of spin in which the rattle decays, shape (6, cells), as `stability.stable_ranges` gives them: all those
     that the trajectory of the cell can reach."""
@@ -39,10 +40,11 @@ class Stability:
 class Prediction:
     """Everything that is predicted for the cells and bodies of a grid."""
 
-    form_factor: Array
-    """L(f), over the bodies."""
+    form_factor: Array | None
+    """L(f), over the bodies; None for bodies that are not the paper's."""
     formulas: Formulas | None
-    """None for a tier to which they do not apply, because without friction the spin reverses for ever."""
+    """None for a tier to which they do not apply, because the spin reverses for ever without friction, or because body
+    or friction are not the paper's."""
     stability: Stability | None
     """None for a tier that is not simulated, and where the eigenvalues were not asked for."""
 
@@ -52,8 +54,8 @@ def predict(tier: Tier, grid: Grid) -> Prediction:
     prediction = formulas(tier, grid)
     if not isinstance(tier, Model):
         return prediction
-    if prediction.formulas is None:
-        nothing = np.full_like(prediction.form_factor, np.nan)
+    if LINEAR not in tier.offers:
+        nothing = np.full(grid.bodies()[0].size, np.nan)
         return replace(prediction, stability=Stability((nothing, nothing), np.full((6, grid.size), np.nan)))
     return replace(prediction, stability=_stability(tier, grid))
 
@@ -78,4 +80,5 @@ def formulas(tier: Tier, grid: Grid) -> Prediction:
     found = None
     if FORMULAS in tier.offers:
         found = Formulas(analytic.reversal_count(grid.columns()), analytic.critical_spins(bodies))
-    return Prediction(analytic.form_factor(bodies), found, None)
+    papers = set(bodies) <= PAPERS
+    return Prediction(analytic.form_factor(bodies) if papers else None, found, None)

@@ -23,3 +23,31 @@ class Variable:
     """Name of one further dimension, after those of the cells; its coordinate counts from one."""
     of_sound_runs: bool = False
     """Whether it is undefined for a trajectory that failed, whatever number the array holds there."""
+
+
+_SI = {
+    "the unit of length": "m",
+    "in c": "m",
+    "in m": "kg",
+    "in g": "m s-2",
+    "in m g": "m s-2",
+    "in m c^2": "kg m2",
+    "in m g c": "m2 s-2",
+    "in sqrt(c/g)": "s",
+    "in sqrt(g/c)": "radian s-1",
+    "in sqrt(g c)": "m s-1",
+    "in 1/sqrt(g c)": "s m-1",
+    "in m c sqrt(g c)": "kg m2 s-1",
+}
+"""Units of SI for the paper's units, which the last words of a `long_name` tell.  Forces and energies of a moving body
+are per unit mass."""
+
+
+def in_si(units: str, long_name: str) -> tuple[str, str]:
+    """CF unit and `long_name`, in SI, of what has these in the paper's units."""
+    head, _, rest = long_name.rpartition(", ")
+    words, mark, after = rest.partition(";")
+    if words not in _SI:
+        return units, long_name
+    per_mass = " per unit mass" if words in ("in m g", "in m g c") else ""
+    return _SI[words], f"{head}{per_mass}{mark}{after}"

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from sweep.config import cases, document, schema
+from sweep.config import cases, document, scenes, schema
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.messages import describe
 from sweep.config.plain import plain
@@ -22,9 +22,9 @@ from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.kernels import measures, methods
 from sweep.kernels.measures import MEASURES
-from sweep.models import MODELS, TIERS
 from sweep.models.model import Model, Tier
-from sweep.parameters import PARAMETERS
+from sweep.models.scene import SI
+from sweep.parameters import PAPER, PARAMETERS, SECTIONS
 
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 
@@ -86,33 +86,31 @@ def _source(config: ConfigLike) -> document.Document:
 def _full_path(key: str) -> tuple[str, ...]:
     """Where the value of an override belongs."""
     if key in PARAMETERS:
-        return PARAMETERS[key].section, key
+        return PARAMETERS[key].place
     return ("integrator", key) if key in Integrator.model_fields else tuple(key.split("."))
 
 
 def _resolve(checked: Any, source: document.Document) -> Config:
     """Fill in defaults, order the axes, and check that the values fit together."""
-    model = TIERS[checked.model]
-    checked = _with_method(checked, model)
-    given = {
-        key: getattr(getattr(checked, section), key)
-        for section, keys in source.values.items()
-        if section in {p.section for p in PARAMETERS.values()}
-        for key in keys
-    }
+    given = _given(checked, source)
     columns = _table(checked.cases, source) if checked.cases is not None else None
-    faults = list(_misfits(checked, given, columns, source))
+    names, law, units = (*given, *(columns or ())), checked.friction.name, checked.units
+    if faults := list(scenes.misfits(checked, names, source)):
+        raise ConfigError(faults)
+    model = schema.tier_of(checked.model, law, units, names)
+    checked = _with_method(checked, model)
+    faults = list(_misfits(checked, model, given, columns, source))
     order = sorted(model.parameters, key=lambda n: (_rank(n, schema.FIRST_AXES), _rank(n, tuple(given))))
     parameters = {}
     for name in order:
-        default = PARAMETERS[name].default
+        default = None if units == SI and name in PAPER else PARAMETERS[name].default
         if name in given:
             parameters[name] = given[name]
         elif name in (columns or {}):
             continue
         elif default is None:
             parameter = PARAMETERS[name]
-            faults.append(source.fault((parameter.section, name), f"missing; allowed: {parameter.allowed}"))
+            faults.append(source.fault(parameter.place, f"missing; allowed: {parameter.allowed}"))
         else:
             parameters[name] = Values((default,), False, default)
     if faults:
@@ -128,6 +126,8 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         refine=checked.refine,
         cases=columns,
         cases_file=checked.cases,
+        units=units,
+        law=law,
     )
     for path, check in _CHECKS:
         if reason := check(config):
@@ -135,6 +135,17 @@ def _resolve(checked: Any, source: document.Document) -> Config:
     if checked.verify is None and config.integrator.method == methods.AUTO and not config.refine:
         return replace(config, verify=schema.VERIFIED if Grid.of(config).size * schema.VERIFIED >= 1 else 0.0)
     return config
+
+
+def _given(checked: Any, source: document.Document) -> dict[str, Values]:
+    """The physical parameters that the document names, in its order."""
+    found: dict[str, Values] = {}
+    for key, value in source.values.items():
+        if key in SECTIONS:
+            found |= {name: getattr(getattr(checked, key), name) for name in value if name in PARAMETERS}
+        elif key in PARAMETERS:
+            found[key] = getattr(checked, key)
+    return found
 
 
 def _table(name: str, source: document.Document) -> dict[str, tuple[float, ...]]:
@@ -158,13 +169,13 @@ def _too_large_to_refine(config: Config) -> str:
 
 def _unusable_step(config: Config) -> str:
     """What is wrong with a step that the configuration fixes; "" if nothing is."""
-    step = config.integrator.step
-    if step == "auto" or config.model not in MODELS:
+    step, model = config.integrator.step, config.tier
+    if step == "auto" or not isinstance(model, Model):
         return ""
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
     with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
-        longest = min(float(methods.longest_step(columns).min()) for columns in distinct(Grid.of(config), BODY))
+        longest = min(float(methods.longest_step(model, columns).min()) for columns in distinct(Grid.of(config), BODY))
     if step <= longest:
         return ""
     return f"{step:g}; allowed: auto, or at most {longest:.3g}, a quarter of the rattle's period"
@@ -175,6 +186,7 @@ def _unusable_step(config: Config) -> str:
 _CHECKS: tuple[tuple[tuple[str, ...], Callable[[Config], str]], ...] = (
     ((), _too_large),
     (("refine",), _too_large_to_refine),
+    (("body",), scenes.impossible),
     (("start", "x0"), off_the_body),
     (("integrator", "step"), _unusable_step),
 )
@@ -199,12 +211,15 @@ def _rank(name: str, names: tuple[str, ...]) -> int:
 
 
 def _misfits(
-    checked: Any, given: dict[str, Any], columns: dict[str, tuple[float, ...]] | None, source: document.Document
+    checked: Any,
+    model: Tier,
+    given: dict[str, Any],
+    columns: dict[str, tuple[float, ...]] | None,
+    source: document.Document,
 ) -> Iterator[Fault]:
     """Faults of values that are valid by themselves but do not fit together."""
-    model = TIERS[checked.model]
     for name in given:
-        path = (PARAMETERS[name].section, name)
+        path = PARAMETERS[name].place
         # A number that the model does not use may stay, so that one file serves every model.
         if name not in model.parameters and given[name].is_axis:
             yield source.fault(

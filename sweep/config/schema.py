@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import sys
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any, Literal
@@ -17,7 +19,7 @@ from pydantic_core import PydanticCustomError
 from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
-from sweep.config.document import Document
+from sweep.config.document import Document, number
 from sweep.config.faults import ConfigError, Fault, Path, quote, suggestion
 from sweep.config.messages import Allowed, describe, refusal, wrong
 from sweep.config.plain import plain
@@ -25,7 +27,12 @@ from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
+from sweep.models.general import BASES
+from sweep.models.laws import LAWS
+from sweep.models.model import Model, Tier
+from sweep.models.scene import PAPER, PAPERS_LAW, SI, is_papers, variant
 from sweep.parameters import PARAMETERS, SECTIONS, Parameter
+from sweep.variables import in_si
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
@@ -86,7 +93,23 @@ class Values:
     """The value as it stands in the configuration."""
 
 
+_DEGREES = re.compile(r"\s*(\S+)\s+deg\s*")
+
+
+def _in_radians(raw: Any) -> Any:
+    """`raw` with "0.5 deg" as a number of radians, also in a list or a range."""
+    if isinstance(raw, list):
+        return [_in_radians(item) for item in raw]
+    if isinstance(raw, dict):
+        return {key: _in_radians(item) for key, item in raw.items()}
+    spelled = _DEGREES.fullmatch(raw) if isinstance(raw, str) else None
+    degrees = number(spelled[1]) if spelled else None
+    return raw if degrees is None else math.radians(degrees)
+
+
 def _parse_values(parameter: Parameter, raw: Any) -> Values:
+    if parameter.units == "radian":
+        raw = _in_radians(raw)
     spec: Any = raw
     if isinstance(raw, dict):
         try:
@@ -105,9 +128,9 @@ def _parse_values(parameter: Parameter, raw: Any) -> Values:
     else:
         _check_number(raw, parameter)
         return Values((float(raw),), False, float(raw))
-    for number in numbers:
-        if not parameter.allows(number):
-            raise wrong(f"{number:g} is out of bounds; allowed: {parameter.allowed}")
+    for value in numbers:
+        if not parameter.allows(value):
+            raise wrong(f"{value:g} is out of bounds; allowed: {parameter.allowed}")
     if len(set(numbers)) < len(numbers):
         raise wrong("an axis with equal values; allowed: distinct numbers")
     return Values(tuple(numbers), True, spec)
@@ -209,17 +232,37 @@ class Integrator(_Strict):
     )
 
 
-def _section(name: str) -> Any:
-    """The schema of one section of physical parameters, made from the table of parameters."""
-    fields: dict[str, Any] = {
+def _physical(section: str) -> dict[str, Any]:
+    """The fields of the physical parameters in a section, made from the table of parameters."""
+    return {
         p.name: (
             Annotated[Any, BeforeValidator(lambda raw, p=p: _parse_values(p, raw)), Field(description=p.long_name)],
             None,
         )
         for p in PARAMETERS.values()
-        if p.section == name
+        if p.section == section
     }
-    return create_model(name.capitalize(), __base__=_Strict, **fields)
+
+
+class _Words(_Strict):
+    """What a section has beside physical parameters: of most, nothing."""
+
+
+class Law(_Words):
+    law: Literal["viscous", "coulomb", "stribeck", "none"] = Field(
+        default="viscous", description="law of slip friction"
+    )
+    regularisation: Literal["sqrt", "tanh", "cubic"] = Field(
+        default="sqrt", description="how Coulomb friction passes through zero slip, within `speed`"
+    )
+
+    @property
+    def name(self) -> str:
+        """As in `sweep.models.laws.LAWS`."""
+        return f"{self.law}-{self.regularisation}" if self.law == "coulomb" else self.law
+
+
+_WORDS: dict[str, type[_Words]] = {"friction": Law}
 
 
 class _Top(_Strict):
@@ -229,6 +272,9 @@ class _Top(_Strict):
     )  # fmt: skip
     model: Literal[tuple(TIERS)] = Field(  # type: ignore[valid-type]
         default="slip", description="which model to integrate"
+    )
+    units: Literal[PAPER, SI] = Field(  # type: ignore[valid-type]
+        default=PAPER, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
     )
     cases: Annotated[str | None, Allowed("the name of a CSV file")] = Field(
         default=None,
@@ -253,16 +299,29 @@ class _Top(_Strict):
     )
 
 
-_sections: dict[str, Any] = {name: (_section(name), Field(default_factory=dict)) for name in SECTIONS}
-Schema: Any = create_model("Configuration", __base__=_Top, **_sections)
+def _section(name: str) -> tuple[Any, Any]:
+    made: Any = create_model(name.capitalize(), __base__=_WORDS.get(name, _Words), **_physical(name))
+    return made, Field(default_factory=made)
+
+
+_sections: dict[str, Any] = {name: _section(name) for name in SECTIONS}
+Schema: Any = create_model("Configuration", __base__=_Top, **_physical(""), **_sections)
 
 SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fields.items() if name != "integrator"}
+SETTINGS |= {f"friction.{name}": field for name, field in Law.model_fields.items()}
 SETTINGS |= {f"integrator.{name}": field for name, field in Integrator.model_fields.items()}
 """All values of a configuration but the physical parameters, by path; the `description` of each says what it means."""
 
 PATHS: dict[str, str] = {p.path: p.long_name for p in PARAMETERS.values()}
 PATHS |= {path: str(field.description) for path, field in SETTINGS.items()}
 """The path of every value of a configuration, and what it means."""
+
+
+def tier_of(model: str, law: str, units: str, names: Collection[str]) -> Tier:
+    """The model of a configuration that names these parameters."""
+    if model not in BASES or is_papers(law, units, names):
+        return TIERS[model]
+    return variant(model, law, units, names)
 
 
 @dataclass(frozen=True)
@@ -282,6 +341,9 @@ class Config:
     cases: dict[str, tuple[float, ...]] | None = None
     """Columns of the table of cases, if there is one."""
     cases_file: str | None = None
+    units: str = PAPER
+    law: str = PAPERS_LAW
+    """Name of the law of friction, as in `sweep.models.laws.LAWS`."""
     source: Document | None = field(default=None, init=False, compare=False, repr=False)
     """What it was made from, so that single values can be replaced; a copy with other values has none."""
 
@@ -293,16 +355,42 @@ class Config:
     def axes(self) -> dict[str, tuple[float, ...]]:
         return {name: v.numbers for name, v in self.parameters.items() if v.is_axis}
 
+    @property
+    def tier(self) -> Tier:
+        """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
+        return tier_of(self.model, self.law, self.units, (*self.parameters, *(self.cases or ())))
+
+    @property
+    def equations(self) -> Model:
+        """The model of a configuration that is simulated."""
+        assert isinstance(self.tier, Model)
+        return self.tier
+
+    def described(self, name: str) -> dict[str, str]:
+        """The CF attributes of a physical parameter."""
+        parameter = PARAMETERS[name]
+        if name in LAWS[self.law].pure:
+            return {"long_name": "coefficient of friction", "units": "1"}
+        units, long_name = parameter.units, parameter.long_name
+        if self.units == SI:
+            units, long_name = in_si(units, long_name)
+        return {"long_name": long_name, "units": units}
+
     def document(self) -> dict[str, Any]:
         """The whole configuration, defaults included, as plain data."""
         written = [PARAMETERS[name].section for name in self.axes if name not in FIRST_AXES]
         # In the order of the axes, so that they keep it when the document is read again.
-        sections: dict[str, dict[str, Any]] = {section: {} for section in (*written, *SECTIONS)}
+        sections: dict[str, dict[str, Any]] = {section: {} for section in (*written, *SECTIONS) if section}
+        top: dict[str, Any] = {"units": self.units} if self.units != PAPER else {}
+        if self.law != PAPERS_LAW:
+            law, _, regularisation = self.law.partition("-")
+            sections["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
         for name, value in self.parameters.items():
-            sections[PARAMETERS[name].section][name] = value.spec
+            sections.get(PARAMETERS[name].section, top)[name] = value.spec
         return {
             "name": self.name,
             "model": self.model,
+            **top,
             **({"cases": self.cases_file} if self.cases_file else {}),
             **{section: values for section, values in sections.items() if values},
             "integrator": self.integrator.model_dump(),

@@ -57,7 +57,7 @@ class Enlarged:
         words = attributes(self.config, len(self._missing), apart) | {"taken_over": self.earlier.words}
         words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash
         labelled = dataset.label(self.config, self.grid, arrays, words)
-        return dataset.beside(labelled, self._verified(arrays)) if self.config.verify else labelled
+        return dataset.beside(self.config, labelled, self._verified(arrays)) if self.config.verify else labelled
 
     def save(self, path: Path) -> None:
         """Write the labelled dataset."""

@@ -15,7 +15,7 @@ from sweep.engine.repeats import repeat_all
 from sweep.engine.sensitivity import runs_asked_for, sensitivity
 from sweep.grid import Array, Grid, Tile
 from sweep.kernels.status import FAILURES, RUNNING, SETTLED
-from sweep.models import MODELS, TIERS
+from sweep.models import MODELS
 from sweep.prediction import predict
 from sweep.results import dataset
 from sweep.results.provenance import this_cpu
@@ -137,7 +137,7 @@ def _groups(
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
     """The results of a model that is a formula."""
-    arrays = dataset.predicted(predict(TIERS[config.model], grid))
+    arrays = dataset.predicted(predict(config.tier, grid))
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:
         arrays["reversals"] = arrays["reversals_predicted"]

@@ -15,7 +15,6 @@ from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.methods import AUTO, METHODS
-from sweep.models import MODELS
 from sweep.models.model import Columns
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
@@ -90,19 +89,19 @@ def plan(config: Config, grid: Grid | None = None) -> Plan:
 def kernels(config: Config) -> list[Kernel]:
     """All kernels that a run of a configuration may need."""
     method = config.integrator.method
-    names = methods.allowed(MODELS[config.model]) if method == AUTO else (method,)
+    names = methods.allowed(config.equations) if method == AUTO else (method,)
     names += (methods.PLAIN,) if config.verify and methods.PLAIN not in names else ()
     return [kernel_of(name, config) for name in names]
 
 
 def kernel_of(method: str, config: Config) -> Kernel:
     """The kernel of a method for the model and the measurements of a configuration."""
-    return _kernel(method, MODELS[config.model], config.measure, config.integrator.tolerance)
+    return _kernel(method, config.equations, config.measure, config.integrator.tolerance)
 
 
 def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
     """Give each cell of `grid` its method and step; no kernel is compiled for it."""
-    model, integrator = MODELS[config.model], config.integrator
+    model, integrator = config.equations, config.integrator
     columns = grid.columns()
     if integrator.method == AUTO:
         chosen, steps, rules = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
@@ -122,7 +121,7 @@ def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
 
 def fill(config: Config, grid: Grid, chosen: Sequence[Choice]) -> Plan:
     """Give each cell of `grid` its limits and start as well, in images of the kernels in `chosen`."""
-    prediction = predict(MODELS[config.model], grid)
+    prediction = predict(config.equations, grid)
     assert prediction.stability is not None  # it is a model
     stable = prediction.stability.ranges
     parts = []

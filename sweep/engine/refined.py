@@ -14,7 +14,6 @@ from sweep.config import Config
 from sweep.engine import refinement
 from sweep.engine.whole import attributes, gather
 from sweep.grid import Array, Grid, Tile
-from sweep.models import TIERS
 from sweep.prediction import formulas
 from sweep.results import dataset, netcdf
 from sweep.results.store import Store
@@ -98,7 +97,7 @@ class Refined:
 
     def _formulas(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
         for tile in self.grid.tiles(_TILE):
-            yield tile, dataset.predicted(formulas(TIERS[self.config.model], self.grid.part(tile)))
+            yield tile, dataset.predicted(formulas(self.config.tier, self.grid.part(tile)))
 
 
 def _outcome(found: Mapping[str, Array]) -> Array:

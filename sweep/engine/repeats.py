@@ -23,7 +23,6 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.lanes import STABLE
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import DIVERGED, FAILURES, RUNNING
-from sweep.models import MODELS
 from sweep.models.model import Columns, Model, stack, take
 
 ROUNDS, FALSE_ROUNDS = 3, 8
@@ -115,8 +114,9 @@ class Cells:
             _, _, inertia = self.kernel.model.energy(*self.kernel.unpack(self.images))
         scale = np.sqrt(2 * inertia * table["energy_start"])
         error = np.divide(table["violation"], scale, out=np.zeros(len(scale)), where=scale > 0)
-        longer = np.maximum(self.kernel.times(self.images, self.t_end) / TOLERANCE_TIME, 1)
-        allowed = self.balance * max(self.tolerance, ROUND_OFF) * longer
+        unit = self.model.spin_unit(self.columns)
+        longer = np.maximum(self.kernel.times(self.images, self.t_end) * unit / TOLERANCE_TIME, 1)
+        allowed = self.balance * max(self.tolerance, ROUND_OFF) * longer * unit
         return np.where(self.failed, np.inf, error / allowed)
 
 
@@ -153,7 +153,7 @@ def cells_of(plans: Sequence[Plan], method: str, kernel: Kernel, images: Array) 
     config, integrator = plans[0].config, plans[0].config.integrator
     parts = [part for each in plans for part in each.parts if part.method == method]
     return Cells(
-        model=MODELS[config.model],
+        model=config.equations,
         kernel=kernel,
         images=images,
         columns={name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns},

@@ -88,7 +88,8 @@ class Whole:
         for name, (over, spec) in dataset.layout(self.grid, tails).items():
             empty = np.broadcast_to(np.zeros((), spec.dtype), over.shape + tails[name])
             chunks = tuple(first[dim].stop for dim in over.dims) + tails[name]
-            variables[name] = xr.Variable(dataset.dims(over, spec), empty, dataset.described(spec)), chunks
+            words = dataset.described(spec, self.config.units)
+            variables[name] = xr.Variable(dataset.dims(over, spec), empty, words), chunks
         blocks = (
             block for i, tile in enumerate(self.tiles) for block in dataset.blocks(self.grid, tile, self.store.load(i))
         )
@@ -100,4 +101,4 @@ class Whole:
         framed = dataset.label(self.config, self.grid, arrays, attributes(self.config, self.grid.size, apart))
         names = dict.fromkeys(name for tile in apart for name in tile if name.startswith("verified_"))
         again = {name: np.concatenate([tile[name] for tile in apart if name in tile]) for name in names}
-        return dataset.beside(framed, again) if again else framed
+        return dataset.beside(self.config, framed, again) if again else framed

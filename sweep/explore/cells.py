@@ -22,7 +22,7 @@ from sweep.explore.state import Cell
 from sweep.grid import Array
 from sweep.jit import showing
 from sweep.kernels import measures
-from sweep.models import MODELS, TIERS
+from sweep.models import MODELS
 from sweep.plots.trajectories import reversal_times
 from sweep.studies.trajectory import trajectory
 
@@ -101,14 +101,14 @@ def _configuration(source: Source) -> Config:
         config = load_config(path, overrides)
     if config.model not in MODELS:
         raise ConfigError([])
-    names = TIERS[config.model].parameters
+    names = config.tier.parameters
     return replace(config, parameters={name: config.parameters[name] for name in names if name in config.parameters})
 
 
 def single(config: Config, cell: Cell) -> Config:
     """`config` with the parameters of one cell, and the usual measurements, which tell spin and energies."""
     parameters = {name: Values((value,), False, value) for name, value in cell.items()}
-    return replace(config, parameters=parameters, measure=measures.default(MODELS[config.model]))
+    return replace(config, parameters=parameters, measure=measures.default(config.equations))
 
 
 def run(setup: Setup, cell: Cell, reporter: Reporter | None = None) -> Curve:

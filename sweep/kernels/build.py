@@ -29,8 +29,8 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import make_kernel
 from sweep.kernels.quartic import compiled_modes, has_fast_slip
 from sweep.kernels.stability import compile_theory, compiled_search
-from sweep.models import MODELS
-from sweep.parameters import PARAMETERS
+from sweep.models import find
+from sweep.parameters import PAPER
 
 Piece = tuple[str, ...]
 """Something to be compiled: the arguments of this module."""
@@ -58,10 +58,10 @@ def _missing(kernel: Kernel) -> Iterator[Piece]:
         yield "kernel", kernel.method, model, *(each.spec for each in kernel.measurements if each.in_kernel)
     if any(function.is_missing() for function in filling):
         yield "images", kernel.method, model
-    if compiled_approach(MODELS[model]).is_missing():
+    if compiled_approach(kernel.model).is_missing():
         yield "approach", model
-    if has_fast_slip(MODELS[model]) and any(
-        function(MODELS[model]).is_missing() for function in (compiled_search, compiled_modes)
+    if has_fast_slip(kernel.model) and any(
+        function(kernel.model).is_missing() for function in (compiled_search, compiled_modes)
     ):
         yield "theory", model
 
@@ -95,15 +95,15 @@ def main(what: str, *which: str) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if what == "kernel":
         method, model, *measure = which
-        make_kernel(method, MODELS[model], measure).compile()
+        make_kernel(method, find(model), measure).compile()
     elif what == "images":
         method, model = which
-        body = {name: np.full(1, p.default if p.default is not None else 1.5) for name, p in PARAMETERS.items()}
-        make_kernel(method, MODELS[model], ()).images(body, np.full(1, 0.1), 10.0)
+        body = {name: np.full(1, p.default if p.default is not None else 1.5) for name, p in PAPER.items()}
+        make_kernel(method, find(model), ()).images(body, np.full(1, 0.1), 10.0)
     elif what == "approach":
-        compile_approach(MODELS[which[0]])
+        compile_approach(find(which[0]))
     else:
-        compile_theory(MODELS[which[0]])
+        compile_theory(find(which[0]))
 
 
 if __name__ == "__main__":

@@ -165,7 +165,7 @@ class Kernel:
         if self.ripple:
             table.set_columns(self.ripple, stack(self.model.ripple.of(columns)).T)
         for each in self.measurements:
-            for name, values in each.start(columns, step, rattle).items():
+            for name, values in each.start(self.model, columns, step, rattle).items():
                 table[name] = values
         return images
 

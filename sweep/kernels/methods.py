@@ -12,7 +12,6 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method
 from sweep.kernels.stability import fastest_motion
 from sweep.models.model import Array, Columns, Model
-from sweep.models.rocking import slower_period
 
 METHODS: dict[str, Method] = {method.name: method for method in (runge_kutta.DOPRI5_METHOD, adams.METHOD)}
 """The first is the plain one, which runs every model."""
@@ -60,13 +59,13 @@ def automatic_step(method: str, model: Model, columns: Columns, tolerance: float
 
 def _step(method: Method, model: Model, columns: Columns, motion: Array, tolerance: float) -> tuple[Array, Array]:
     with np.errstate(divide="ignore"):
-        step = np.minimum(method.accurate_step(model, columns, motion, tolerance), longest_step(columns))
+        step = np.minimum(method.accurate_step(model, columns, motion, tolerance), longest_step(model, columns))
         if method.stable_step is None:
             return step, np.full(len(step), ACCURACY)
         stable = method.stable_step(model, columns)
     return np.minimum(step, stable), np.where(stable < step, STABILITY, ACCURACY)
 
 
-def longest_step(columns: Columns) -> Array:
+def longest_step(model: Model, columns: Columns) -> Array:
     """A quarter of the rattle's period, in sqrt(c/g), shape (cells,): two steps in half a window of the average."""
-    return slower_period(columns) / 4
+    return model.slower_period(columns) / 4

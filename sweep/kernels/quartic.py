@@ -20,7 +20,7 @@ import numpy as np
 
 from sweep.jit import Cached, called, compiled, serial
 from sweep.kernels.codegen import compile_inline, tuple_of
-from sweep.models.model import Model
+from sweep.models.model import MODES, Model
 
 # Rounds of the iteration for X, beyond which the slip does not count as fast.
 _ROUNDS = 60
@@ -28,7 +28,7 @@ _ROUNDS = 60
 
 def has_fast_slip(model: Model) -> bool:
     """Whether the compiled theory applies to a model."""
-    return len(model.states) == 7 and model.states[5:] == ("v1", "v2")
+    return MODES in model.offers
 
 
 def make_jacobian(model: Model) -> Any:

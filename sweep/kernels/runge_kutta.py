@@ -125,7 +125,7 @@ def _accurate_step(model: Model, columns: Columns, motion: Array, tolerance: flo
     spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
     e = 2 * rattle / inertia
     with np.errstate(divide="ignore", invalid="ignore"):
-        moved = _LAYER_ERROR * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2
+        moved = _LAYER_ERROR * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.fmin(step, _UNRESOLVED / decay * (tolerance / moved) ** (1 / DOPRI5.order)))
 

@@ -1,8 +1,14 @@
 """The ladder of models, one file each; every model approximates the one before it."""
 
-from sweep.models import analytic, averaged, effective, noslip, slip
+from sweep.models import analytic, averaged, effective, general, noslip, slip
 from sweep.models.model import Model, Tier
 
 MODELS: dict[str, Model] = {module.MODEL.name: module.MODEL for module in (slip, noslip, effective, averaged)}
+
+
+def find(name: str) -> Model:
+    """The model of a name: one of `MODELS`, or a variant such as `slip+coulomb-tanh+sigma`."""
+    return MODELS[name] if name in MODELS else general.variant(name)
+
 
 TIERS: dict[str, Tier] = {**MODELS, analytic.MODEL.name: analytic.MODEL}

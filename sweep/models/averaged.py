@@ -18,7 +18,8 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.coefficients import coefficients, normal_coordinates
-from sweep.models.model import COUNT, ENERGY, FORMULAS, SPIN, Array, Columns, Model
+from sweep.models.model import COUNT, ENERGY, FORMULAS, LINEAR, SPIN, Array, Columns, Model
+from sweep.models.rocking import slower_period
 
 
 class Constants(NamedTuple):
@@ -73,9 +74,10 @@ MODEL = Model(
     states=("A", "B", "n"),
     spin_state=2,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
-    offers=frozenset({COUNT, SPIN, ENERGY, FORMULAS}),
+    offers=frozenset({COUNT, SPIN, ENERGY, FORMULAS, LINEAR}),
     constants=Constants,
     start=start,
+    slower_period=slower_period,
     upright=upright,
     rhs=rhs,
     energy=energy,

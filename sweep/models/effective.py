@@ -16,8 +16,9 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.coefficients import coefficients, normal_coordinates
-from sweep.models.model import COUNT, FORMULAS, SPIN, Array, Columns, Model, Ripple
+from sweep.models.model import COUNT, FORMULAS, LINEAR, SPIN, Array, Columns, Model, Ripple
 from sweep.models.ripple import FORM, ripple
+from sweep.models.rocking import slower_period
 
 
 class Constants(NamedTuple):
@@ -119,9 +120,10 @@ MODEL = Model(
     states=("X", "Y", "dX", "dY", "n"),
     spin_state=4,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
-    offers=frozenset({COUNT, SPIN, FORMULAS}),
+    offers=frozenset({COUNT, SPIN, FORMULAS, LINEAR}),
     constants=Constants,
     start=start,
+    slower_period=slower_period,
     upright=upright,
     rhs=rhs,
     energy=energy,

@@ -39,8 +39,15 @@ def fastest_motion(model: Model, columns: Columns) -> Array:
 
     This is the motion that an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.
     """
-    constants, reach = model.constants.of(columns), fastest_spin(model, columns)
-    values = np.concatenate([np.linalg.eigvals(jacobian(model, constants, spin)) for spin in (reach, -reach)], axis=-1)
+    reach = fastest_spin(model, columns)
+    values = np.concatenate(
+        [
+            np.linalg.eigvals(jacobian(model, model.constants.of(extreme), spin))
+            for extreme in model.extremes(columns)
+            for spin in (reach, -reach)
+        ],
+        axis=-1,
+    )
     moving = -values.real <= np.abs(values.imag)
     return np.asarray(np.where(moving, np.abs(values), 0.0).max(axis=-1))
 

@@ -6,7 +6,8 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 
 1. Choose the states, in such a way that all but one vanish in upright spin; the remaining one carries the spin
    (`states`, `spin_state`).  A rattle then keeps its relative precision however small it becomes.
-2. Compute the coefficients and the starts of many cells at once, from arrays of parameters (`constants`, `start`).
+2. Compute the coefficients, the starts and the period of the slower rocking of many cells at once, from arrays of
+   parameters (`constants`, `start`, `slower_period`).
 3. Write `rhs`, `energy` and `upright` for one trajectory, on scalars.
 4. Say what the model depends on and what can be asked of it (`parameters`, `offers`).
 5. If friction or anything else makes the model stiff, bound its fastest decay (`fastest_decay`).
@@ -15,7 +16,8 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 again at every look.  The linear theory of `sweep.models.linear` calls `upright` and `rhs`, the latter with complex
 states.
 
-Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.
+Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.  Equations that hold in any units say what
+sqrt(g/c) is in theirs (`spin_unit`).
 """
 
 from __future__ import annotations
@@ -36,9 +38,11 @@ Columns = Mapping[str, Array]
 
 
 COUNT, SPIN, ENERGY, MODES, FORMULAS = "count", "spin", "energy", "modes", "formulas"
+LINEAR = "linear"
 """What a model may offer: a number of reversals; the spin as a function of time; an energy that only friction changes;
 two rocking modes that the linear theory of the slip model describes; Takano's formulas for the critical spins and the
-number of reversals."""
+number of reversals; and the spins between which a tiny rattle decays, by the eigenvalues of its Jacobian, at which
+trajectories may settle."""
 
 
 @inline
@@ -84,8 +88,7 @@ class Tier:
     parameters: tuple[str, ...]
     """Names of the physical parameters that it depends on; `sweep.parameters` has their meanings."""
     offers: frozenset[str]
-    """What can be asked of it, out of `COUNT`, `SPIN`, `ENERGY`, `MODES` and `FORMULAS`.  If a model lacks `FORMULAS`,
-    no stable ranges of spin are searched for, and its trajectories never settle."""
+    """What can be asked of it, out of the names above, such as `COUNT`."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,8 @@ class Model(Tier):
     from columns of parameters, each coefficient of shape (cells,)."""
     start: Callable[[Columns], tuple[Array, ...]]
     """(columns) -> the states at t = 0, each of shape (cells,)."""
+    slower_period: Callable[[Columns], Array]
+    """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none."""
     upright: Callable[..., tuple[Any, ...]]
     """Inline, (spin) -> the states of steady upright spin without rattle."""
     rhs: Callable[..., tuple[Any, ...]]
@@ -128,6 +133,14 @@ class Model(Tier):
     0.1, μ = 20, where accuracy determines the step); they fall as its fifth power."""
     ripple: Ripple = NO_RIPPLE
     """How the spin ripples with the rattle, for the ripple-free spin whose changes of sign are counted."""
+    spin_unit: Callable[[Columns], Array] = lambda columns: np.ones_like(columns["a"])
+    """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
+    largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""
+    faint: str = ""
+    """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
+    rattle below it may settle."""
+    extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
+    """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
     shows beside spin and energy, by names that `sweep.studies.trajectory` explains."""

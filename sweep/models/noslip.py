@@ -17,6 +17,7 @@ from sweep.models import ellipsoid
 from sweep.models.ellipsoid import contact
 from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, Model, Ripple
 from sweep.models.ripple import FORM, form, ripple
+from sweep.models.rocking import slower_period
 
 
 class Constants(NamedTuple):
@@ -110,6 +111,7 @@ MODEL = Model(
     offers=frozenset({COUNT, SPIN, ENERGY}),
     constants=Constants,
     start=start,
+    slower_period=slower_period,
     upright=upright,
     rhs=rhs,
     energy=energy,

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models import ellipsoid, friction
+from sweep.models import ellipsoid, friction, model
 from sweep.models.ellipsoid import contact
 from sweep.models.model import COUNT, ENERGY, FORMULAS, MODES, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.ripple import FORM, form, ripple
-from sweep.models.rocking import Body, frequencies
+from sweep.models.rocking import Body, frequencies, slower_period
 
 SHAPE = ("A11", "A12", "A22", "A33")
 INVERSE_INERTIA = ("inv_I1", "inv_I2", "inv_I3")
@@ -183,9 +183,10 @@ MODEL = Model(
     states=("u1", "u2", "omega1", "omega2", "omega3", "v1", "v2"),
     spin_state=4,
     parameters=("a", "b", "c", "delta", *friction.PARAMETERS, "n0", "x0", "y0"),
-    offers=frozenset({COUNT, SPIN, ENERGY, MODES, FORMULAS}),
+    offers=frozenset({COUNT, SPIN, ENERGY, MODES, FORMULAS, model.LINEAR}),
     constants=Constants,
     start=start,
+    slower_period=slower_period,
     fastest_decay=fastest_decay,
     upright=upright,
     rhs=rhs,

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from sweep.models.linear import growth_rate, jacobian
-from sweep.models.model import Array, Columns, Model, take
+from sweep.models.model import Array, Columns, Model, stack, take
 
 SPIN_LIMIT = 10.0
 """Largest |spin| examined, in sqrt(g/c), fifty times what a hand gives: upright spin that is stable up to here is
@@ -54,25 +54,34 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     -------
     Shape (6, cells), in sqrt(g/c): the lower and the upper end of each range, as `Kernel.images` takes them.
     Infinite where a range does not end within `SPIN_LIMIT`; NaN where there is no such range, and for all of a body
-    whose rattle does not decay at rest (no friction, or no dissipation in the model).
+    whose rattle does not decay at rest (no friction, or no dissipation in the model), or whose third axis is no axis of
+    inertia, so that it cannot spin upright.
 
     Raises
     ------
     ValueError
         if the Jacobian of the model is not quadratic in the spin.
     """
-    constants = model.constants.of(columns)
+    constants, limits = model.constants.of(columns), SPIN_LIMIT * model.spin_unit(columns)
     rest = np.zeros_like(constants[0])
     ranges = np.full((6, len(rest)), np.nan)
-    cells = np.flatnonzero(growth_rate(model, constants, rest) < _DECAYS)
+    steady = _is_steady(model, constants, model.spin_unit(columns))
+    cells = np.flatnonzero((growth_rate(model, constants, rest) < _DECAYS) & steady)
     if len(cells):
         constants = take(constants, cells)
         changes = _possible_changes(*_polynomial(model, constants))
         for sign, rows in ((-1, (0, 3, 2)), (1, (1, 4, 5))):
-            ends = _ends(model, constants, sign * changes, sign)
+            ends = _ends(model, constants, sign * changes, sign, limits[cells])
             for row, end in zip(rows, ends, strict=True):
                 ranges[row, cells] = sign * end
     return ranges
+
+
+def _is_steady(model: Model, constants: Any, spin: Array) -> Array:
+    """Whether no rattle arises from upright `spin` by itself, shape (cells,)."""
+    slopes, _ = model.rhs(tuple(stack(model.upright(spin))), constants)
+    arising = np.abs(np.delete(stack(slopes), model.spin_state, axis=0)).max(axis=0)
+    return np.asarray(arising <= 1e-12 * spin**2)
 
 
 def _polynomial(model: Model, constants: Any) -> tuple[Array, Array, Array]:
@@ -109,13 +118,13 @@ def _compound(J: Array) -> Array:
     return np.asarray(J[:, p, i] * (q == j) - J[:, q, i] * (p == j) + J[:, q, j] * (p == i) - J[:, p, j] * (q == i))
 
 
-def _ends(model: Model, constants: Any, changes: Array, sign: int) -> tuple[Array, Array, Array]:
+def _ends(model: Model, constants: Any, changes: Array, sign: int, limits: Array) -> tuple[Array, Array, Array]:
     """|spin| at the end of the range about zero, and at both ends of the next one, on the side of `sign`."""
-    changes = np.sort(np.where((changes > 0) & (changes <= SPIN_LIMIT), changes, np.inf), axis=-1)
+    changes = np.sort(np.where((changes > 0) & (changes <= limits[:, None]), changes, np.inf), axis=-1)
     changes = np.append(changes, np.full((len(changes), 1), np.inf), axis=-1)
     # Whether the rattle grows between one change and the next.
     cells, place = np.nonzero(np.isfinite(changes))
-    spins = (changes[cells, place] + np.minimum(changes[cells, place + 1], SPIN_LIMIT)) / 2
+    spins = (changes[cells, place] + np.minimum(changes[cells, place + 1], limits[cells])) / 2
     growth = np.full(changes.shape, np.nan)
     growth[cells, place] = growth_rate(model, take(constants, cells), sign * spins)
 

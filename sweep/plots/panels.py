@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
+from textwrap import fill
 
 import numpy as np
 import xarray as xr
@@ -20,6 +21,9 @@ from sweep.plots.marks import field
 
 MAX_PANELS = 8
 """Panels that a figure may have."""
+
+_HEADING = 90
+"""Letters in a line of the constant parameters above a figure."""
 
 _PANEL_VALUES = 4
 """An axis of more values is drawn as an axis; one of fewer gets a panel for each value."""
@@ -102,7 +106,7 @@ def title(dataset: xr.Dataset, panel: dict[str, int]) -> str:
 
 def heading(dataset: xr.Dataset) -> str:
     """The dataset's title and its constant parameters."""
-    return f"{dataset.attrs.get('title', '')}\n{labels.constants(dataset)}".strip()
+    return f"{dataset.attrs.get('title', '')}\n{fill(labels.constants(dataset), _HEADING)}".strip()
 
 
 def best_shape(dataset: xr.Dataset) -> float | None:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sweep.grid import Array
-from sweep.models.rocking import slower_period
+from sweep.models import solid
 from sweep.parameters import PARAMETERS
 from sweep.plots import labels, legends, theory
 from sweep.plots.panels import heading
@@ -156,8 +156,8 @@ def reversal_times(one: xr.Dataset) -> Array:
         return np.array([])
     good = np.isfinite(one["time"].values)
     time, spin = one["time"].values[good], one["ripple_free_spin"].values[good]
-    columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "delta")}
-    tau = float(slower_period(columns)[0])
+    columns = {name: np.atleast_1d(one[name].values) for name in solid.PARAMETERS if name in one}
+    tau = float(solid.slower_period(columns)[0])
     total = np.concatenate([[0], np.cumsum(np.diff(time) * (spin[1:] + spin[:-1]) / 2)])
     ends = np.arange(0, time[-1], tau)
     means = np.diff(np.interp(ends, time, total)) / tau
@@ -168,7 +168,8 @@ def reversal_times(one: xr.Dataset) -> Array:
 def _label(dataset: xr.Dataset, i: int) -> str:
     """The parameters that set this trajectory apart from the others, and its number of reversals."""
     varying = [name for name in PARAMETERS if name in dataset and len(set(np.ravel(dataset[name].values))) > 1]
-    named = ", ".join(labels.value(name, float(np.ravel(dataset[name].values)[i])) for name in varying or ["n0"])
+    names = varying or [name for name in ("n0", "omega3") if name in dataset]
+    named = ", ".join(labels.value(name, float(np.ravel(dataset[name].values)[i])) for name in names)
     return f"{named}: {int(dataset['reversals'][i])} reversals" if "reversals" in dataset else named
 
 

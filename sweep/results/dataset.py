@@ -15,9 +15,9 @@ from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
-from sweep.parameters import PARAMETERS
+from sweep.models.scene import PAPER, SI
 from sweep.prediction import Prediction
-from sweep.variables import Variable
+from sweep.variables import Variable, in_si
 
 STATUSES = {
     0: "not_run",
@@ -111,7 +111,7 @@ def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, A
 
 def predicted(prediction: Prediction) -> dict[str, Array]:
     """The predicted variables, each over the cells or over the bodies."""
-    result = {"form_factor": prediction.form_factor}
+    result = {} if prediction.form_factor is None else {"form_factor": prediction.form_factor}
     if formulas := prediction.formulas:
         plus, minus = formulas.n_c1
         result["reversals_predicted"] = formulas.reversals
@@ -128,20 +128,18 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     The cells may lie along one dimension, in C order, or along those of the grid.
     """
     variables = {
-        name: xr.Variable(dims(over, spec), shaped(over, spec, arrays[name]), described(spec))
+        name: xr.Variable(dims(over, spec), shaped(over, spec, arrays[name]), described(spec, config.units))
         for name, (over, spec) in layout(grid, arrays).items()
     }
-    coordinates = {
-        name: xr.Variable((name,), values, _parameter_attributes(name)) for name, values in grid.axes.items()
-    }
+    coordinates = {name: xr.Variable((name,), values, config.described(name)) for name, values in grid.axes.items()}
     coordinates |= numbers_along({name: np.shape(values) for name, values in arrays.items()})
     for name, column in (grid.cases or {}).items():
-        coordinates[name] = xr.Variable(("case",), column, _parameter_attributes(name))
+        coordinates[name] = xr.Variable(("case",), column, config.described(name))
     if grid.cases is not None:
         index = np.arange(grid.size, dtype="int64")
         coordinates["case"] = xr.Variable(("case",), index, {"long_name": "row of the table of cases", "units": "1"})
     for name, value in grid.constants.items():
-        coordinates[name] = xr.Variable((), value, _parameter_attributes(name))
+        coordinates[name] = xr.Variable((), value, config.described(name))
     head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals of a rattleback ({config.model} model)"}
     return xr.Dataset(variables, coordinates, {**head, **attributes})
 
@@ -191,11 +189,11 @@ def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, A
     return whole
 
 
-def beside(result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
+def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
     """`result`, with the results of a second run of some cells (`again`) along the dimension `verified`."""
     variables = {
         f"verified_{name}": xr.Variable(
-            "verified", np.asarray(again[f"verified_{name}"]).astype(spec.dtype), described(spec)
+            "verified", np.asarray(again[f"verified_{name}"]).astype(spec.dtype), described(spec, config.units)
         )
         for name, spec in {"cell": _VERIFIED_CELL, **VERIFIED}.items()
         if f"verified_{name}" in again
@@ -208,14 +206,11 @@ def beside(result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
     return result
 
 
-def described(spec: Variable) -> dict[str, Any]:
-    """The CF attributes of a variable."""
-    words: dict[str, Any] = {"long_name": spec.long_name, "units": spec.units}
+def described(spec: Variable, system: str = PAPER) -> dict[str, Any]:
+    """The CF attributes of a variable in a system of units."""
+    units, long_name = in_si(spec.units, spec.long_name) if system == SI else (spec.units, spec.long_name)
+    words: dict[str, Any] = {"long_name": long_name, "units": units}
     if spec.flags:
         words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
         words["flag_meanings"] = " ".join(spec.flags.values())
     return words
-
-
-def _parameter_attributes(name: str) -> dict[str, str]:
-    return {"long_name": PARAMETERS[name].long_name, "units": PARAMETERS[name].units}

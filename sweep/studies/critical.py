@@ -13,7 +13,6 @@ from sweep.config import Config, ConfigError, Values
 from sweep.engine.reporter import Reporter
 from sweep.grid import Array, Grid
 from sweep.jit import fingerprint
-from sweep.models import MODELS
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset, netcdf
@@ -159,6 +158,8 @@ def _searchable(config: Config) -> Config:
     stepwise(config)  # raises if there is nothing to simulate
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
         raise ConfigError([config.fault(("start", beyond[0]), "an axis; allowed: a number")])
+    if "n0" not in config.tier.parameters:
+        raise ConfigError([config.fault(("start",), "angles and angular velocity; allowed: x0 and y0")])
     parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
     return replace(config, parameters=parameters, cases=cases or None)
@@ -180,7 +181,7 @@ def _search(config: Config, width: float, store: Store, reporter: Reporter) -> x
     if store.done or store.load_running():
         reporter.note(f"resuming an earlier search, which finished {len(store.done)} rounds of simulations")
     grid = Grid.of(config)
-    prediction = predict(MODELS[config.model], grid)
+    prediction = predict(config.equations, grid)
     arrays: dict[str, Array] = dict(dataset.predicted(prediction))
     arrays.pop("reversals_predicted", None)
     reasons = np.full((2, 2, grid.size), NO_FRICTION)
@@ -209,10 +210,9 @@ def _search(config: Config, width: float, store: Store, reporter: Reporter) -> x
 
 def _decays_at_rest(prediction: Prediction, grid: Grid) -> Array:
     """Whether friction makes the rattle of each body decay, so that there may be critical spins."""
-    if prediction.formulas is None:
-        return np.zeros(grid.size, bool)
     assert prediction.stability is not None  # it is a model
-    return np.asarray((grid.columns()["mu"] > 0) & ~np.isnan(prediction.stability.n_c1[0]))
+    resisted = grid.columns()["mu"] > 0 if prediction.formulas else True
+    return np.asarray(resisted & ~np.isnan(prediction.stability.n_c1[0]))
 
 
 @dataclass(frozen=True)
@@ -234,12 +234,12 @@ class _Group:
 
         The axes are inner and outer end, positive and negative side, cells.
         """
-        assert self.prediction.formulas is not None
         assert self.prediction.stability is not None
         cells, width = self.cells, self.width
         bodies = {name: np.tile(values[cells], 2) for name, values in self.grid.columns().items()}
         sign = np.repeat([1.0, -1.0], len(cells))
-        uncoupled = np.isnan(self.prediction.formulas.n_c1[0][np.tile(cells, 2)])
+        formulas = self.prediction.formulas
+        uncoupled = np.isnan(formulas.n_c1[0][np.tile(cells, 2)]) if formulas else np.zeros(2 * len(cells), bool)
         linear = np.abs(np.concatenate([n_c1[cells] for n_c1 in self.prediction.stability.n_c1]))
         stable = np.tile(self.prediction.stability.ranges[:, cells], 2)
 

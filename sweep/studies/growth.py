@@ -20,7 +20,6 @@ from sweep.kernels.status import TIME_LIMIT
 from sweep.kernels.tableau import DOPRI5
 from sweep.models.linear import jacobian
 from sweep.models.model import Columns, Model, stack
-from sweep.models.rocking import slower_period
 from sweep.models.stability import SPIN_LIMIT
 from sweep.studies.bracket import FAILED, HAPPENS, NOT_YET, Bracket, Question, search
 from sweep.studies.rounds import Batch, Rounds, Simulations
@@ -75,7 +74,8 @@ def find_n_c1(
 
     decay = -growth(np.arange(len(sign)), np.zeros(len(sign)))
     begin = np.fmax(_BELOW_ALL * decay, 1e-12)
-    return search(ask, begin, SPIN_LIMIT, width, expected, precisely=True, settled=settled)
+    limit = SPIN_LIMIT * float(part.kernel.model.spin_unit(bodies).max())
+    return search(ask, begin, limit, width, expected, precisely=True, settled=settled)
 
 
 def simulated_growth(kernel: Kernel, bodies: Columns, spin: Array, rounds: Rounds) -> Array:
@@ -124,7 +124,7 @@ def _duration_and_step(model: Model, columns: Columns) -> tuple[Array, Array]:
     growth = np.abs(values.real.max(axis=-1))
     leading = -values.real <= np.maximum(np.abs(values.imag), 4 * growth[:, None])
     with np.errstate(divide="ignore"):
-        duration = np.minimum(slower_period(columns), _GROWTH / growth)
+        duration = np.minimum(model.slower_period(columns), _GROWTH / growth)
         accurate = _RADIANS / np.where(leading, np.abs(values), 0.0).max(axis=-1)
         stable = _STABILITY_SHARE * DOPRI5.real_stability / np.abs(values).max(axis=-1)
     return duration, np.minimum(np.minimum(accurate, stable), duration)

@@ -9,7 +9,6 @@ import xarray as xr
 from sweep import prediction
 from sweep.config import ConfigLike, load_config
 from sweep.grid import Grid
-from sweep.models import TIERS
 from sweep.results import dataset
 
 
@@ -28,4 +27,4 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """
     config = load_config(config, overrides)
     grid = Grid.of(config)
-    return dataset.label(config, grid, dataset.predicted(prediction.predict(TIERS[config.model], grid)), {})
+    return dataset.label(config, grid, dataset.predicted(prediction.predict(config.tier, grid)), {})

@@ -17,7 +17,7 @@ from sweep.kernels import methods
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import AUTO, METHODS, allowed
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
-from sweep.models import MODELS, linear
+from sweep.models import linear
 from sweep.models.model import Columns
 from sweep.models.stability import SPIN_LIMIT
 from sweep.studies.bracket import FAILED, HAPPENS, NOT_YET, UNDECIDED, Bracket, Question, search
@@ -97,7 +97,7 @@ def find_n_c2(
 
 def body_seconds(config: Config, bodies: Columns) -> tuple[float, float]:
     """Rough time to find n_c2 of both signs for a body like these, one of many: as a rule, and at most."""
-    model, integrator = MODELS[config.model], config.integrator
+    model, integrator = config.equations, config.integrator
     decay = -linear.growth_rate(model, model.constants.of(bodies), np.zeros(len(bodies["a"])))
     bodies, decay = {name: values[decay > 0] for name, values in bodies.items()}, decay[decay > 0]
     if not len(decay):
@@ -134,7 +134,7 @@ class _Trajectories:
 
     def cells(self) -> dict[str, Array]:
         """Indices of the simulations that each method runs."""
-        model, integrator = MODELS[self.config.model], self.config.integrator
+        model, integrator = self.config.equations, self.config.integrator
         chosen, *_ = methods.cheapest(model, self.columns, self.tolerance, integrator.t_end)
         if integrator.method != AUTO:
             named = self.exact | (integrator.step != "auto")
@@ -143,7 +143,7 @@ class _Trajectories:
 
     def start(self) -> Batch:
         """The trajectories at t = 0."""
-        model, integrator, batch = MODELS[self.config.model], self.config.integrator, {}
+        model, integrator, batch = self.config.equations, self.config.integrator, {}
         for method, cells in self.cells().items():
             theirs = {name: values[cells] for name, values in self.columns.items()}
             if integrator.step == "auto":

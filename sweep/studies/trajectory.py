@@ -14,6 +14,7 @@ import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
 from sweep.config.faults import suggestion
+from sweep.config.scenes import impossible
 from sweep.config.schema import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS
@@ -26,7 +27,6 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import RUNNING
-from sweep.models import MODELS, TIERS
 from sweep.models.linear import fastest_motion
 from sweep.models.model import Columns, Model, Tier
 from sweep.parameters import PARAMETERS
@@ -34,6 +34,7 @@ from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.rounds import Simulations
 from sweep.studies.stepwise import stepwise
+from sweep.variables import Variable
 
 SAMPLES_A_RADIAN = 3
 """Samples per radian of the fastest motion: nearly twenty per period."""
@@ -52,6 +53,8 @@ _UNTIL_ALL_STOP = 2**40
 
 MAX_TRAJECTORIES = 1000
 """Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
+
+_TIME = ("1", "time, in sqrt(c/g)")
 
 # name: units, long_name
 SERIES: dict[str, tuple[str, str]] = {
@@ -128,19 +131,19 @@ def trajectory(
     series = [_series(part.kernel, *found) for found in _sample(part.kernel, marks, part.images, interval)]
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(job.grid.size), {"units": "1", "long_name": "number of the trajectory"})
-    return flat.assign_coords(trajectory=index).assign(_side_by_side(series))
+    return flat.assign_coords(trajectory=index).assign(_side_by_side(series, chosen.units))
 
 
-def _side_by_side(series: list[dict[str, Array]]) -> xr.Dataset:
+def _side_by_side(series: list[dict[str, Array]], system: str) -> xr.Dataset:
     """The series of all trajectories over (trajectory, time), NaN after the end of each."""
     times = max((one["time"] for one in series), key=len)
-    found: dict[str, Any] = {"time": ("time", times, {"units": "1", "long_name": "time, in sqrt(c/g)"})}
+    known = {name: Variable("float64", *words) for name, words in {"time": _TIME, **SERIES}.items()}
+    found: dict[str, Any] = {"time": ("time", times, dataset.described(known["time"], system))}
     for name in filter(SERIES.__contains__, series[0]):
-        units, words = SERIES[name]
         padded = np.full((len(series), len(times)), np.nan)
         for row, one in zip(padded, series, strict=True):
             row[: len(one[name])] = one[name]
-        found[name] = (("trajectory", "time"), padded, {"units": units, "long_name": words})
+        found[name] = (("trajectory", "time"), padded, dataset.described(known[name], system))
     return xr.Dataset(found)
 
 
@@ -148,7 +151,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
     """Trajectories, steps, samples and time, a line each; parameters and errors as of `trajectory`."""
     chosen = choose(config, at)
     columns, integrator = Grid.of(chosen).columns(), chosen.integrator
-    model, step = MODELS[chosen.model], integrator.step
+    model, step = chosen.equations, integrator.step
     steps = np.full(len(columns["a"]), integrator.t_end)
     steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
     samples = (integrator.t_end / _intervals(model, columns)).sum()
@@ -168,7 +171,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
 def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
     config = stepwise(load_config(config))
-    wanted = _numbers(TIERS[config.model], at)
+    wanted = _numbers(config.tier, at)
     if (count := prod(map(len, wanted.values()))) > MAX_TRAJECTORIES:
         raise ConfigError([Fault("", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
@@ -177,7 +180,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     cells = [dict(zip(wanted, values, strict=True)) for values in product(*wanted.values())]
     cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)
-    if beyond := off_the_body(chosen):
+    if beyond := impossible(chosen) or off_the_body(chosen):
         raise ConfigError([Fault("", None, None, (), beyond)])
     return chosen
 

@@ -28,7 +28,7 @@ def change(old: str, new: str) -> str:
 # ruff: noqa: E501  (a table)
 # name: (configuration, line of the fault, path, part of what is said)
 BROKEN: dict[str, tuple[str, int, str, str]] = {
-    "unknown key": (SMALL + "speed: 3\n", 6, "speed", "unknown key; allowed: name, model,"),
+    "unknown key": (SMALL + "colour: 3\n", 6, "colour", "unknown key; allowed: name, model,"),
     "unknown key in a section": (change("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); allowed: a, b, c, delta"),
     "duplicate key": (SMALL + "name: again\n", 6, "name", "duplicate key, first on line 1"),
     "duplicate key in a section": (change("mu: [40, 60]", "mu: 40, mu: 60"), 3, "friction.mu", "first on line 3"),
@@ -59,7 +59,7 @@ BROKEN: dict[str, tuple[str, int, str, str]] = {
     "measure twice": (SMALL + "measure: [reversals, reversals]\n", 6, "measure", "each once"),
     "impossible share": (SMALL + "max_failed_fraction: 2\n", 6, "max_failed_fraction", "2; allowed: a finite number >= 0 and <= 1"),
     "a name that leaves the folder": (change("name: small", "name: ../small"), 1, "name", "'../small'; allowed: up to 100 of A-Z"),
-    "a section that is none": (change("{mu: [40, 60]}", "40"), 3, "friction", "40; allowed: a section with mu"),
+    "a section that is none": (change("{mu: [40, 60]}", "40"), 3, "friction", "40; allowed: a section with law, regularisation, mu"),
     "no such table": (SMALL + "cases: nowhere.csv\n", 6, "cases", "no such file"),
     "broken YAML": (change("[40, 60]", "[40, 60"), 3, "", "not YAML"),
     "a tag": (change("10.0", "!!python/name:os.system 1"), 2, "body.a", "a YAML tag or anchor; allowed: plain values"),
@@ -115,7 +115,7 @@ def test_missing_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("setting", "said"),
     [("friction.mu=-1", "--set friction.mu: -1 is out of bounds"), ("mu", "allowed: PATH=VALUE"),
-     ("friction.nu=3", "allowed: mu"), ("friction.mu=[", "not YAML"), ("name.first=3", "not a section")],
+     ("friction.nu=3", "allowed: law, regularisation, mu"), ("friction.mu=[", "not YAML"), ("name.first=3", "not a section")],
 )  # fmt: skip
 def test_broken_setting(setting: str, said: str, write: Write) -> None:
     result = CliRunner().invoke(main, ["run", str(write()), "--set", setting])

@@ -11,7 +11,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement
-from sweep.models.model import SPIN, Array, Columns
+from sweep.models.model import SPIN, Array, Columns, Model
 from sweep.variables import Variable
 
 
@@ -29,7 +29,7 @@ class FirstReversal(Measurement):
         )
     }
 
-    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         return {"first_reversal": np.nan}
 
     def make_at_reversal(self, layout: Layout) -> Any:

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from sweep.kernels.layout import Layout, Table
-from sweep.models.model import Array, Columns
+from sweep.models.model import Array, Columns, Model
 from sweep.variables import Variable
 
 
@@ -97,11 +97,12 @@ class Measurement:
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
         return bool(self.rows) or own or self.follows_work or self.follows_ripple
 
-    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.
 
         Parameters
         ----------
+        model : the model of the kernel
         columns : physical parameters by name, each of shape (cells,)
         step : length of the steps, shape (cells,)
         rattle : energy of the rattle at t = 0, shape (cells,)

@@ -24,7 +24,7 @@ from sweep.kernels.measures.measurement import Measurement, Stretch
 from sweep.kernels.stability import growth_rates
 from sweep.models import friction, linear, slip
 from sweep.models.coefficients import coefficients, normal_coordinates
-from sweep.models.model import MODES, Array, Columns, stack
+from sweep.models.model import MODES, Array, Columns, Model, stack
 from sweep.variables import Variable
 
 # Ratio of amplitudes below which a mode counts as round-off of the other.
@@ -66,7 +66,7 @@ class NoiseLimited(Measurement):
         )
     }
 
-    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         shares = _shares(columns)
         logs = [0.5 * np.log(np.maximum(share * rattle, _ZERO)) for share in shares]
         rates = growth_coefficients(columns).reshape(len(_RATES), -1)

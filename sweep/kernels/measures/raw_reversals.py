@@ -9,7 +9,7 @@ from typing import Any
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
-from sweep.models.model import COUNT, Array, Columns
+from sweep.models.model import COUNT, Array, Columns, Model
 from sweep.variables import Variable
 
 
@@ -24,8 +24,9 @@ class RawReversals(Measurement):
         "raw_reversals": Variable("int16", "1", "sign changes of the spin, ripple included", of_sound_runs=True)
     }
 
-    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
-        return {"earlier_spin": columns["n0"]}
+    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+        spin, _, _ = model.energy(model.start(columns), model.constants.of(columns))
+        return {"earlier_spin": spin}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
         COUNT, EARLIER = map(layout.at, self.rows)

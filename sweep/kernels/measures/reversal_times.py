@@ -15,7 +15,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement
-from sweep.models.model import SPIN, Array, Columns
+from sweep.models.model import SPIN, Array, Columns, Model
 from sweep.variables import Variable
 
 LATEST = ("newest_reversal", "second_newest_reversal", "third_newest_reversal")
@@ -50,7 +50,7 @@ class ReversalTimes(Measurement):
     def spec(self) -> str:
         return f"{self.name}={self.count}"
 
-    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         return dict.fromkeys((*LATEST, *self.times), np.nan)
 
     def make_at_reversal(self, layout: Layout) -> Any:

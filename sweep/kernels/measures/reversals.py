@@ -19,8 +19,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
-from sweep.models.model import COUNT, Array, Columns
-from sweep.models.rocking import slower_period
+from sweep.models.model import COUNT, Array, Columns, Model
 from sweep.variables import Variable
 
 
@@ -49,8 +48,8 @@ class Reversals(Measurement):
         ),
     }  # fmt: skip
 
-    def start(self, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
-        return {"period": slower_period(columns), "shifted": 1.0, "last_reversal": np.nan}
+    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+        return {"period": model.slower_period(columns), "shifted": 1.0, "last_reversal": np.nan}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
         PERIOD, PHASE, HALF, EARLIER, SHIFTED, CLOSED, CLOSED_SHIFTED, COUNT, COUNT_SHIFTED, LAST = map(

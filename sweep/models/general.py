@@ -1,0 +1,369 @@
+"""Any body and any law of friction: the equations of `slip` and `noslip` for a `sweep.models.solid`.
+
+A model of this file is a *variant* of `slip` or `noslip`, specialised for a law of friction and for couples, whose
+names make up its own: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`.  What a variant does not name leaves no
+instruction in its kernel.  The states are those of `slip` and `noslip`, in the axes of the ellipsoid.  All forces are
+per unit mass: R is the acceleration N/m by the normal force.
+
+With slip.  Gravity, the contact force R (u + f) with f = -k v_p, and the couple τ0 + R τ1 give
+
+    v_g' + ω × v_g = R (u + f) - g u,   v_g = v_p + v_0,   v_0 = x_p × ω,
+    J ω' = x_p × R (u + f) + τ0 + R τ1 - ω × J ω.
+
+So ω' = α + R β with α = J⁻¹ (τ0 - ω × J ω) and β = J⁻¹ (x_p × (u + f) + τ1), and
+
+    v_p' = R (u + f) - g u - x_p × ω' - ω × (v_p + v_0 - x_p').
+
+The contact point stays in the plane, v_p · u = 0.  With u' = u × ω the derivative of that is v_p' · u =
+-u · (ω × v_p), which cancels the same term on the right.  With q = u × x_p,
+
+    R = (g + (v_0 - x_p') · u' + q · α) / (1 - q · β).
+
+Without slip.  v_g = v_0, and the contact force is g u + v_g' + ω × v_g whatever it has to be.  Its torque gives
+
+    (J + |x_p|² - x_p x_pᵀ) ω' = x_p × (g u + ω × (v_0 - x_p')) + τ0 + R τ1 - ω × J ω,
+    R = g + u · (ω × (v_0 - x_p')) + q · ω'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models import noslip, slip, solid, starts, steady
+from sweep.models.couples import COUPLES, Couple, nothing
+from sweep.models.laws import LAWS, Law
+from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, Ripple, named
+from sweep.models.solid import contact, gyroscopic
+
+BASES = ("slip", "noslip")
+
+SOLID = "solid"
+"""Stands in place of the law in the names of variants without slip."""
+
+
+@cache
+def variant(name: str, parameters: tuple[str, ...] = ()) -> Model:
+    """The model of a name, such as `slip+coulomb-tanh+sigma`.
+
+    Parameters
+    ----------
+    parameters : those of the body and the start that it is asked to depend on; they make no difference to its kernel
+
+    Raises
+    ------
+    KeyError
+        if a part of the name is unknown.
+    """
+    base, law, *couples = name.split("+")
+    resisting = [COUPLES[couple] for couple in couples]
+    if base == "slip":
+        return _slipping(name, LAWS[law], resisting, parameters)
+    if (base, law) == ("noslip", SOLID):
+        return _rolling(name, resisting, parameters)
+    raise KeyError(name)
+
+
+def name_of(base: str, law: str, couples: Sequence[str]) -> str:
+    """The name of a variant; of a model without slip whatever the law is."""
+    return "+".join([base, law if base == "slip" else SOLID, *couples])
+
+
+def _record(constants: Sequence[str], more: Any) -> type[Any]:
+    """The constants of a variant: shape, inertia, its inverse, and `more`, a function of the columns."""
+    inverse = tuple(name.replace("J", "inv_J") for name in solid.INERTIA)
+
+    class Constants(named(*solid.SHAPE, *solid.INERTIA, *inverse, *constants)):  # type: ignore[misc]
+        @classmethod
+        def of(cls, columns: Columns) -> Constants:
+            J = solid.inertia(columns)
+            return cls(*solid.shape(columns), *J, *solid.inverse(J), *more(columns))
+
+    return Constants
+
+
+def _couple_constants(couples: Sequence[Couple]) -> tuple[tuple[str, ...], Any]:
+    names = tuple(name for couple in couples for name in couple.constants)
+    return names, lambda columns: tuple(value for couple in couples for value in couple.of(columns))
+
+
+def _resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
+    """The resistance by itself and the one per unit of the normal force."""
+    found: list[Any] = [nothing, nothing]
+    for couple in couples:
+        found[couple.needs_normal_force] = couple.resistance
+    return found[0], found[1]
+
+
+def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[str, ...]) -> Model:
+    resistance, (plain, loaded) = law.resistance, _resistances(couples)
+    names, values = _couple_constants(couples)
+
+    @inline
+    def rhs(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3, v1, v2 = y
+        (u3, inv_u3), (x, y_, z), (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
+
+        v3 = -(v1 * u1 + v2 * u2) * inv_u3
+        slip_square = v1 * v1 + v2 * v2 + v3 * v3
+        k = resistance(slip_square, p)
+        # f = u - k v, the contact force per unit of R
+        f1, f2, f3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
+        # s = v_0 - x_p'
+        s1, s2, s3 = y_ * w3 - z * w2 - dx, z * w1 - x * w3 - dy, x * w2 - y_ * w1 - dz
+        q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
+        turn_square = w1 * w1 + w2 * w2 + w3 * w3
+        k0, k1 = plain(turn_square, p), loaded(turn_square, p)
+        m1, m2, m3 = gyroscopic(w1, w2, w3, p)
+        m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
+        al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
+        al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
+        al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
+        t1, t2, t3 = y_ * f3 - z * f2 - k1 * w1, z * f1 - x * f3 - k1 * w2, x * f2 - y_ * f1 - k1 * w3
+        be1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
+        be2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
+        be3 = p.inv_J13 * t1 + p.inv_J23 * t2 + p.inv_J33 * t3
+
+        denominator = 1.0 - (q1 * be1 + q2 * be2 + q3 * be3)
+        R = (p.g + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)) / denominator
+
+        dw1, dw2, dw3 = al1 + R * be1, al2 + R * be2, al3 + R * be3
+        s1, s2, s3 = s1 + v1, s2 + v2, s3 + v3
+        dv1 = R * f1 - p.g * u1 - (y_ * dw3 - z * dw2) - (w2 * s3 - w3 * s2)
+        dv2 = R * f2 - p.g * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
+
+        spin = u1 * w1 + u2 * w2 + u3 * w3
+        power = R * (k * slip_square + k1 * turn_square) + k0 * turn_square
+        return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, power, R, denominator)
+
+    @inline
+    def energy(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3, v1, v2 = y
+        return solid.energy(u1, u2, w1, w2, w3, v1, v2, p)
+
+    def observe(y: Array, p: Any) -> dict[str, Array]:
+        return {**_seen(rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
+
+    def fastest_decay(columns: Columns) -> Array:
+        return np.asarray(law.strongest(columns) * strongest_grip(columns) + _couples_decay(couples, columns))
+
+    def more(columns: Columns) -> tuple[Array, ...]:
+        faint = () if law.linear_to is None else (_faint(law.linear_to(columns), columns),)
+        return (*(columns[each] for each in law.parameters), *values(columns), *faint)
+
+    fields = (*law.parameters, *names, *(() if law.linear_to is None else ("faint",)))
+    return Model(
+        name=name,
+        summary=f"{slip.MODEL.summary}, for any body",
+        states=slip.MODEL.states,
+        spin_state=slip.MODEL.spin_state,
+        parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
+        offers=_offers(couples, dissipates=True),
+        constants=_record(fields, more),
+        start=starts.slipping,
+        slower_period=solid.slower_period,
+        fastest_decay=fastest_decay,
+        upright=slip.MODEL.upright,
+        rhs=rhs,
+        energy=energy,
+        ripple=Ripple(steady.NAMES, steady.form, steady.slipping),
+        tilt=slip.MODEL.tilt,
+        observe=observe,
+        spin_unit=solid.spin_unit,
+        faint="" if law.linear_to is None else "faint",
+        extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
+    )
+
+
+def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) -> Model:
+    plain, loaded = _resistances(couples)
+    names, values = _couple_constants(couples)
+
+    @inline
+    def rhs(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3 = y
+        (u3, _), (x, y_, z), (du1, du2, _), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
+        # s = v_0 - x_p', and h = g u + ω × s
+        s1, s2, s3 = y_ * w3 - z * w2 - dx, z * w1 - x * w3 - dy, x * w2 - y_ * w1 - dz
+        c1, c2, c3 = w2 * s3 - w3 * s2, w3 * s1 - w1 * s3, w1 * s2 - w2 * s1
+        h1, h2, h3 = p.g * u1 + c1, p.g * u2 + c2, p.g * u3 + c3
+        turn_square = w1 * w1 + w2 * w2 + w3 * w3
+        k0, k1 = plain(turn_square, p), loaded(turn_square, p)
+        m1, m2, m3 = gyroscopic(w1, w2, w3, p)
+        t1 = m1 + y_ * h3 - z * h2 - k0 * w1
+        t2 = m2 + z * h1 - x * h3 - k0 * w2
+        t3 = m3 + x * h2 - y_ * h1 - k0 * w3
+
+        # P = J + |x_p|² - x_p x_pᵀ, and the adjugate C of it
+        P11, P22, P33 = p.J11 + y_ * y_ + z * z, p.J22 + z * z + x * x, p.J33 + x * x + y_ * y_
+        P12, P13, P23 = p.J12 - x * y_, p.J13 - x * z, p.J23 - y_ * z
+        C11, C22, C33 = P22 * P33 - P23 * P23, P11 * P33 - P13 * P13, P11 * P22 - P12 * P12
+        C12, C13, C23 = P13 * P23 - P12 * P33, P12 * P23 - P13 * P22, P12 * P13 - P11 * P23
+        inv = 1.0 / (P11 * C11 + P12 * C12 + P13 * C13)
+        # ω' = a - R k1 b
+        a1 = inv * (C11 * t1 + C12 * t2 + C13 * t3)
+        a2 = inv * (C12 * t1 + C22 * t2 + C23 * t3)
+        a3 = inv * (C13 * t1 + C23 * t2 + C33 * t3)
+        b1 = inv * (C11 * w1 + C12 * w2 + C13 * w3)
+        b2 = inv * (C12 * w1 + C22 * w2 + C23 * w3)
+        b3 = inv * (C13 * w1 + C23 * w2 + C33 * w3)
+
+        q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
+        denominator = 1.0 + k1 * (q1 * b1 + q2 * b2 + q3 * b3)
+        R = (p.g + (u1 * c1 + u2 * c2 + u3 * c3) + (q1 * a1 + q2 * a2 + q3 * a3)) / denominator
+        load = R * k1
+        spin = u1 * w1 + u2 * w2 + u3 * w3
+        power = (load + k0) * turn_square
+        return (du1, du2, a1 - load * b1, a2 - load * b2, a3 - load * b3), (spin, power, R, denominator)
+
+    @inline
+    def energy(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3 = y
+        return solid.energy(u1, u2, w1, w2, w3, 0.0, 0.0, p)
+
+    return Model(
+        name=name,
+        summary=f"{noslip.MODEL.summary}, for any body",
+        states=noslip.MODEL.states,
+        spin_state=noslip.MODEL.spin_state,
+        parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
+        offers=_offers(couples, dissipates=bool(couples)),
+        constants=_record(names, values),
+        start=starts.rolling,
+        slower_period=solid.slower_period,
+        fastest_decay=lambda columns: _couples_decay(couples, columns),
+        upright=noslip.MODEL.upright,
+        rhs=rhs,
+        energy=energy,
+        tilt=noslip.MODEL.tilt,
+        radians_a_step=noslip.MODEL.radians_a_step,
+        ripple=Ripple(steady.NAMES, steady.form, steady.rolling),
+        observe=lambda y, p: _seen(rhs, y, p),
+        spin_unit=solid.spin_unit,
+    )
+
+
+def _offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
+    """A couple that is not linear has no Jacobian that is quadratic in the spin, which the linear theory needs."""
+    theory = {LINEAR} if dissipates and all(couple.linear for couple in couples) else set()
+    return frozenset({COUNT, SPIN, ENERGY} | theory)
+
+
+def _faint(speed: Array, columns: Columns) -> Array:
+    """Energy of a rattle whose slip velocity is below `speed`, per unit mass, shape (cells,).
+
+    With ω = n u + o the slip v_p = v_g - x_p × o - n x_p × u is at most sqrt(2 E G) + |n| ρ.  G is the largest
+    eigenvalue of 1 - [x_p] J⁻¹ [x_p], and ρ <= (a²/c) sqrt(2 E / (g k)) the distance of the contact point from the
+    vertical through G, with the stiffness k.  Spins up to sqrt(g/c) are allowed for.
+    """
+    c, g = columns["c"], solid.gravity(columns)
+    inverse = np.linalg.eigvalsh(solid.matrix(solid.inverse(solid.inertia(columns))))[:, -1]
+    grip = 1 + (c - solid.offset(columns)) ** 2 * inverse
+    arm = np.maximum(columns["a"], columns["b"]) ** 2 / c
+    per_root = np.sqrt(2 * grip) + np.sqrt(g / c) * arm * np.sqrt(2 / (g * np.minimum(*solid.stiffness(columns))))
+    return np.asarray((speed / per_root) ** 2)
+
+
+def _seen(rhs: Any, y: Array, p: Any) -> dict[str, Array]:
+    """The contact point and the normal force."""
+    _, point, _, _ = contact(*y[:5], p)
+    _, (_, _, R, _) = rhs(y, p)
+    return {"contact_x": point[0], "contact_y": point[1], "normal_force": R}
+
+
+def _with_and_without(law: Law) -> Any:
+    """As a law that saturates leaves the body free when it slips fast, motions without friction matter as well."""
+
+    def extremes(columns: Columns) -> tuple[Columns, ...]:
+        free = {name: 0 * columns[name] for name in law.parameters if name.startswith("mu")}
+        return columns, {**columns, **free}
+
+    return extremes
+
+
+def _couples_decay(couples: Sequence[Couple], columns: Columns) -> Array:
+    """Bound on the rate at which couples damp the angular velocity, shape (cells,)."""
+    rate = np.zeros_like(columns["a"])
+    for couple in couples:
+        strength = couple.strongest(columns)
+        rate = rate + (strength * _hardest_press(columns) if couple.needs_normal_force else strength)
+    return np.asarray(rate / np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0])
+
+
+def _energy_start(columns: Columns) -> Array:
+    """Energy above rest at the start, per unit mass, shape (cells,)."""
+    J = solid.inertia(columns)
+    y = starts.slipping(columns) if "slip1" in columns else (*starts.rolling(columns), 0.0, 0.0)
+    fields = dict(zip((*solid.SHAPE, *solid.INERTIA), (*solid.shape(columns), *J), strict=True))
+    spin, rattle, inertia = solid.energy(*y, SimpleNamespace(**fields))
+    return np.asarray(rattle + 0.5 * inertia * spin**2)
+
+
+_AZIMUTHS, _SHARES = 12, 9
+
+
+def _attitudes(columns: Columns) -> Iterator[tuple[Array, Array]]:
+    """Attitudes that a body may reach: normals u, shape (cells, 3), with bounds on the normal force R, shape (cells,).
+
+    A body tilts at most until the height of G takes up the whole energy at the start, E0.  If it tilts towards the
+    azimuth ψ at the rate φ', then R - g <= r'' φ'², where r is the height of G at the tilt φ, and
+
+        φ'² <= 2 (E0 - g (r - r0)) / (J_t + r'²),
+
+    where J_t is the least moment of inertia about the axis of tilting, with free spin.
+    """
+    (a2, b2, c2, below, g), J = solid.shape(columns), solid.matrix(solid.inertia(columns))
+    E0, r0 = _energy_start(columns), columns["c"] - below
+    for psi in np.linspace(0, np.pi, _AZIMUTHS, endpoint=False):
+        cos, sin = np.cos(psi), np.sin(psi)
+        flat = a2 * cos**2 + b2 * sin**2
+
+        def height(phi: Array, flat: Array = flat) -> Array:
+            return np.asarray(np.sqrt(flat * np.sin(phi) ** 2 + c2 * np.cos(phi) ** 2) - below * np.cos(phi))
+
+        # The largest tilt that the energy allows, by bisection; heights grow with the tilt, at least at first.
+        low, high = np.zeros_like(E0), np.full_like(E0, 1.5)
+        for _ in range(40):
+            middle = (low + high) / 2
+            within = g * (height(middle) - r0) < E0
+            low, high = np.where(within, middle, low), np.where(within, high, middle)
+        axis = np.array([-sin, cos, 0.0])
+        for share in np.linspace(0, 1, _SHARES):
+            phi, d = high * share, 1e-4
+            r, ahead, behind = height(phi), height(phi + d), height(phi - d)
+            slope, bend = (ahead - behind) / (2 * d), (ahead - 2 * r + behind) / d**2
+            u = np.stack([cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi)], axis=-1)
+            tt, tu, uu = (np.einsum("...i,...ij,...j->...", p, J, q) for p, q in ((axis, axis), (axis, u), (u, u)))
+            square = 2 * np.maximum(E0 - g * (r - r0), 0) / (tt - tu**2 / uu + slope**2)
+            yield u, g + np.maximum(bend, 0) * square
+
+
+def _hardest_press(columns: Columns) -> Array:
+    """Bound on the normal force over the trajectory, per unit mass, shape (cells,)."""
+    return np.asarray(np.max([R for _, R in _attitudes(columns)], axis=0))
+
+
+def strongest_grip(columns: Columns) -> Array:
+    """Bound on the decay rate of the slip per unit of friction's resistance, shape (cells,).
+
+    Friction on a slip v changes it by -R k (1 - [x_p] J⁻¹ [x_p]) v, where [x] is the matrix of x ×.
+    """
+    a2, b2, c2, below, _ = solid.shape(columns)
+    inverse = solid.matrix(solid.inverse(solid.inertia(columns)))
+    A = np.stack([a2, b2, c2], axis=-1)
+    worst = np.zeros_like(a2)
+    for u, R in _attitudes(columns):
+        x_p = -A * u / np.sqrt((A * u * u).sum(axis=-1))[:, None]
+        x_p[:, 2] -= below
+        X = np.cross(np.eye(3), x_p[:, None, :])
+        G = X @ inverse @ np.swapaxes(X, 1, 2)
+        # One eigenvalue is zero, along x_p; the larger of the others follows from the traces of G and G².
+        trace, squares = np.trace(G, axis1=1, axis2=2), (G * G).sum(axis=(1, 2))
+        largest = 0.5 * (trace + np.sqrt(np.maximum(2 * squares - trace**2, 0)))
+        worst = np.maximum(worst, R * (1 + largest))
+    return worst

@@ -1,0 +1,59 @@
+"""Which model runs a configuration: the paper's, or a variant for what the configuration names beyond it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from sweep.models import general, solid, starts
+from sweep.models.couples import COUPLES
+from sweep.models.laws import LAWS
+from sweep.models.model import Tier
+
+PAPER, SI = "paper", "SI"
+"""Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
+
+PAPERS_LAW = "viscous"
+
+PAPERS = frozenset({"a", "b", "c", "delta", "mu", *starts.POINT})
+"""Parameters of the paper's models."""
+
+INERTIA = (*solid.MOMENTS, *solid.PRODUCTS)
+
+
+def is_papers(law: str, units: str, names: Collection[str]) -> bool:
+    """Whether the paper's models know all of a scene: the law of friction, the units, and the parameters `names`."""
+    return law == PAPERS_LAW and units == PAPER and set(names) <= PAPERS
+
+
+def variant(base: str, law: str, units: str, names: Collection[str]) -> Tier:
+    """The variant of `slip` or `noslip` for a scene; its parameters are those that follow from `names`."""
+    moments = INERTIA if set(INERTIA) & set(names) else ("delta",)
+    system = ("mass", "gravity") if units == SI else ()
+    by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
+    start = by_angles if {*starts.ANGLES, *starts.SLIP} & set(names) else starts.POINT
+    couples = [name for name, couple in COUPLES.items() if set(couple.parameters) & set(names)]
+    parameters = ("a", "b", "c", "offset", *moments, *system, *start)
+    return general.variant(general.name_of(base, law, couples), parameters)
+
+
+def strangers(law: str, units: str, names: Collection[str]) -> dict[str, str]:
+    """The parameters that do not belong to a scene, with the reason."""
+    names = set(names)
+    found: dict[str, str] = {}
+    inertia, angles, point = names & set(INERTIA), names & {*starts.ANGLES, *starts.SLIP}, names & set(starts.POINT)
+    if inertia:
+        found |= {"delta": f"beside {_some(inertia)}; allowed: delta or the elements of inertia"}
+    if angles:
+        words = f"beside {_some(angles)}; allowed: {', '.join(starts.POINT)}, or angles, omega1 … omega3 and slip"
+        found |= dict.fromkeys(starts.POINT, words)
+    if units == PAPER:
+        found |= dict.fromkeys(("mass", "gravity"), "with units: paper, in which it is 1; allowed: with units: SI")
+    for other in LAWS.values():
+        foreign = set(other.parameters) - set(LAWS[law].parameters) - {"mu"}
+        words = ", ".join((*LAWS[law].parameters, *(name for couple in COUPLES.values() for name in couple.parameters)))
+        found |= dict.fromkeys(foreign, f"not of the law {law}; allowed: {words}")
+    return {name: words for name, words in found.items() if name in names and (name not in point or angles)}
+
+
+def _some(names: Collection[str]) -> str:
+    return ", ".join(sorted(names))

@@ -1,0 +1,109 @@
+"""Kernels of variants: their trajectories against SciPy's, their energy, and the steps that they take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import newton
+
+import sweep
+from sweep.config import load_config
+from sweep.grid import Grid
+from sweep.models.model import stack
+
+BODY = "{a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}"
+UNIT = np.sqrt(9.81 / 0.02)
+"""sqrt(g/c) in radians per second."""
+
+SLIPPING = f"""\
+units: SI
+gravity: 9.81
+body: {BODY}
+friction: {{law: coulomb, mu: [0.2, 0.5], regularisation: tanh, speed: 0.02, sigma: 1.0e-4}}
+start: {{roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5], slip1: 0.05, slip2: -0.1}}
+integrator: {{t_end: 1.5, step: auto}}
+"""
+ROLLING = f"""\
+model: noslip
+units: SI
+gravity: 9.81
+body: {BODY}
+friction: {{sigma: [0, 1.0e-4]}}
+start: {{roll: 0.5 deg, pitch: 0.5 deg, omega3: [-5, 5]}}
+integrator: {{t_end: 20}}
+measure: [reversals, first_reversal, energy_error]
+"""
+
+
+def run(folder: Path, text: str, **settings: object) -> xr.Dataset:
+    file = folder / "scene.yaml"
+    file.write_text(text, encoding="utf-8")
+    return sweep.run(load_config(file, settings))
+
+
+def test_slipping_and_its_energy_against_an_independent_integrator(tmp_path: Path) -> None:
+    result = run(tmp_path, SLIPPING).stack(cell=("mu", "omega3"))
+    config = load_config(tmp_path / "scene.yaml")
+    columns, model = Grid.of(config).columns(), config.equations
+    assert model.name == "slip+coulomb-tanh+sigma"
+    start = stack(model.start(columns))
+    for i in range(4):
+        parameters = {name: float(values[i]) for name, values in columns.items()}
+        end = newton.follow(start[:, i], parameters, "coulomb-tanh", np.array([0, float(result["t_stop"][i])]))[:, -1]
+        spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
+        assert float(result["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)
+    assert float(result["energy_error"].max()) < 1e-7
+
+
+def test_kane_and_levinson_by_the_kernel(tmp_path: Path) -> None:
+    """The averaged spin reverses within a period of the rattle of the published times."""
+    result = run(tmp_path, ROLLING)
+    published = {(0, -5): 2.855, (1e-4, -5): 2.556, (0, 5): 11.53}
+    for (sigma, omega3), time in published.items():
+        at = result.sel(sigma=sigma, omega3=omega3)
+        assert float(at["t_first_reversal"]) == pytest.approx(time, abs=0.19)
+    assert int(result["reversals"].sel(sigma=1e-4, omega3=5)) == 0
+    assert result["status"].sel(sigma=0).values.tolist() == [2, 2]
+    assert result["status"].sel(sigma=1e-4).values.tolist() == [1, 1]
+    assert float(result["energy_error"].max()) < 1e-7
+
+
+def test_units_of_si_and_of_the_paper_take_the_same_steps(tmp_path: Path) -> None:
+    """The same body in both systems: spins agree to round-off."""
+    c, g = 0.02, 9.81
+    time, moment = float(np.sqrt(c / g)), c**2
+    natural = {"gravity: 9.81\n": "", "units: SI": "units: paper"}
+    text = ROLLING
+    for old, new in natural.items():
+        text = text.replace(old, new)
+    elements = {"Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5}
+    body = {"a": 10.0, "b": 1.5, "c": 1.0, "offset": 0.5} | {name: v / moment for name, v in elements.items()}
+    text = text.replace(BODY, repr(body).replace("'", "")).replace("[0, 1.0e-4]", repr([0, 1e-4 * time / moment]))
+    text = text.replace("[-5, 5]", repr([-5 * time, 5 * time]))
+    si, paper = run(tmp_path, ROLLING, t_end=2.0), run(tmp_path, text, t_end=2.0 / time)
+    np.testing.assert_allclose(si["spin_final"] / UNIT, paper["spin_final"], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(si["step"] / time, paper["step"], rtol=1e-9)
+    assert si["spin_final"].attrs["units"] == "radian s-1"
+    assert paper["spin_final"].attrs["units"] == "1"
+
+
+def test_bodies_that_need_no_variant_are_bit_for_bit_as_they_were(tmp_path: Path) -> None:
+    """Naming the default of what is new changes nothing."""
+    plain = "body: {b: [3, 5]}\nfriction: {mu: 60}\nintegrator: {t_end: 300, method: dopri5}\n"
+    named = plain.replace("{mu: 60}", "{law: viscous, mu: 60}") + "units: paper\n"
+    xr.testing.assert_identical(*(run(tmp_path, text).drop_attrs(deep=False) for text in (plain, named)))
+
+
+def test_a_body_with_the_mass_at_the_centre_is_the_papers(tmp_path: Path) -> None:
+    """As offset → 0 the general equations give the paper's trajectories, by another kernel."""
+    plain = "body: {b: [3, 5]}\nfriction: {mu: 60}\nintegrator: {t_end: 300, method: dopri5}\n"
+    with_offset = plain.replace("b: [3, 5]", "b: [3, 5], offset: 0")
+    paper, general = run(tmp_path, plain), run(tmp_path, with_offset)
+    np.testing.assert_allclose(general["spin_final"], paper["spin_final"], rtol=0, atol=2e-9)
+    np.testing.assert_array_equal(general["reversals"], paper["reversals"])
+    np.testing.assert_allclose(general["t_last_reversal"], paper["t_last_reversal"], rtol=1e-6)
+    np.testing.assert_allclose(general["n_c1_plus_linear"], paper["n_c1_plus_linear"], rtol=1e-9)
+    np.testing.assert_allclose(general["n_c1_minus_linear"], paper["n_c1_minus_linear"], rtol=1e-9)

@@ -1,0 +1,329 @@
+"""Any body and any law of friction, against equations derived another way, and against limits that are known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from support import STANDARD, columns, newton
+
+from sweep.models import find, linear, noslip, rocking, slip, solid, stability, steady
+from sweep.models.general import strongest_grip, variant
+from sweep.models.laws import LAWS, tanh_ratio
+from sweep.models.model import LINEAR, take
+
+BODY = {"a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 0.7, "gravity": 9.81}
+KANE_LEVINSON = BODY | {"mass": 1.0, "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5}
+SKEW = KANE_LEVINSON | {"mass": 0.7, "Ixz": 3e-5, "Iyz": -1e-5}
+FRICTION = {"mu": 0.4, "mu_static": 0.7, "mu_viscous": 0.3, "speed": 0.05, "speed_stick": 0.02}
+COUPLES = {"sigma": 1e-4, "mu_rolling": 0.1, "radius": 0.004, "speed_rolling": 0.5}
+ANGLES = {"roll": np.pi / 360, "pitch": np.pi / 360, "omega1": 0.0, "omega2": 0.0, "omega3": -5.0}
+
+
+def cells(**parameters: Any) -> dict[str, np.ndarray]:
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, float)) for value in parameters.values()))
+    return {name: array.copy() for name, array in zip(parameters, arrays, strict=True)}
+
+
+def one(name: str, parameters: dict[str, Any]) -> tuple[Any, Any]:
+    """A model and its constants for one body, as scalars."""
+    model = find(name)
+    return model, take(model.constants.of(cells(**parameters)), 0)
+
+
+def states(number: int, count: int) -> np.ndarray:
+    """Random states, far from upright."""
+    random = np.random.default_rng(number)
+    tilt, omega = random.uniform(-0.45, 0.45, 2), random.uniform(-6, 6, 3)
+    return np.array([*tilt, *omega, *random.uniform(-0.1, 0.1, 2)])[:count]
+
+
+@pytest.mark.parametrize("couples", ["", "+sigma", "+rolling", "+sigma+rolling"])
+@pytest.mark.parametrize("law", [*LAWS, None])
+def test_the_equations_are_those_of_newton_and_euler(law: str | None, couples: str) -> None:
+    parameters = SKEW | FRICTION | {
+        name: value for name, value in COUPLES.items() if ("sigma" if name == "sigma" else "rolling") in couples
+    }  # fmt: skip
+    model, constants = one(f"slip+{law}{couples}" if law else f"noslip+solid{couples}", parameters)
+    for number in range(30):
+        y = states(number, len(model.states))
+        slopes, (spin, power, force, _) = model.rhs(tuple(y), constants)
+        expected, N, lost = newton.derivative(y, parameters, law)
+        np.testing.assert_allclose(slopes, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+        assert force == pytest.approx(N / parameters["mass"], rel=1e-12)
+        assert power == pytest.approx(lost / parameters["mass"], rel=1e-12)
+        assert spin == pytest.approx(y[2:5] @ [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "name", [*(f"slip+{law}+sigma+rolling" for law in LAWS), "noslip+solid", "noslip+solid+rolling"]
+)
+def test_only_friction_changes_the_energy(name: str) -> None:
+    model, constants = one(name, SKEW | FRICTION | COUPLES)
+    for number in range(20):
+        y = states(number, len(model.states))
+        slopes, (_, power, _, _) = model.rhs(tuple(y), constants)
+        spin, rattle, inertia = model.energy(tuple(y + 1e-30j * np.array(slopes)), constants)
+        change = (rattle + 0.5 * inertia * spin**2).imag / 1e-30
+        scale = np.abs(rattle) + np.abs(spin) ** 2 * inertia
+        assert change == pytest.approx(-power, rel=1e-11, abs=1e-11 * scale * np.abs(slopes).max())
+
+
+def test_the_energy_is_that_of_a_rigid_body() -> None:
+    model, constants = one("slip+viscous", SKEW | FRICTION)
+    for number in range(20):
+        y = states(number, 7)
+        u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
+        x_p, v = newton._contact(u, SKEW), np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
+        v_g, rest = v + np.cross(x_p, y[2:5]), SKEW["c"] - SKEW["offset"]
+        expected = y[2:5] @ newton._inertia(SKEW) @ y[2:5] / 2 / SKEW["mass"] + v_g @ v_g / 2
+        expected += SKEW["gravity"] * (-x_p @ u - rest)
+        spin, rattle, inertia = model.energy(tuple(y), constants)
+        assert rattle + 0.5 * inertia * spin**2 == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["slip", "noslip"])
+def test_the_papers_body_is_a_special_case(name: str) -> None:
+    parameters = STANDARD | {"b": 4.0, "delta": 0.3}
+    paper, general = one(name, parameters), one(f"{name}+{'viscous' if name == 'slip' else 'solid'}", parameters)
+    cos, sin = np.cos(0.3), np.sin(0.3)
+    turn = np.array([[cos, -sin], [sin, cos]])
+
+    def turned(y: np.ndarray) -> np.ndarray:
+        return np.array([*turn @ y[:2], *turn @ y[2:4], y[4], *(turn @ y[5:] if len(y) > 5 else ())])
+
+    start = [np.array(model.start(columns(**parameters)))[:, 0] for model, _ in (paper, general)]
+    np.testing.assert_allclose(turned(start[0]), start[1], rtol=1e-14, atol=1e-17)
+    for number in range(20):
+        y = 0.1 * states(number, len(paper[0].states))
+        (slopes, seen), (others, also) = (
+            model.rhs(tuple(z), constants) for (model, constants), z in ((paper, y), (general, turned(y)))
+        )
+        np.testing.assert_allclose(turned(np.array(slopes)), others, rtol=1e-11, atol=1e-13)
+        np.testing.assert_allclose(seen[:3], also[:3], rtol=1e-11, atol=1e-13)
+
+
+def test_the_papers_ripple_period_and_bounds_are_a_special_case() -> None:
+    body = columns(b=[2.0, 3.0, 5.0, 8.5], delta=[0.03, -0.1, 0.3, 0.2])
+    np.testing.assert_allclose(solid.slower_period(body), rocking.slower_period(body), rtol=1e-12)
+    general = find("slip+viscous")
+    for i in range(4):
+        y = 1e-3 * states(i, 7)
+        cos, sin = np.cos(body["delta"][i]), np.sin(body["delta"][i])
+        turn = np.array([[cos, -sin], [sin, cos]])
+        z = np.array([*turn @ y[:2], *turn @ y[2:4], y[4], *turn @ y[5:]])
+        expected, found = (
+            model.ripple.value(tuple(at), take(model.constants.of(body), i), [k[i] for k in model.ripple.of(body)])
+            for model, at in ((slip.MODEL, y), (general, z))
+        )
+        assert found == pytest.approx(expected, rel=1e-10)
+    ratio = general.fastest_decay(body) / slip.MODEL.fastest_decay(body)
+    assert (ratio > 0.95).all()
+    assert (ratio < 1.3).all()
+
+
+@pytest.mark.parametrize("body", [KANE_LEVINSON, SKEW])
+def test_frequencies_are_those_of_the_equations(body: dict[str, float]) -> None:
+    model, _ = one("noslip+solid", body)
+    values = linear.jacobian(model, model.constants.of(cells(**body)), np.zeros(1))[0]
+    expected = np.unique(np.abs(np.linalg.eigvals(values).imag).round(9))
+    np.testing.assert_allclose(np.ravel(solid.frequencies(cells(**body))), expected[-2:], rtol=1e-8)
+
+
+def test_the_ripple_free_spin_of_a_real_body_hardly_ripples() -> None:
+    """Of a small rolling rattle at n = 0 only terms of higher order are left."""
+    model, constants = one("noslip+solid", KANE_LEVINSON)
+    u, omega = np.array([3e-4, -2e-4]), np.array([4e-3, 1e-3])
+    y = np.array([*u, *omega, u @ omega])
+    times = np.linspace(0, 3 * solid.slower_period(cells(**KANE_LEVINSON))[0], 400)
+    course = newton.follow(y, KANE_LEVINSON, None, times)
+    spin = model.energy(course, constants)[0]
+    steady_spin = spin - model.ripple.value(course, constants, [k[0] for k in steady.form(cells(**KANE_LEVINSON))])
+    trend = [values - np.polyval(np.polyfit(times, values, 3), times) for values in (spin, steady_spin)]
+    assert np.std(trend[1]) < 0.05 * np.std(trend[0])
+
+
+@pytest.mark.parametrize("law", [law for law in LAWS if law != "none"])
+def test_the_bound_on_a_laws_resistance_holds_and_is_near(law: str) -> None:
+    p, x = FRICTION | KANE_LEVINSON, np.linspace(0, 0.3, 30001)
+    force = np.array([newton.LAWS[law](each, p) for each in x])
+    steepest = np.diff(force).max() / x[1]
+    (bound,) = LAWS[law].strongest(cells(**p))
+    assert steepest <= bound * (1 + 1e-9)
+    assert steepest >= 0.7 * bound
+
+
+def test_tanh_to_round_off() -> None:
+    x = np.concatenate([[0.0], np.geomspace(1e-9, 700, 4001)])
+    with np.errstate(invalid="ignore"):
+        expected = np.where(x > 0, np.tanh(x) / x, 1.0)
+    np.testing.assert_allclose(tanh_ratio(x**2), expected, rtol=4e-15)
+
+
+def test_the_slip_decays_no_faster_than_the_bound() -> None:
+    """On random states that the energy at the start allows."""
+    start = {"n0": 4.0, "x0": 0.0, "y0": 0.0}
+    body = cells(**KANE_LEVINSON, **FRICTION, **start)
+    model, grip = find("slip+viscous"), strongest_grip(body)[0]
+    spin, rattle, inertia = model.energy(model.start(body), model.constants.of(body))
+    energy = (rattle + 0.5 * inertia * spin**2)[0]
+    constants, largest, random = take(model.constants.of(body), 0), 0.0, np.random.default_rng(3)
+    for _ in range(4000):
+        y = random.normal(size=7) * [0.1, 0.1, 4, 4, 4, 0, 0]
+        y *= random.uniform()
+        spin, rattle, inertia = model.energy(tuple(y), constants)
+        if rattle + 0.5 * inertia * spin**2 > energy:
+            continue
+        rates = np.zeros((2, 2))
+        for i in (0, 1):
+            at = y.astype(complex)
+            at[5 + i] = 1e-30j
+            rates[:, i] = [each.imag / 1e-30 for each in model.rhs(tuple(at), constants)[0][5:]]
+        largest = max(largest, -np.linalg.eigvals(rates).real.min() / FRICTION["mu"])
+    assert 0.4 * grip < largest <= 1.02 * grip
+
+
+def crossings(sigma: float, omega3: float) -> np.ndarray:
+    """Times in 20 s at which the spin of Kane and Levinson's body vanishes."""
+    parameters = KANE_LEVINSON | ANGLES | {"sigma": sigma, "omega3": omega3}
+    model, constants = one("noslip+solid+sigma", parameters)
+
+    def spin(_: float, y: np.ndarray) -> float:
+        return float(model.energy(tuple(y), constants)[0])
+
+    start = np.array(model.start(cells(**parameters)))[:, 0]
+    solution = solve_ivp(
+        lambda t, y: np.array(model.rhs(tuple(y), constants)[0]),  # noqa: ARG005
+        (0, 15), start, "DOP853", rtol=1e-10, atol=1e-13, events=spin,
+    )  # fmt: skip
+    return np.asarray(solution.t_events[0])
+
+
+@pytest.mark.parametrize(("sigma", "omega3", "time"), [(0, -5, 2.855), (1e-4, -5, 2.556), (0, 5, 11.53)])
+def test_kane_and_levinson_1982(sigma: float, omega3: float, time: float) -> None:
+    """The spin, which ripples, has changed its sign for good at the published time."""
+    found = crossings(sigma, omega3)
+    assert len(found) % 2 == 1
+    assert found[-1] == pytest.approx(time, abs=0.005)
+
+
+def test_with_damping_kane_and_levinsons_body_does_not_reverse_the_other_way() -> None:
+    assert not len(crossings(1e-4, 5))
+
+
+def test_natural_units_and_si_are_the_same() -> None:
+    m, L, g = (KANE_LEVINSON[name] for name in ("mass", "c", "gravity"))
+    T = np.sqrt(L / g)
+    natural = {name: value / L for name, value in KANE_LEVINSON.items() if name in ("a", "b", "c", "offset")}
+    natural |= {name: value / (m * L**2) for name, value in KANE_LEVINSON.items() if name.startswith("I")}
+    natural |= {"mu": 0.4, "speed": 0.05 * T / L, "sigma": 1e-4 * T / (m * L**2)}
+    (one_, p), (other, q) = (
+        one("slip+coulomb-tanh+sigma", given) for given in (KANE_LEVINSON | FRICTION | COUPLES, natural)
+    )
+    units = np.array([1, 1, 1 / T, 1 / T, 1 / T, L / T, L / T])
+    for number in range(10):
+        y = states(number, 7)
+        slopes, _ = one_.rhs(tuple(y), p)
+        others, _ = other.rhs(tuple(y / units), q)
+        np.testing.assert_allclose(np.array(slopes) * T / units, others, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("law", ["viscous", "coulomb-sqrt", "coulomb-tanh", "coulomb-cubic", "stribeck"])
+def test_the_mirror_image_does_the_mirror_image(law: str) -> None:
+    """y → -y: u and v are vectors, ω is a pseudovector."""
+    vector, turning = np.array([1, -1]), np.array([-1, 1, -1])
+    image = np.array([*vector, *turning, *vector])
+    body = SKEW | FRICTION | COUPLES
+    (model, p), (_, q) = (one(f"slip+{law}+sigma+rolling", each) for each in (body, body | {"Ixy": 2e-5, "Iyz": 1e-5}))
+    for number in range(10):
+        y = states(number, 7)
+        np.testing.assert_allclose(
+            image * model.rhs(tuple(y), p)[0], model.rhs(tuple(image * y), q)[0], rtol=1e-12, atol=1e-12
+        )
+
+
+def ends(name: str, parameters: dict[str, Any], time: float) -> np.ndarray:
+    model, constants = one(name, parameters)
+    start = np.array(model.start(cells(**parameters)))[:, 0]
+    solution = solve_ivp(
+        lambda t, y: np.array(model.rhs(tuple(y), constants)[0]),  # noqa: ARG005
+        (0, time), start, "LSODA" if "slip+v" in name else "DOP853", rtol=1e-11, atol=1e-13,
+    )  # fmt: skip
+    return np.asarray(solution.y[:, -1])
+
+
+def test_strong_friction_is_rolling() -> None:
+    """The difference falls as 1/μ."""
+    start = KANE_LEVINSON | ANGLES | {"slip1": 0.0, "slip2": 0.0}
+    rolling = ends("noslip+solid", start, 0.5)
+    off = [np.abs(ends("slip+viscous", start | {"mu": mu}, 0.5)[:5] - rolling).max() for mu in (1e3, 1e4)]
+    assert off[0] / off[1] == pytest.approx(10, rel=0.1)
+
+
+def test_narrower_regularisations_meet_dry_friction() -> None:
+    """A start with slip, which dry friction keeps to its direction at first: its force is μ N at once."""
+    u, v = np.array([0.0, 0.0, -1.0]), 0.1
+    y = (u[0], u[1], 0.0, 0.0, 0.0, v, 0.0)
+    body = KANE_LEVINSON | {"mu": 0.3}
+    dry = newton.derivative(np.array(y), body | {"speed": 1e-30}, "coulomb-tanh")[0]
+    for law, power in (("coulomb-tanh", np.inf), ("coulomb-cubic", np.inf), ("coulomb-sqrt", 2)):
+        off = []
+        for speed in (1e-2, 1e-3):
+            model, constants = one(f"slip+{law}", body | {"speed": speed})
+            off.append(np.abs(np.array(model.rhs(y, constants)[0]) - dry).max())
+        assert off[1] < (1e-12 if power == np.inf else 1.1 * 10**-power * off[0])
+
+
+def test_to_which_variants_the_linear_theory_applies() -> None:
+    for name in ("slip+viscous+sigma", "slip+coulomb-tanh", "noslip+solid+sigma"):
+        assert LINEAR in find(name).offers
+    for name in ("slip+viscous+rolling", "noslip+solid"):
+        assert LINEAR not in find(name).offers
+    assert LINEAR not in noslip.MODEL.offers
+
+
+def test_a_faint_rattle_slips_slowly() -> None:
+    """Of all rattles of that energy none slips faster than the speed up to which the law counts as linear."""
+    body = KANE_LEVINSON | {"mu": 0.5, "speed": 0.01}
+    model, constants = one("slip+coulomb-sqrt", body)
+    random, fastest = np.random.default_rng(5), 0.0
+    for _ in range(3000):
+        y = random.normal(size=7) * [1e-4, 1e-4, 1e-2, 1e-2, 0, 1e-3, 1e-3]
+        u = np.array([y[0], y[1], -1.0])
+        spin = random.uniform(-20, 20)
+        y[4] = (spin - y[:2] @ (y[2:4] + spin * y[:2])) / -1.0
+        y[2:4] += spin * u[:2]
+        rattle = model.energy(tuple(y), constants)[1]
+        fastest = max(fastest, np.hypot(y[5], y[6]) * np.sqrt(constants.faint / rattle))
+    assert 0.03 * 0.1 * body["speed"] < fastest <= 0.1 * body["speed"]
+
+
+def test_a_body_that_cannot_spin_upright_has_no_critical_spins() -> None:
+    for model in (find("slip+viscous"), find("noslip+solid+sigma")):
+        straight, skew = (
+            stability.stable_ranges(model, cells(**body, mu=20, sigma=1e-4)) for body in (KANE_LEVINSON, SKEW)
+        )
+        assert np.isfinite(straight[:2]).all()
+        assert np.isnan(skew).all()
+
+
+def test_every_law_is_viscous_to_the_linear_theory() -> None:
+    spin = np.array([1.0])
+    expected = {"viscous": 0.4, "coulomb-sqrt": 0.4 / 0.05, "coulomb-tanh": 0.4 / 0.05, "coulomb-cubic": 1.2 / 0.05,
+                "stribeck": 0.7 / 0.02 + 0.3}  # fmt: skip
+    for law, mu in expected.items():
+        (model, _), (viscous, _) = (
+            one(f"slip+{law}", KANE_LEVINSON | FRICTION),
+            one("slip+viscous", KANE_LEVINSON | {"mu": mu}),
+        )
+        found = linear.jacobian(model, model.constants.of(cells(**KANE_LEVINSON, **FRICTION)), spin)
+        alike = linear.jacobian(viscous, viscous.constants.of(cells(**KANE_LEVINSON, mu=mu)), spin)
+        np.testing.assert_allclose(found, alike, rtol=1e-12, atol=1e-9)
+
+
+def test_unknown_variants() -> None:
+    for name in ("slip+magic", "noslip+viscous", "averaged+viscous", "slip+viscous+magic"):
+        with pytest.raises(KeyError):
+            variant(name)

@@ -1,0 +1,38 @@
+"""Critical spins of a real body: by the eigenvalues of the general equations, and by simulation with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.config import ConfigError
+
+STONE = """\
+units: SI
+body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
+friction: {mu: [30, 100]}
+start: {n0: 1, x0: 1.0e-3, y0: 1.0e-3}
+integrator: {t_end: 100}
+"""
+
+
+def test_simulation_finds_the_critical_spins_of_the_eigenvalues(tmp_path: Path) -> None:
+    file = tmp_path / "stone.yaml"
+    file.write_text(STONE, encoding="utf-8")
+    result = sweep.critical(file, width=1e-2)
+    for side in ("plus", "minus"):
+        assert (result[f"n_c1_{side}_reason"] == 0).all()
+        np.testing.assert_allclose(result[f"n_c1_{side}_simulated"], result[f"n_c1_{side}_linear"], rtol=1e-2)
+        assert result[f"n_c1_{side}_linear"].attrs["units"] == "radian s-1"
+    assert "form_factor" not in result
+    assert "n_c1_plus" not in result
+
+
+def test_a_start_by_angles_has_no_spin_to_search(tmp_path: Path) -> None:
+    file = tmp_path / "stone.yaml"
+    file.write_text(STONE.replace("n0: 1, x0: 1.0e-3, y0: 1.0e-3", "roll: 1 deg"), encoding="utf-8")
+    with pytest.raises(ConfigError, match="allowed: x0 and y0"):
+        sweep.critical(file)

@@ -1,0 +1,111 @@
+"""Any body on a plane, derived a second way: Newton and Euler in axes fixed in space, with all forces unknown.
+
+Nothing is solved by hand, and mass, gravity and couples enter as they are.  The laws are written as functions of |v|.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+Vector = np.ndarray
+
+
+def _rounded(x: float, s: float) -> float:
+    return x if x >= s else x**2 / s * (1 - x / (3 * s)) + s / 3
+
+
+def _stribeck(x: float, p: Mapping[str, float]) -> float:
+    t = min(x / p["speed"], 1.0)
+    mu = p["mu_static"] + (p["mu"] - p["mu_static"]) * (10 * t**3 - 15 * t**4 + 6 * t**5)
+    return mu * x / np.sqrt(x**2 + p["speed_stick"] ** 2) + p["mu_viscous"] * x
+
+
+LAWS: dict[str, Callable[[float, Mapping[str, float]], float]] = {
+    "viscous": lambda x, p: p["mu"] * x,
+    "none": lambda x, p: 0.0,  # noqa: ARG005
+    "coulomb-sqrt": lambda x, p: p["mu"] * x / np.sqrt(x**2 + p["speed"] ** 2),
+    "coulomb-tanh": lambda x, p: p["mu"] * np.tanh(x / p["speed"]),
+    "coulomb-cubic": lambda x, p: p["mu"] * x / _rounded(x, p["speed"]),
+    "stribeck": _stribeck,
+}
+"""Friction force per unit of normal force, at the slip velocity x >= 0."""
+
+
+def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vector, float, float]:
+    """y', the normal force and the dissipated power; without a law there is no slip.
+
+    Parameters
+    ----------
+    y : u1, u2, ω1, ω2, ω3 and, with a law, v1 and v2, in the body's axes
+    p : parameters by name
+    """
+    m, g = p.get("mass", 1.0), p.get("gravity", 1.0)
+    u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
+    side = np.cross(u, [1.0, 0, 0]) / np.linalg.norm(np.cross(u, [1.0, 0, 0]))
+    space = np.array([np.cross(side, u), side, u])  # rows: axes fixed in space, in the body's components
+    inertia = space @ _inertia(p) @ space.T
+    omega, up = space @ y[2:5], np.array([0, 0, 1.0])
+    v = space @ np.array([*y[5:], -(y[5] * u[0] + y[6] * u[1]) / u[2]]) if law else np.zeros(3)
+    du = np.cross(u, y[2:5])
+    x_p = space @ _contact(u, p)
+    # The velocity of the contact point, in space, as the body turns: by a complex step.
+    moving = space @ (_contact(u + 1e-30j * du, p).imag / 1e-30) + np.cross(omega, x_p)
+
+    # Unknowns: a_G, ω' and the contact force F; ω' is the same in both systems of axes.
+    matrix, right = np.zeros((9, 9)), np.zeros(9)
+    matrix[:3, :3], matrix[:3, 6:], right[:3] = m * np.eye(3), -np.eye(3), -m * g * up
+    speed = np.linalg.norm(omega)
+    matrix[3:6, 3:6], matrix[3:6, 6:] = inertia, -_cross(x_p)
+    right[3:6] = -np.cross(omega, inertia @ omega) - p.get("sigma", 0.0) * omega
+    rolling = p["mu_rolling"] * p["radius"] / _rounded(speed, p["speed_rolling"]) if "mu_rolling" in p else 0.0
+    matrix[3:6, 8] += rolling * omega
+    # The acceleration of the point of the body in contact, plus that of the contact moving on in the body, is v'.
+    acceleration = np.hstack([np.eye(3), -_cross(x_p)])
+    drift = -np.cross(omega, moving)
+    if law:
+        matrix[6, :6], right[6] = acceleration[2], drift[2]
+        size = np.linalg.norm(v)
+        friction = LAWS[law](size, p) * v / size if size else v
+        matrix[7:, 6:8], matrix[7:, 8] = np.eye(2), friction[:2]
+    else:
+        matrix[6:, :6], right[6:] = acceleration, drift
+    found = np.linalg.solve(matrix, right)
+    N, turning = found[8], space.T @ found[3:6]
+    slopes = [du[0], du[1], *turning]
+    if law:
+        in_space = acceleration @ found[:6] - drift
+        slopes += list((space.T @ in_space - np.cross(y[2:5], space.T @ v))[:2])
+    power = -found[6:] @ v + (p.get("sigma", 0.0) + N * rolling) * speed**2
+    return np.array(slopes), N, power
+
+
+def follow(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) -> Vector:
+    """The states at `times`, shape (states, times)."""
+    solution = solve_ivp(
+        lambda t, y: derivative(y, p, law)[0],  # noqa: ARG005
+        (0, times[-1]), y, "DOP853", times, rtol=1e-12, atol=1e-14,
+    )  # fmt: skip
+    return np.asarray(solution.y)
+
+
+def _inertia(p: Mapping[str, float]) -> Vector:
+    xy, xz, yz = (p.get(name, 0.0) for name in ("Ixy", "Ixz", "Iyz"))
+    return np.array([[p["Ixx"], xy, xz], [xy, p["Iyy"], yz], [xz, yz, p["Izz"]]])
+
+
+def _contact(u: Vector, p: Mapping[str, float]) -> Vector:
+    """The lowest point of the ellipsoid, from the centre of mass."""
+    semi = np.array([p["a"], p["b"], p["c"]])
+    return -semi * _unit(semi * u) - np.array([0, 0, p["offset"]])
+
+
+def _cross(x: Vector) -> Vector:
+    """The matrix of x ×."""
+    return np.array([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]])
+
+
+def _unit(u: Vector) -> Vector:
+    return u / np.sqrt(u @ u)
