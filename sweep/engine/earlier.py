@@ -17,7 +17,8 @@ from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures.sensitivity import Sensitivity
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import FAILURES, TIME_LIMIT
-from sweep.models import MODELS
+from sweep.models.model import Model
+from sweep.parameters import PARAMETERS, SECTIONS
 from sweep.results import dataset
 from sweep.results.identity import Identity
 
@@ -71,9 +72,9 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     same_program = (found.source_hash, found.versions) == (wanted.source_hash, wanted.versions)
     if rerun is None and not (same_program and found.of_one_run):
         return found.difference(wanted)
-    old, new = parse_value(found.config, "dataset"), parse_value(wanted.config, "config")
+    old, new = (_settings(parse_value(each.config, "dataset")) for each in (found, wanted))
     free = _FREE_AGAIN if rerun else _FREE
-    changed = [key for key in {**old, **new} if key not in _PARAMETERS | free and _differ(key, old, new)]
+    changed = [key for key in {**old, **new} if key not in free and _differ(key, old, new)]
     grown = _match(Grid.of(config), _grid(there))
     same_cells = len(grown) == there["status"].size
     if changed or config.refine or (grown >= 0).sum() < there["status"].size or (rerun and not same_cells):
@@ -88,7 +89,7 @@ def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
     if rerun:
         return Earlier(there, np.where(np.isin(status, RERUN[rerun])[cells], -1, cells), rerun)
     old = parse_value(str(there.attrs["config"]), "dataset")
-    if old["measure"] != config.document()["measure"] or config.model not in MODELS:
+    if old["measure"] != config.document()["measure"] or not isinstance(config.tier, Model):
         return Earlier(there, np.full(len(cells), -1))
     if old["integrator"]["t_end"] != config.integrator.t_end:
         taken = np.flatnonzero(cells >= 0)
@@ -99,7 +100,12 @@ def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
     return Earlier(there, cells)
 
 
-_PARAMETERS = {"body", "friction", "start", "cases"}
+def _settings(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that a configuration says, but for the values of parameters, by which cells are matched."""
+    found = {key: value for key, value in document.items() if key not in (*SECTIONS, *PARAMETERS, "cases")}
+    for section in SECTIONS:
+        found |= {f"{section}.{key}": v for key, v in document.get(section, {}).items() if key not in PARAMETERS}
+    return found
 
 
 def _differ(key: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
