@@ -71,32 +71,7 @@ def critical(
     fresh: bool = False,
     reporter: Reporter | None = None,
 ) -> xr.Dataset:
-    """Critical spins over all axes of `config` except n0.
-
-    n_c1 is the first spin, outwards from zero, at which a tiny rattle grows.  n_c2 is the first spin, outwards from
-    the simulated n_c1, from which the trajectory from the configuration's start point reverses before t_end.
-
-    Parameters
-    ----------
-    width : of the brackets, relative to the spin
-    output : folder for NAME_critical.nc and .png; until they are finished it holds a checkpoint, from which the same
-        call resumes.  By default nothing is written
-    fresh : discard what an earlier search left in `output`
-    reporter : receives progress, counted in bodies, and messages; by default there are none
-
-    Returns
-    -------
-    Dataset over the axes without n0.  With each `*_simulated` come the ends of its bracket, `*_inner` and `*_outer`,
-    and its `*_reason`, which says why it is NaN, or that it disagrees with the eigenvalues.  `critical_reason` is the
-    first of the four reasons that is not `exists`.
-
-    Raises
-    ------
-    ConfigError
-        if the model is a formula, or the start point is an axis.
-    StoreError
-        if what `output` holds cannot be used.
-    """
+    """As `sweep.api.critical`; what there is to tell goes to `reporter` alone, with progress counted in bodies."""
     config, reporter = _searchable(config), reporter or Reporter()
     if output is None:
         return _search(config, width, Memory(), reporter)
