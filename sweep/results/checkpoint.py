@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -86,8 +87,10 @@ class Checkpoint:
 
     def _write(self, path: Path, arrays: Mapping[str, Array]) -> None:
         named: dict[str, Any] = {**arrays, "stamp": np.array(self._stamp(path, arrays))}
-        with replacing(path) as temporary, temporary.open("wb") as stream:
-            np.savez(stream, **named)
+        # In a thread of its own, where Ctrl-C is not raised: an archive that is left half written complains when it is
+        # collected.
+        with replacing(path) as temporary, temporary.open("wb") as stream, ThreadPoolExecutor(1) as pool:
+            pool.submit(np.savez, stream, **named).result()
 
     def _read(self, path: Path) -> dict[str, Array] | None:
         """The arrays of a file, its checksums verified; None if it is missing or cannot be used."""
