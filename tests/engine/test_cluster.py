@@ -22,7 +22,7 @@ from support.kernels import threads
 from support.same import contents
 
 import sweep
-from sweep.engine.cluster import Cluster
+from sweep.engine.cluster import AHEAD, Cluster
 from sweep.engine.reporter import Progress, Reporter
 from sweep.results.provenance import sources
 from sweep.results.store import StoreError
@@ -133,7 +133,8 @@ def test_a_killed_worker_costs_only_its_tile(
     assert contents(tmp_path) == by_threads
     assert reporter.killed
     moves = [(start, end) for key, start, end, *_ in local.scheduler.transition_log if str(key).startswith("_work")]
-    assert TILES <= moves.count(("processing", "memory")) <= TILES + 1
+    # With the worker go results that had not been fetched yet: on a busy machine up to all that it was sent ahead.
+    assert TILES <= moves.count(("processing", "memory")) <= TILES + AHEAD
     assert moves.count(("processing", "released")) >= 1
 
 
