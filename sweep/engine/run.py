@@ -67,7 +67,7 @@ def run(
         if found and not found.difference(identity):
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
-            earlier = _earlier(config, identity, files, rerun)
+            earlier = _earlier(config, found, identity, files, rerun)
             files.picture.unlink(missing_ok=True)  # of a dataset that is gone
             store = Checkpoint(files.checkpoint, identity, reporter.note)
             _compute(config, store, reporter, cluster, earlier).save(files.dataset)
@@ -77,23 +77,30 @@ def run(
     return result
 
 
-def _earlier(config: Config, identity: Identity, files: RunFiles, rerun: str | None) -> Earlier | None:
+def _earlier(
+    config: Config, found: Identity | None, identity: Identity, files: RunFiles, rerun: str | None
+) -> Earlier | None:
     """What the dataset that is there, or that was there when an interrupted run began, has of the cells of `config`.
+
+    `found` is the identity of the one that is there.
 
     Raises
     ------
     StoreError
         if results of that dataset would be lost.
     """
-    if files.dataset.exists():
-        found, there = files.identity(), open_dataset(files.dataset)
-        assert found is not None
+    if found:
+        there = open_dataset(files.dataset)
         if reason := reason_against(config, found, identity, there, rerun):
             raise not_resumed(files.dataset, reason)
         files.keep_earlier()
-    elif rerun and not files.earlier.exists():
+    elif files.earlier.exists():
+        there = open_dataset(files.earlier)
+    elif rerun:
         raise StoreError(f"{files.dataset}: no such file; --rerun needs the dataset of an earlier run")
-    return taken_over(config, open_dataset(files.earlier), rerun) if files.earlier.exists() else None
+    else:
+        return None
+    return taken_over(config, there, rerun)
 
 
 def _compute(

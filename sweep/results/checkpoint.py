@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from sweep.config import files
 from sweep.grid import Array
 from sweep.results.identity import Identity, require_same
 from sweep.results.store import Running, StoreError
-from sweep.results.writing import replacing
+from sweep.results.writing import replacing, uninterrupted
 
 
 class Checkpoint:
@@ -87,10 +86,9 @@ class Checkpoint:
 
     def _write(self, path: Path, arrays: Mapping[str, Array]) -> None:
         named: dict[str, Any] = {**arrays, "stamp": np.array(self._stamp(path, arrays))}
-        # In a thread of its own, where Ctrl-C is not raised: an archive that is left half written complains when it is
-        # collected.
-        with replacing(path) as temporary, temporary.open("wb") as stream, ThreadPoolExecutor(1) as pool:
-            pool.submit(np.savez, stream, **named).result()
+        # An archive that Ctrl-C leaves half written complains when it is collected.
+        with replacing(path) as temporary, temporary.open("wb") as stream:
+            uninterrupted(np.savez, stream, **named)
 
     def _read(self, path: Path) -> dict[str, Array] | None:
         """The arrays of a file, its checksums verified; None if it is missing or cannot be used."""

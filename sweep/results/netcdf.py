@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ import xarray as xr
 
 from sweep.grid import Array
 from sweep.results.store import StoreError
-from sweep.results.writing import probe, replacing
+from sweep.results.writing import probe, replacing, uninterrupted
 
 Chunked = tuple[xr.Variable, tuple[int, ...]]
 """An empty variable with its attributes, and the shape of the chunks in which it is stored."""
@@ -63,10 +62,9 @@ def write(
 def _write_frame(frame: xr.Dataset, path: Path) -> None:
     filled = {name for name, variable in frame.data_vars.items() if variable.dtype.kind == "f"}
     encoding = {name: {"_FillValue": None} for name in set(frame.variables) - filled}
-    # In a thread of its own, where Ctrl-C is not raised: one that came while xarray took its lock of HDF5 left that
-    # locked, and closing the file waited for it for ever (1 in 60 runs interrupted while they wrote their dataset).
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(frame.to_netcdf, path, format="NETCDF4", engine="netcdf4", encoding=encoding).result()
+    # A Ctrl-C that came while xarray took its lock of HDF5 left that locked, and closing the file waited for it for
+    # ever (1 in 60 runs interrupted while they wrote their dataset).
+    uninterrupted(frame.to_netcdf, path, format="NETCDF4", engine="netcdf4", encoding=encoding)
 
 
 def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
