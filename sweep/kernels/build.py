@@ -97,9 +97,10 @@ def main(what: str, *which: str) -> None:
         method, model, *measure = which
         make_kernel(method, find(model), measure).compile()
     elif what == "images":
-        method, model = which
+        kernel = make_kernel(which[0], find(which[1]), ())
         body = {name: np.full(1, p.default if p.default is not None else 1.5) for name, p in PAPER.items()}
-        make_kernel(method, find(model), ()).images(body, np.full(1, 0.1), 10.0)
+        body |= {name: np.full(1, 1.5) for name in kernel.model.parameters if name not in body}
+        kernel.images(body, np.full(1, 0.1), 10.0)
     elif what == "approach":
         compile_approach(find(which[0]))
     else:

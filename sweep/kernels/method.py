@@ -57,8 +57,8 @@ class Method:
     """(model, columns) -> the longest stable step, shape (cells,), in sqrt(c/g); None if no limit is near."""
     step_words: str = ""
     """What limits an automatic step in addition to the tolerance, in words, for the provenance; "" if nothing does."""
-    models: frozenset[str] | None = None
-    """Names of the models that it can integrate; None for all."""
+    runs: Callable[[Model], bool] = lambda model: True  # noqa: ARG005
+    """Whether it can integrate a model; by default it can integrate all."""
     step_cost: float = 1.0
     """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""
     start_up_cost: float = 0.0
@@ -71,7 +71,3 @@ class Method:
     ended before does not depend on the limit."""
     stops_anywhere: bool = False
     """Whether a run may stop after any step and go on from there towards another goal."""
-
-    def runs(self, model: Model) -> bool:
-        """Whether it can integrate a model."""
-        return self.models is None or model.name in self.models

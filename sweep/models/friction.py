@@ -3,21 +3,10 @@
 This file holds what the equations of motion and the methods know of the law, but for one thing: the implicit step for
 the slip, `slip_split.newton`, has the force and its derivative written out.  Forces are per unit of the normal force R,
 so the friction force on the body is R f.  The slip velocity v_p and all forces are given by components along the body
-axes; `p` are the constants of the model.
-
-To change the law, change all of these consistently:
-
-* `PARAMETERS` are its physical parameters, each of which has an entry in `sweep.parameters`; `constants` makes from
-  them what the functions read of `p`, by the names in `CONSTANTS`.
-* `contact_force` is the law itself.  It enters the full equations (`slip`), which is all that dopri5 needs.
-* `dissipation` is the power that the force takes from the body, for the energy balance.
-* `strongest_resistance` bounds the derivative -df/dv; the stable step of dopri5, and the step and the start-up of
-  adams, follow from it.
+axes; `p` are the constants of the model.  Other laws are in `sweep.models.laws`.
 
 The first two functions are inlined into the kernels, where they work on scalars.  They are also called with arrays,
 which are complex where a Jacobian is computed by complex steps; so they have to be analytic in v_p, without `abs`.
-Takano's formulas and the models `effective` and `averaged` were derived for the viscous law and do not follow a
-change.
 """
 
 from __future__ import annotations

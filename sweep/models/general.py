@@ -92,7 +92,7 @@ def _couple_constants(couples: Sequence[Couple]) -> tuple[tuple[str, ...], Any]:
     return names, lambda columns: tuple(value for couple in couples for value in couple.of(columns))
 
 
-def _resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
+def resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
     """The resistance by itself and the one per unit of the normal force."""
     found: list[Any] = [nothing, nothing]
     for couple in couples:
@@ -101,7 +101,7 @@ def _resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
 
 
 def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[str, ...]) -> Model:
-    resistance, (plain, loaded) = law.resistance, _resistances(couples)
+    resistance, (plain, loaded) = law.resistance, resistances(couples)
     names, values = _couple_constants(couples)
 
     @inline
@@ -150,7 +150,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         return {**_seen(rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
 
     def fastest_decay(columns: Columns) -> Array:
-        return np.asarray(law.strongest(columns) * strongest_grip(columns) + _couples_decay(couples, columns))
+        return np.asarray(law.strongest(columns) * strongest_grip(columns) + couples_decay(couples, columns))
 
     def more(columns: Columns) -> tuple[Array, ...]:
         faint = () if law.linear_to is None else (_faint(law.linear_to(columns), columns),)
@@ -181,7 +181,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
 
 
 def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) -> Model:
-    plain, loaded = _resistances(couples)
+    plain, loaded = resistances(couples)
     names, values = _couple_constants(couples)
 
     @inline
@@ -236,7 +236,7 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         constants=_record(names, values),
         start=starts.rolling,
         slower_period=solid.slower_period,
-        fastest_decay=lambda columns: _couples_decay(couples, columns),
+        fastest_decay=lambda columns: couples_decay(couples, columns),
         upright=noslip.MODEL.upright,
         rhs=rhs,
         energy=energy,
@@ -286,7 +286,7 @@ def _with_and_without(law: Law) -> Any:
     return extremes
 
 
-def _couples_decay(couples: Sequence[Couple], columns: Columns) -> Array:
+def couples_decay(couples: Sequence[Couple], columns: Columns) -> Array:
     """Bound on the rate at which couples damp the angular velocity, shape (cells,)."""
     rate = np.zeros_like(columns["a"])
     for couple in couples:

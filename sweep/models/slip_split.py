@@ -25,10 +25,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models import ellipsoid, slip
-from sweep.models.model import Array, Columns, Ripple, named
+from sweep.models import ellipsoid, friction, slip
+from sweep.models.model import Array, Columns, Ripple, named, nothing_decays
 from sweep.models.ripple import FORM, form, ripple
-from sweep.models.rocking import rocking
+from sweep.models.rocking import frequencies, rocking
+from sweep.models.split import Split
 
 
 class Constants(named("I1", "I2", "I3", *slip.Constants._fields)):  # type: ignore[misc]
@@ -172,6 +173,13 @@ def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any
 
 
 @inline
+def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
+    """Power of friction at a point with slip (v1, v2) and normal force R."""
+    v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
+    return friction.dissipation(R, v1, v2, v3, p)
+
+
+@inline
 def energy(y: Any, p: Any) -> Any:
     """(spin, energy of the rattle, I3), as in the slip model."""
     u1, u2, M1, M2, M3, v1, v2 = y
@@ -231,3 +239,32 @@ SPLIT = replace(
     ripple=Ripple(FORM, form, _ripple),
 )
 """The slip model in these variables, for methods that use `slow` and `newton` in place of a right-hand side."""
+
+
+def _fastest_rocking(p: Constants) -> Array:
+    _, fastest = frequencies(p)
+    return fastest
+
+
+def _rise(columns: Columns) -> Array:
+    I1, I2, _ = ellipsoid.inertia(columns)
+    return np.asarray(slip.strongest_grip(columns) / (1 + columns["c"] ** 2 / np.minimum(I1, I2)) - 1)
+
+
+PAPERS = Split(
+    full=slip.MODEL,
+    model=SPLIT,
+    momentum=momentum,
+    velocities=velocities,
+    slow=slow,
+    newton=newton,
+    power=power,
+    implicit=implicit,
+    fastest_rocking=_fastest_rocking,
+    time_unit=lambda columns: np.sqrt(columns["c"]),
+    slip_decay=lambda columns: 2.2 * friction.strongest_resistance(columns) + 2.2,
+    rise=_rise,
+    resistance=lambda columns: friction.strongest_resistance(columns) * np.sqrt(columns["c"]),
+    damping=nothing_decays,
+    resolves_modes=True,
+)

@@ -8,7 +8,7 @@ from support import columns
 from support.kernels import finish, images_of, kernel, spin, threads
 
 from sweep.kernels.adams import start_up
-from sweep.kernels.adams.step import HISTORY, NAMES
+from sweep.kernels.adams.step import HISTORY, names
 from sweep.kernels.codegen import compile_lanes
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES
@@ -17,6 +17,7 @@ from sweep.kernels.status import LIFT_OFF, RUNNING
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS, slip, slip_split
 from sweep.models.model import Columns, take
+from sweep.models.slip_split import PAPERS
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
 
@@ -83,14 +84,14 @@ def test_start_up_leaves_no_trace_in_the_spin() -> None:
 def test_bit_identical_for_each_grouping_and_thread() -> None:
     with threads(2):
         expected = begun(MIXED, STEPS)
-    assert len(np.unique(start_up.count_levels(MIXED["mu"], STEPS))) > 10
+    assert len(np.unique(start_up.count_levels(PAPERS.slip_decay(MIXED), STEPS))) > 10
     order = np.random.default_rng(2).permutation(len(STEPS))
     shuffled = begun({name: values[order] for name, values in MIXED.items()}, STEPS[order])
     np.testing.assert_array_equal(shuffled, expected[order])
     with threads(1):
         for i in range(0, len(STEPS), 9):
             np.testing.assert_array_equal(begun(cell(MIXED, i), STEPS[i : i + 1])[0], expected[i])
-    assert len(start_up.compiled_start_up().signatures) == 1  # not compiled once for a cell and again for many
+    assert len(start_up.compiled_start_up(PAPERS).signatures) == 1  # not compiled once for a cell and again for many
 
 
 def test_a_level_may_have_more_cells_than_lanes() -> None:
@@ -127,8 +128,10 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
 
 
 def test_the_loop_over_lanes_is_vector_instructions() -> None:
-    advance = compile_lanes("advance", "group, points, ticks", start_up._advance(), NAMES)
-    group, points = np.zeros(len(start_up._GROUP.names) * LANES), np.zeros((HISTORY + 1) * start_up._POINT_SIZE)
+    lines = start_up._advance(PAPERS, start_up._places(PAPERS))
+    advance = compile_lanes("advance", "group, points, ticks", lines, names(PAPERS))
+    kept = start_up.layout(PAPERS).names
+    group, points = np.zeros(len(kept) * LANES), np.zeros((HISTORY + 1) * start_up._POINT_SIZE)
     advance(group, points, 1.0)
     assembly = next(iter(advance.inspect_asm().values()))
     # The scalar loop beside it is for arrays that overlap.

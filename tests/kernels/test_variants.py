@@ -107,3 +107,25 @@ def test_a_body_with_the_mass_at_the_centre_is_the_papers(tmp_path: Path) -> Non
     np.testing.assert_allclose(general["t_last_reversal"], paper["t_last_reversal"], rtol=1e-6)
     np.testing.assert_allclose(general["n_c1_plus_linear"], paper["n_c1_plus_linear"], rtol=1e-9)
     np.testing.assert_allclose(general["n_c1_minus_linear"], paper["n_c1_minus_linear"], rtol=1e-9)
+
+
+def test_the_stiff_method_takes_any_body_with_viscous_friction(tmp_path: Path) -> None:
+    """Against SciPy where friction is weak enough for it, and against dopri5 where steps of adams are far longer."""
+    text = SLIPPING.replace("law: coulomb, mu: [0.2, 0.5], regularisation: tanh, speed: 0.02", "mu: [20, 1000]")
+    text = text.replace("step: auto", "stop_when_settled: false").replace("slip1: 0.05, slip2: -0.1", "slip1: 0.01")
+    text += "measure: [reversals, energy_error]\n"
+    stiff = run(tmp_path, text, method="adams")
+    config = load_config(tmp_path / "scene.yaml")
+    columns, model = Grid.of(config).columns(), config.equations
+    start = stack(model.start(columns))[:, 0]
+    parameters = {name: float(values[0]) for name, values in columns.items()}
+    end = newton.follow(start, parameters, "viscous", np.array([0, float(stiff["t_stop"][0, 0])]))[:, -1]
+    spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
+    assert float(stiff["spin_final"][0, 0]) == pytest.approx(spin, abs=1e-8 * UNIT)
+    plain = run(tmp_path, text, method="dopri5")
+    np.testing.assert_allclose(stiff["spin_final"], plain["spin_final"], rtol=0, atol=1e-8 * UNIT)
+    np.testing.assert_array_equal(stiff["reversals"], plain["reversals"])
+    assert float(stiff["energy_error"].max()) < 1e-6
+    assert (stiff["step"] > 3 * plain["step"]).sel(mu=1000).all()
+    chosen = run(tmp_path, text)
+    assert set(chosen["method"].values.ravel()) == {0, 1}

@@ -18,6 +18,14 @@ def contact(u: np.ndarray, a: float, b: float, c: float, delta: float) -> np.nda
 
 def derivative(states: np.ndarray, a: float, b: float, c: float, delta: float, mu: float) -> tuple[np.ndarray, float]:
     """y' and the normal force R for y = (u1, u2, ω1, ω2, ω3, v1, v2)."""
+    slopes, R, _ = _solution(states, a, b, c, delta, mu)
+    return slopes, R
+
+
+def _solution(
+    states: np.ndarray, a: float, b: float, c: float, delta: float, mu: float
+) -> tuple[np.ndarray, float, float]:
+    """As `derivative`, and the determinant of the linear system, which vanishes where no force solves it."""
     u = np.array([*states[:2], -np.sqrt(1 - states[0] ** 2 - states[1] ** 2)])
     omega = states[2:5]
     v_p = np.array([*states[5:], -(states[5] * u[0] + states[6] * u[1]) / u[2]])
@@ -44,7 +52,7 @@ def derivative(states: np.ndarray, a: float, b: float, c: float, delta: float, m
     domega, accel, R = solution[:3], solution[3:6], solution[6]
     dv_g = accel - np.cross(omega, v_g)
     dv_p = dv_g - np.cross(dx, omega) - np.cross(x_p, domega)
-    return np.array([du[0], du[1], *domega, dv_p[0], dv_p[1]]), R
+    return np.array([du[0], du[1], *domega, dv_p[0], dv_p[1]]), R, np.linalg.det(matrix)
 
 
 def _turn(delta: float) -> np.ndarray:
@@ -57,10 +65,11 @@ def _unit(u: np.ndarray) -> np.ndarray:
 
 def end(
     a: float, b: float, c: float, delta: float, mu: float, n0: float, x0: float, y0: float, t_end: float
-) -> tuple[float, float, float]:
-    """When and how a trajectory ends, by SciPy: the time, u3², and the normal force there.
+) -> tuple[float, float, float, float]:
+    """When and how a trajectory ends, by SciPy: the time, and then u3², normal force and determinant.
 
-    It ends where the force vanishes or grows beyond all bounds, or where u3 vanishes.
+    It ends where one of these vanishes, or where the force grows beyond all bounds.  Force and determinant often vanish
+    together, so that the force stays finite, and SciPy steps across.
     """
     turn = _turn(delta)
     inverse = turn.T @ np.diag([a**-2.0, b**-2.0, c**-2.0]) @ turn
@@ -75,24 +84,28 @@ def end(
     def force(_: float, y: np.ndarray) -> float:
         return derivative(y, a, b, c, delta, mu)[1]
 
+    def determinant(_: float, y: np.ndarray) -> float:
+        return _solution(y, a, b, c, delta, mu)[2]
+
     def jams(_: float, y: np.ndarray) -> float:
         return force(0.0, y) - 1e4
 
     def topples(_: float, y: np.ndarray) -> float:
         return _height(y) - 1e-8
 
-    for event in (force, jams, topples):
+    events = [force, jams, topples, determinant]
+    for event in events:
         event.terminal = True  # type: ignore[attr-defined]
     with np.errstate(all="ignore"):
         solution = solve_ivp(
             slopes, (0, t_end), [*u[:2], *(n0 * u), 0.0, 0.0], "DOP853",
-            rtol=1e-9, atol=1e-12, events=[force, jams, topples],
+            rtol=1e-9, atol=1e-12, events=events,
         )  # fmt: skip
     assert solution.status == 1
     y, time = solution.y[:, -1], solution.t[-1]
     if len(solution.t_events[2]):  # u3 vanishes linearly in time, so u3² does like its square
         time += _height(y) / (y[:2] @ slopes(time, y)[:2])
-    return time, _height(y), force(time, y)
+    return time, _height(y), force(time, y), determinant(time, y)
 
 
 def _height(y: np.ndarray) -> float:

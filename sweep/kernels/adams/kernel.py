@@ -30,11 +30,11 @@ from sweep.kernels.adams.step import (
     CORRECTOR_NODES,
     HISTORY,
     MATRIX,
-    NAMES,
     POINT,
     PREDICTOR_NODES,
     accept_lines,
     load_lines,
+    names,
     step_lines,
     store_lines,
 )
@@ -43,11 +43,10 @@ from sweep.kernels.kernel import Kernel, steps_to
 from sweep.kernels.layout import BLOCK, LANES, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
 from sweep.kernels.status import DIVERGED, RUNNING
-from sweep.models import friction, linear, slip, slip_split
+from sweep.models import linear
 from sweep.models.model import Array, Columns, stack
 from sweep.models.modes import bending
-from sweep.models.rocking import frequencies
-from sweep.models.slip_split import SPLIT
+from sweep.models.split import Split
 
 _PREDICT = tuple(f"predict{j}" for j in range(len(PREDICTOR_NODES)))
 _CORRECT = tuple(f"correct{j}" for j in range(len(CORRECTOR_NODES)))
@@ -55,10 +54,10 @@ _HISTORY = tuple(name.format(slot) for slot in range(HISTORY) for name in POINT)
 
 
 class AdamsKernel(Kernel):
-    """The `Kernel` of this method, for the slip model; its states contain M in place of ω.
+    """The `Kernel` of this method; its states contain M in place of ω.
 
     Where the rattle is so small that its linear modes describe it to within `tolerance` in spin, these
-    carry the trajectory on, without steps (`sweep.kernels.adams.stretches`).
+    carry the trajectory on, without steps (`sweep.kernels.adams.stretches`), if they are known (`resolves_modes`).
     """
 
     method = "adams"
@@ -68,17 +67,17 @@ class AdamsKernel(Kernel):
     # right to the tolerance.
     energy_gain = 1e-2
 
-    def __init__(self, measurements: Sequence[Measurement], tolerance: float) -> None:
-        self.tolerance = tolerance
+    def __init__(self, split: Split, measurements: Sequence[Measurement], tolerance: float) -> None:
+        self.split, self.tolerance = split, tolerance
         powers = stretches.POWERS if any(each.follows_work for each in measurements) else ()
-        more = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS, "begin", "spin", *powers)
+        looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if split.resolves_modes else ()
         method = ("gamma", "per_weight", *_PREDICT, *_CORRECT, *MATRIX)
-        self._lay_out(SPLIT, measurements, (*more, *method, *_HISTORY))
+        self._lay_out(split.model, measurements, (*looks, "begin", "spin", *powers, *method, *_HISTORY))
         self._compile_with(self._make_run_block())
 
     def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
         """As `Kernel.images`, but the images are those at the end of start-up, at the time in `begin`."""
-        levels = count_levels(friction.strongest_resistance(columns), step)
+        levels = count_levels(self.split.slip_decay(columns), step)
         lead = duration(levels)
         steps = np.maximum(steps_to(t_end, step), lead + 1)
         goal, step = steps - lead, t_end / steps
@@ -86,41 +85,42 @@ class AdamsKernel(Kernel):
         table = self.table(images)
         self._set_method(table, self.unpack(images)[1])
         constants = table.columns(self.constants)
-        self._set_started(table, start_up.start_up(step, constants, stack(slip.start(columns)).T, levels))
-        self._set_looks(table, columns)
+        starts = stack(self.split.full.start(columns)).T
+        self._set_started(table, start_up.start_up(self.split, step, constants, starts, levels))
+        if self.split.resolves_modes:
+            self._set_looks(table, columns)
         return images
 
     def _image_functions(self) -> tuple[Cached, ...]:
-        return (start_up.compiled_start_up(),)
+        return (start_up.compiled_start_up(self.split),)
 
     def model_states(self, images: Array) -> Array:
-        return slip_split.velocities(*self.unpack(images))
+        return self.split.velocities(*self.unpack(images))
 
     def _reached(self, table: Table, t_end: float | Array) -> Array:
         reached = table["begin"] + table["done"] * table["step"]
         return np.where(table["done"] == table["goal"], t_end, reached)
 
-    def _set_method(self, table: Table, constants: slip_split.Constants) -> None:
+    def _set_method(self, table: Table, constants: Any) -> None:
         """Set the weights of the formulas and the matrix P."""
         step = table["step"]
-        _, fastest = frequencies(constants)
-        phase = fastest * step
+        phase = self.split.fastest_rocking(constants) * step
         correct = step[:, None] * weights.fitted_weights(CORRECTOR_NODES, phase)
         table.set_columns(_PREDICT, step[:, None] * weights.fitted_weights(PREDICTOR_NODES, phase))
         table.set_columns(_CORRECT, correct)
-        table.set_columns(MATRIX, stack(slip_split.implicit(correct[:, 0], constants)).T)
+        table.set_columns(MATRIX, stack(self.split.implicit(correct[:, 0], constants)).T)
         table["per_weight"] = 1 / correct[:, 0]
         table["gamma"] = BDF_GAMMA * step
 
     def _set_started(self, table: Table, started: Started) -> None:
         """Set the state after start-up, and do what looks and measurements would have done during it."""
         before = self.steady_spin(table.images)
-        table.set_columns(SPLIT.states, started.states)
+        table.set_columns(self.model.states, started.states)
         table.set_columns(_HISTORY, started.history)
         table["begin"], table["status"] = started.begin, started.status
         if self.follows_work:
             table.set_columns(stretches.POWERS, started.powers)
-        spin, rattle, inertia = SPLIT.energy(*self.unpack(table.images))
+        spin, rattle, inertia = self.model.energy(*self.unpack(table.images))
         energy = rattle + 0.5 * inertia * spin**2
         grown = energy > table["energy_start"] * (1 + self.energy_gain)
         table["status"] = np.where(grown, DIVERGED, table["status"])
@@ -132,7 +132,7 @@ class AdamsKernel(Kernel):
 
     def _set_looks(self, table: Table, columns: Columns) -> None:
         """Set below which energy, and after which step, looks search for a stretch of small rattle."""
-        reach, goal = linear.fastest_spin(SPLIT, columns), table["goal"]
+        reach, goal = linear.fastest_spin(self.model, columns), table["goal"]
         table["quiet_energy"] = stretches.quiet_energy(reach)
         time = goal * table["step"]
         table["quiet_after"] = stretches.first_look(columns, reach, time, goal, self.tolerance)
@@ -140,7 +140,8 @@ class AdamsKernel(Kernel):
 
     def carry(self, images: Array) -> None:
         """As `Kernel.carry`."""
-        stretches.carry(self, images, self.tolerance)
+        if self.split.resolves_modes:
+            stretches.carry(self, images, self.tolerance)
 
     def _make_run_block(self) -> Any:
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes.
@@ -149,8 +150,8 @@ class AdamsKernel(Kernel):
         compiled, not one for each place in a ring of eight.  The history is not part of the group: LLVM sees then that
         no step reads from one what it has written to the other.
         """
-        names: dict[str, Any] = NAMES | {"watch": self._make_watch(), "work_of": self._make_work()}
-        names |= {"full_width": full_width(), "np": np}
+        known = names(self.split) | {"watch": self._make_watch(), "work_of": self._make_work()}
+        known |= {"full_width": full_width(), "np": np}
         first, size = self.layout.at(_HISTORY[0]), len(POINT) * LANES
         lines = [
             "def run_block(group):",
@@ -164,7 +165,7 @@ class AdamsKernel(Kernel):
             f"    for i in range({HISTORY * size}):",
             f"        group[{first} + i] = history[{BLOCK * size} + i]",
         ]
-        return compiled(compile_inline("run_block", "\n".join(lines), names))
+        return compiled(compile_inline("run_block", "\n".join(lines), known))
 
     def _step_lines(self) -> list[str]:
         """The source of one step, from eight points of the history, of which the first is at `oldest`, to the ninth.
@@ -182,11 +183,11 @@ class AdamsKernel(Kernel):
             return f"group[{self.layout.at(name)} + lane]"
 
         return [
-            *load_lines(at),
+            *load_lines(self.split, at),
             f"status, done, h, old = {at('status')}, {at('done')}, {at('step')}, {at('spin')}",
             f"active = (status == {RUNNING}) & (done < {at('goal')})",
             *step_lines(at, range(HISTORY)[::-1]),
-            *accept_lines(at),
+            *accept_lines(self.split, at),
             *store_lines(at, HISTORY),
             f"{at('done')} = done + (1.0 if accepted else 0.0)",
             f"{at('spin')} = spin if accepted else old",

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.adams.stretches import WORTHWHILE
+from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.method import Method
-from sweep.models import friction, linear, slip
-from sweep.models.ellipsoid import inertia
-from sweep.models.model import Array, Columns
+from sweep.models import linear, splits
+from sweep.models.model import Array, Columns, Model
 
 # Two bounds on the error in spin at t = 400.  The first is that of the Adams formulas, the second that of BDF5, which
 # matters where the slip does not relax fast.  θ is the phase of the fastest motion in a step, ρ the share by which the
@@ -24,31 +26,36 @@ from sweep.models.model import Array, Columns
 _LONGEST_PHASE = 0.4
 
 
-def accurate_step(columns: Columns, motion: Array, tolerance: float) -> Array:
-    """Step, in sqrt(c/g), that keeps the error in spin at t = 400 within `tolerance`, shape (cells,).
+def accurate_step(model: Model, columns: Columns, motion: Array, tolerance: float) -> Array:
+    """Step that keeps the error in spin at t = 400 sqrt(c/g) within `tolerance`, in the model's units, shape (cells,).
 
     Parameters
     ----------
-    motion : the `fastest_motion`, in sqrt(g/c), shape (cells,)
+    motion : the `fastest_motion`, shape (cells,)
     """
-    I1, I2, _ = inertia(columns)
-    root = np.sqrt(columns["c"])
-    rise = np.maximum(slip.strongest_grip(columns) / (1 + columns["c"] ** 2 / np.minimum(I1, I2)) - 1, 1e-6)
-    reach = np.maximum(linear.fastest_spin(slip.MODEL, columns) * root, 1e-6)
-    resistance = friction.strongest_resistance(columns) * root
+    split = splits.of(model)
+    assert split is not None
+    rise = np.maximum(split.rise(columns), 1e-6)
+    reach = np.maximum(linear.fastest_spin(split.full, columns) * split.time_unit(columns), 1e-6)
     adams = 7.6 * rise**1.54 * (1 + rise) ** 1.6 * reach**0.45
-    bdf = 0.074 * rise**0.81 * reach**1.01 * np.minimum(1, 30 / np.maximum(resistance, 30)) ** 2
+    bdf = 0.074 * rise**0.81 * reach**1.01 * np.minimum(1, 30 / np.maximum(split.resistance(columns), 30)) ** 2
     phase = np.minimum((tolerance / adams) ** (1 / 7), (tolerance / bdf) ** (1 / 4))
-    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / motion)
+    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, split.damping(columns)))
+
+
+def _kernel(model: Model, measurements: Sequence[Measurement], tolerance: float) -> AdamsKernel:
+    split = splits.of(model)
+    assert split is not None
+    return AdamsKernel(split, measurements, tolerance)
 
 
 METHOD = Method(
     name=AdamsKernel.method,
     summary="Adams formulas of orders eight and nine for the slow variables and BDF5 for the slip, for the slip model: "
     "friction does not limit its step",
-    kernel=lambda model, measurements, tolerance: AdamsKernel(measurements, tolerance),  # noqa: ARG005
-    accurate_step=lambda model, columns, motion, tolerance: accurate_step(columns, motion, tolerance),  # noqa: ARG005
-    models=frozenset({slip.MODEL.name}),
+    kernel=_kernel,
+    accurate_step=accurate_step,
+    runs=lambda model: splits.of(model) is not None,
     # On one thread start-up takes 4.6 to 6.4 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
     start_up_cost=390.0,

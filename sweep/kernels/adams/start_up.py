@@ -16,18 +16,18 @@ import numpy as np
 from sweep.jit import Cached, on_all_threads, serial
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
-    CONSTANTS,
     CORRECTOR_NODES,
     HISTORY,
     MATRIX,
-    NAMES,
     POINT,
     PREDICTOR_NODES,
     SLIPS,
     SLOPES,
+    At,
     accept_lines,
+    constants,
     load_lines,
-    power,
+    names,
     step_lines,
     store_lines,
 )
@@ -37,9 +37,8 @@ from sweep.kernels.layout import LANES, Layout
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import slip
 from sweep.models.model import Array
-from sweep.models.slip_split import SPLIT, implicit, momentum, newton, slow
+from sweep.models.split import Split
 
 # Steps of dopri5, in widths of the layer, and their number: after them the slip differs from its slow value by only
 # e^-14 of what it did at first.  Every second one of the last steps is a point of the history.  BDF5 would lose more
@@ -51,10 +50,16 @@ _SHARE, _DOPRI5_STEPS = 0.5, 28
 # 1e-10; without, the error is up to twelve times that of the method itself at h = 0.03.
 _LAYER_LEVELS, _EXTRA_STEPS = 2, 6
 
-# The quantities that a group keeps of a trajectory, and of a point of its history.
-_GROUP = Layout((*SPLIT.states, *CONSTANTS, "spacing", "h", "status", "ticks", "work", "per_weight", *MATRIX))
+# The quantities of a point of the history.
 _POINT = Layout((*POINT, "power{}"))
 _POINT_SIZE = len(_POINT.names) * LANES
+
+
+@cache
+def layout(split: Split) -> Layout:
+    """The quantities that a group keeps of a trajectory."""
+    more = ("spacing", "h", "status", "ticks", "work", "per_weight", *MATRIX)
+    return Layout((*split.model.states, *constants(split), *more))
 
 
 class Started(NamedTuple):
@@ -64,7 +69,7 @@ class Started(NamedTuple):
     """
 
     states: Array
-    """States of `slip_split`, shape (cells, 7)."""
+    """States of the split model, shape (cells, 7)."""
     history: Array
     """The eight points, newest last, each with the quantities of `POINT`, shape (cells, 56)."""
     powers: Array
@@ -77,12 +82,12 @@ class Started(NamedTuple):
     """Work of friction: the energy that it has dissipated, shape (cells,)."""
 
 
-def count_levels(resistance: Array, step: Array) -> Array:
+def count_levels(slip_decay: Array, step: Array) -> Array:
     """Number of levels, one or more: doublings of the spacing of the history, from two steps of dopri5 to `step`.
 
-    `resistance` is that of friction; both it and the result are of shape (cells,).
+    `slip_decay` is the rate at which the slip decays at first; both it and the result are of shape (cells,).
     """
-    return np.maximum(1, np.ceil(np.log2(step * (2.2 * resistance + 2.2) / (2 * _SHARE)))).astype(np.int64)
+    return np.maximum(1, np.ceil(np.log2(step * slip_decay / (2 * _SHARE)))).astype(np.int64)
 
 
 def _steps(levels: int) -> Array:
@@ -103,14 +108,14 @@ def duration(levels: Array) -> Array:
     return np.asarray(np.array([_duration(count) for count in range(1, levels.max() + 1)])[levels - 1])
 
 
-def start_up(step: Array, constants: Array, starts: Array, levels: Array) -> Started:
+def start_up(split: Split, step: Array, constants: Array, starts: Array, levels: Array) -> Started:
     """Take trajectories through start-up, from t = 0 to `duration(levels)` steps.
 
     Parameters
     ----------
     step : the final step, in sqrt(c/g), shape (cells,)
-    constants : constants of `slip_split`, shape (cells, constants)
-    starts : states of the slip model at t = 0, shape (cells, 7)
+    constants : constants of the split model, shape (cells, constants)
+    starts : states of the full model at t = 0, shape (cells, 7)
     levels : number of levels, from `count_levels`, shape (cells,)
     """
     groups = [
@@ -119,45 +124,49 @@ def start_up(step: Array, constants: Array, starts: Array, levels: Array) -> Sta
         for rows in [np.flatnonzero(levels == count)]
         for begin in range(0, len(rows), LANES)
     ]
-    begins = np.concatenate([starts, constants], axis=1)
+    kept, begins = layout(split), np.concatenate([starts, constants], axis=1)
     started = Started(
-        *(np.empty((len(step), n)) for n in (len(SPLIT.states), HISTORY * len(POINT), 3)),
+        *(np.empty((len(step), n)) for n in (len(split.model.states), HISTORY * len(POINT), 3)),
         *(np.empty(len(step)) for _ in range(3)),
     )
 
     def take(cells: Array) -> None:
         """Take the cells of one group through start-up; lanes that would stay empty repeat the last of them."""
         lanes, steps = np.pad(cells, (0, LANES - len(cells)), mode="edge"), _steps(levels[cells[0]])
-        group = np.zeros((len(_GROUP.names), LANES))
+        group = np.zeros((len(kept.names), LANES))
         group[: begins.shape[1]] = begins[lanes].T
-        group[_GROUP.row("spacing")] = step[lanes] / 2.0 ** len(steps)
-        group[_GROUP.row("h")] = 0.5 * group[_GROUP.row("spacing")]
+        group[kept.row("spacing")] = step[lanes] / 2.0 ** len(steps)
+        group[kept.row("h")] = 0.5 * group[kept.row("spacing")]
         points = np.zeros((HISTORY + steps.max(), len(_POINT.names), LANES))
         run(group.ravel(), points.ravel(), steps)
-        _store(started, cells, group[:, : len(cells)], points[:HISTORY, :, : len(cells)])
+        _store(started, cells, kept, group[:, : len(cells)], points[:HISTORY, :, : len(cells)])
 
-    run = compiled_start_up()
+    run = compiled_start_up(split)
     on_all_threads(take, groups)
     return started
 
 
-def _store(started: Started, cells: Array, group: Array, points: Array) -> None:
-    """Write what a group has come to, its quantities of shape (rows, cells), to the rows of these cells."""
-    started.states[cells] = group[: len(SPLIT.states)].T
+def _store(started: Started, cells: Array, kept: Layout, group: Array, points: Array) -> None:
+    """Write what a group has come to, its quantities `kept` of shape (rows, cells), to the rows of these cells."""
+    started.states[cells] = group[: started.states.shape[1]].T
     started.history[cells] = points[:, : len(POINT)].reshape(-1, len(cells)).T
     started.powers[cells] = points[:-4:-1, _POINT.row("power{}")].T
-    ticks, spacing = group[_GROUP.row("ticks")], group[_GROUP.row("spacing")]
-    started.begin[cells] = ticks * spacing
-    started.status[cells], started.work[cells] = group[_GROUP.row("status")], group[_GROUP.row("work")]
+    started.begin[cells] = group[kept.row("ticks")] * group[kept.row("spacing")]
+    started.status[cells], started.work[cells] = group[kept.row("status")], group[kept.row("work")]
 
 
-def _at(name: str) -> str:
+def _places(split: Split) -> At:
     """The place at which the loops below keep a quantity of one lane; point 0 of the history is the oldest."""
-    if name in _POINTS:
-        return f"points[{_POINTS[name]} + lane]"
-    if name.startswith(("gamma", "predict", "correct")):
-        return f"({_weights()[name]!r} * h)"
-    return f"group[{_GROUP.at(name)} + lane]"
+    kept = layout(split)
+
+    def at(name: str) -> str:
+        if name in _POINTS:
+            return f"points[{_POINTS[name]} + lane]"
+        if name.startswith(("gamma", "predict", "correct")):
+            return f"({_weights()[name]!r} * h)"
+        return f"group[{kept.at(name)} + lane]"
+
+    return at
 
 
 _POINTS = {
@@ -179,76 +188,86 @@ def _weights() -> dict[str, float]:
     }
 
 
-_BEGIN_STEP = [
-    *load_lines(_at),
-    f"h, status, work = {_at('h')}, {_at('status')}, {_at('work')}",
-    f"active = status == {RUNNING}",
-]
-
-
-def _end_step(ticks: str) -> list[str]:
-    return [f"{_at('ticks')} += {ticks} if accepted else 0.0", f"{_at('work')} = work + (done if accepted else 0.0)"]
-
-
-_DOPRI5 = [
-    *_BEGIN_STEP,
-    "new, _, done, sound, airborne, jammed = step(y, p, h)",
-    "accepted = active & sound",
-    *(f"{_at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(SPLIT.states)),
-    f"failure = {PARADOX} if jammed else ({LIFT_OFF} if airborne else {DIVERGED})",
-    f"{_at('status')} = failure if active & (not sound) else status",
-    *_end_step("0.5"),
-]
-
-_TO_SPLIT = [*load_lines(_at), "s = momentum(y, p)"]
-
-# Makes point 0 of the history from a state of the slip model.
-_RECORD = [
-    *_TO_SPLIT,
-    "f, geometry = slow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)",
-    "_, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, p, 0.0, 0.0, 0.0)",
-    *(f"{_at(name.format(0))} = f[{i}]" for i, name in enumerate(SLOPES)),
-    *(f"{_at(name.format(0))} = s[{5 + i}]" for i, name in enumerate(SLIPS)),
-    f"{_at('power0')} = power(num, den, s[5], s[6], geometry, p)",
-]
-
-_REPLACE = [*_TO_SPLIT, *(f"{_at(name)} = s[{i}]" for i, name in enumerate(SPLIT.states))]
-
-
-def _set_step() -> list[str]:
+def _begin_step(split: Split, at: At) -> list[str]:
     return [
-        *load_lines(_at),
-        f"h = ticks * {_at('spacing')}",
-        f"{_at('h')} = h",
-        f"{_at('per_weight')} = 1.0 / {_at('correct0')}",
-        f"matrix = implicit({_at('correct0')}, p)",
-        *(f"{_at(name)} = matrix[{i}]" for i, name in enumerate(MATRIX)),
+        *load_lines(split, at),
+        f"h, status, work = {at('h')}, {at('status')}, {at('work')}",
+        f"active = status == {RUNNING}",
     ]
 
 
-def _advance() -> list[str]:
+def _end_step(at: At, ticks: str) -> list[str]:
+    return [f"{at('ticks')} += {ticks} if accepted else 0.0", f"{at('work')} = work + (done if accepted else 0.0)"]
+
+
+def _dopri5(split: Split, at: At) -> list[str]:
+    return [
+        *_begin_step(split, at),
+        "new, _, done, sound, airborne, jammed = step(y, p, h)",
+        "accepted = active & sound",
+        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(split.model.states)),
+        f"failure = {PARADOX} if jammed else ({LIFT_OFF} if airborne else {DIVERGED})",
+        f"{at('status')} = failure if active & (not sound) else status",
+        *_end_step(at, "0.5"),
+    ]
+
+
+def _to_split(split: Split, at: At) -> list[str]:
+    return [*load_lines(split, at), "s = momentum(y, p)"]
+
+
+def _record(split: Split, at: At) -> list[str]:
+    """Make point 0 of the history from a state of the full model."""
+    return [
+        *_to_split(split, at),
+        "f, geometry = slow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)",
+        "_, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, p, 0.0, 0.0, 0.0)",
+        *(f"{at(name.format(0))} = f[{i}]" for i, name in enumerate(SLOPES)),
+        *(f"{at(name.format(0))} = s[{5 + i}]" for i, name in enumerate(SLIPS)),
+        f"{at('power0')} = power(num / den, s[5], s[6], geometry, p)",
+    ]
+
+
+def _replace(split: Split, at: At) -> list[str]:
+    return [*_to_split(split, at), *(f"{at(name)} = s[{i}]" for i, name in enumerate(split.model.states))]
+
+
+def _set_step(split: Split, at: At) -> list[str]:
+    return [
+        *load_lines(split, at),
+        f"h = ticks * {at('spacing')}",
+        f"{at('h')} = h",
+        f"{at('per_weight')} = 1.0 / {at('correct0')}",
+        f"matrix = implicit({at('correct0')}, p)",
+        *(f"{at(name)} = matrix[{i}]" for i, name in enumerate(MATRIX)),
+    ]
+
+
+def _advance(split: Split, at: At) -> list[str]:
     """Steps from points 0 … 7 to point 8; the work follows from the Adams-Moulton formula of order four."""
     return [
-        *_BEGIN_STEP,
-        *step_lines(_at, range(HISTORY)[::-1]),
-        *store_lines(_at, HISTORY),
-        f"{_at('power8')} = power",
-        f"done = h / 24.0 * (9.0 * power + 19.0 * {_at('power7')} - 5.0 * {_at('power6')} + {_at('power5')})",
-        *accept_lines(_at),
-        *_end_step("ticks"),
+        *_begin_step(split, at),
+        *step_lines(at, range(HISTORY)[::-1]),
+        *store_lines(at, HISTORY),
+        f"{at('power8')} = power",
+        f"done = h / 24.0 * (9.0 * power + 19.0 * {at('power7')} - 5.0 * {at('power6')} + {at('power5')})",
+        *accept_lines(split, at),
+        *_end_step(at, "ticks"),
     ]
 
 
 @cache
-def compiled_start_up() -> Cached:
+def compiled_start_up(split: Split) -> Cached:
     """Compiled (group, points, steps) -> None: takes a group through all its levels."""
-    names = NAMES | {"slow": slow, "newton": newton, "momentum": momentum, "implicit": implicit, "power": power}
-    names["step"] = make_step(DOPRI5, slip.rhs, len(SPLIT.states))
-    record = compile_lanes("record", "group, points", _RECORD, names)
-    replace = compile_lanes("replace", "group", _REPLACE, names)
-    dopri5 = compile_lanes("dopri5", "group", _DOPRI5, names)
-    set_step = compile_lanes("set_step", "group, ticks", _set_step(), names)
-    advance = compile_lanes("advance", "group, points, ticks", _advance(), names)
+    at = _places(split)
+    known = names(split) | {"slow": split.slow, "newton": split.newton, "power": split.power}
+    known |= {"momentum": split.momentum, "implicit": split.implicit}
+    known["step"] = make_step(DOPRI5, split.full.rhs, len(split.model.states))
+    record = compile_lanes("record", "group, points", _record(split, at), known)
+    replace = compile_lanes("replace", "group", _replace(split, at), known)
+    dopri5 = compile_lanes("dopri5", "group", _dopri5(split, at), known)
+    set_step = compile_lanes("set_step", "group, ticks", _set_step(split, at), known)
+    advance = compile_lanes("advance", "group, points, ticks", _advance(split, at), known)
     size, dopri5_steps = _POINT_SIZE, _DOPRI5_STEPS
 
     def run(group: Any, points: Any, steps: Any) -> None:
@@ -268,4 +287,4 @@ def compiled_start_up() -> Cached:
                 for i in range(size):
                     points[j * size + i] = points[(steps[level] - HISTORY + 1 + 2 * j) * size + i]
 
-    return serial(run, "start-up")
+    return serial(run, f"start-up-{split.full.name}")

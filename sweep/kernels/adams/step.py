@@ -1,7 +1,7 @@
 """One step of the stiff method, used both in its main loop and in its start-up.
 
-The arithmetic is in `solve`, an ordinary inline function.  Only the sums over the history are generated as text,
-because the places of the points have to be known when the code is compiled.
+The arithmetic is in `solve`, an ordinary inline function, made for each model.  Only the sums over the history are
+generated as text, because the places of the points have to be known when the code is compiled.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from typing import Any
 
 from sweep.jit import inline
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
-from sweep.models import friction
-from sweep.models.slip_split import SPLIT, newton, slow
+from sweep.models.split import Split
 
 HISTORY = 8
 PREDICTOR_NODES = tuple(-j for j in range(8))
@@ -31,9 +30,7 @@ POINT = (*SLOPES, *SLIPS)
 """Quantities of a point of the history, to be formatted with its slot: the slopes of (u, M), and the slip."""
 
 MATRIX = tuple(f"P{i}{j}" for i in range(4) for j in range(4))
-"""Elements of P, the implicit part of the corrector (see `slip_split.implicit`)."""
-
-CONSTANTS = tuple(f"constant.{name}" for name in SPLIT.constants._fields)
+"""Elements of P, the implicit part of the corrector (see `Split.implicit`)."""
 
 At = Callable[[str], str]
 """Tells where a quantity of one lane is kept: (name) -> an expression that can be read and assigned to."""
@@ -51,57 +48,61 @@ def correct(q: Any, g: Any, f: Any, weight: Any, P: Any) -> Any:
     return (r0, r1, r2, r3), (d0, d1, d2, d3)
 
 
-@inline
-def solve(q: Any, g: Any, e: Any, b: Any, p: Any, weight: Any, per_weight: Any, gamma: Any, P: Any) -> Any:
-    """The new point, from the sums over the history.
+def make_solve(split: Split) -> Any:
+    """Inline (q, g, e, b, p, weight, per_weight, gamma, P) -> (states, slopes, spin, (num, den) of R, power).
+
+    This is the new point, from the sums over the history.
 
     Parameters
     ----------
     q : predicted (u, M), five numbers
     g : the corrector for (u, M) without the term of the new slope, five numbers
     e, b : extrapolated slip, and the BDF formula without the term of the new slope, two numbers each
-    p : constants of `slip_split`
+    p : constants of the split model
     weight, per_weight : weight of the new slope in the corrector, and 1/weight
     gamma : weight of the new slope in the BDF formula
     P : the implicit part of the corrector, row by row, sixteen numbers
 
-    Returns
-    -------
-    (states, slopes, spin, (num, den) of R, power of friction); the slopes are those that the corrected states imply.
+    The slopes returned are those that the corrected states imply, and the power is that of friction.
     """
-    f, geometry = slow(q[0], q[1], q[2], q[3], q[4], e[0], e[1], p)
-    v0, v1, num, den = newton(q[0], q[1], e[0], e[1], geometry, p, gamma, b[0], b[1])
-    _, d = correct(q, g, f, weight, P)
-    q = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4])
-    f, geometry = slow(q[0], q[1], q[2], q[3], q[4], v0, v1, p)
-    r, d = correct(q, g, f, weight, P)
-    states = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4], v0, v1)
-    slopes = (
-        f[0] + (d[0] - r[0]) * per_weight,
-        f[1] + (d[1] - r[1]) * per_weight,
-        f[2] + (d[2] - r[2]) * per_weight,
-        f[3] + (d[3] - r[3]) * per_weight,
-        f[4],
-    )
-    spin = q[0] * geometry.w1 + q[1] * geometry.w2 + geometry.u3 * geometry.w3
-    return states, slopes, spin, (num, den), power(num, den, v0, v1, geometry, p)
+    slow, newton, power = split.slow, split.newton, split.power
+
+    @inline
+    def solve(q: Any, g: Any, e: Any, b: Any, p: Any, weight: Any, per_weight: Any, gamma: Any, P: Any) -> Any:
+        f, geometry = slow(q[0], q[1], q[2], q[3], q[4], e[0], e[1], p)
+        v0, v1, num, den = newton(q[0], q[1], e[0], e[1], geometry, p, gamma, b[0], b[1])
+        _, d = correct(q, g, f, weight, P)
+        q = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4])
+        f, geometry = slow(q[0], q[1], q[2], q[3], q[4], v0, v1, p)
+        r, d = correct(q, g, f, weight, P)
+        states = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4], v0, v1)
+        slopes = (
+            f[0] + (d[0] - r[0]) * per_weight,
+            f[1] + (d[1] - r[1]) * per_weight,
+            f[2] + (d[2] - r[2]) * per_weight,
+            f[3] + (d[3] - r[3]) * per_weight,
+            f[4],
+        )
+        spin = q[0] * geometry.w1 + q[1] * geometry.w2 + geometry.u3 * geometry.w3
+        return states, slopes, spin, (num, den), power(num / den, v0, v1, geometry, p)
+
+    return solve
 
 
-@inline
-def power(num: Any, den: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
-    """Power of friction at a point with slip (v1, v2) and normal force num/den."""
-    v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
-    return friction.dissipation(num / den, v1, v2, v3, p)
+def constants(split: Split) -> tuple[str, ...]:
+    """The quantities of an image that hold the constants."""
+    return tuple(f"constant.{name}" for name in split.model.constants._fields)
 
 
-NAMES = {"solve": solve, "Constants": SPLIT.constants}
-"""The names to which the generated lines refer."""
+def names(split: Split) -> dict[str, Any]:
+    """What the generated lines refer to."""
+    return {"solve": make_solve(split), "Constants": split.model.constants}
 
 
-def load_lines(at: At) -> list[str]:
+def load_lines(split: Split, at: At) -> list[str]:
     """Lines that load the constants p and the states y."""
-    constants, states = (" ".join(f"{at(name)}," for name in names) for names in (CONSTANTS, SPLIT.states))
-    return [f"p = Constants({constants})", f"y = ({states})"]
+    values, states = (" ".join(f"{at(name)}," for name in names) for names in (constants(split), split.model.states))
+    return [f"p = Constants({values})", f"y = ({states})"]
 
 
 def step_lines(at: At, slots: Sequence[int]) -> list[str]:
@@ -138,10 +139,10 @@ def store_lines(at: At, slot: int) -> list[str]:
     ]
 
 
-def accept_lines(at: At) -> list[str]:
+def accept_lines(split: Split, at: At) -> list[str]:
     """Lines that write the new states if `accepted`, and the status of a failure if `active` but not `sound`."""
     return [
-        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(SPLIT.states)),
+        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(split.model.states)),
         f"failure = {PARADOX} if den <= 0.0 else ({LIFT_OFF} if num <= 0.0 else {DIVERGED})",
         f"{at('status')} = failure if active & (not sound) else status",
     ]

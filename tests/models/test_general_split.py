@@ -1,0 +1,107 @@
+"""The split form of the general equations, for the stiff method: the same motion in other variables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sweep.models import find, general_split, solid, splits
+from sweep.models.model import Columns
+
+COUNT = 40
+
+
+def bodies(**replaced: float) -> Columns:
+    random = np.random.default_rng(3)
+    ranges = {
+        "a": (0.15, 0.25), "b": (0.025, 0.04), "c": (0.02, 0.02), "offset": (-0.002, 0.01), "mass": (1.3, 1.3),
+        "Ixx": (1e-4, 3e-4), "Iyy": (1.5e-3, 1.6e-3), "Izz": (1.6e-3, 1.7e-3), "Ixy": (-2e-5, 2e-5),
+        "Ixz": (-3e-5, 3e-5), "Iyz": (-1e-5, 1e-5), "gravity": (9.81, 9.81), "mu": (1, 50), "sigma": (0, 1e-3),
+    }  # fmt: skip
+    drawn = {name: random.uniform(*range_, COUNT) for name, range_ in ranges.items()}
+    return drawn | {name: np.full(COUNT, value) for name, value in replaced.items()}
+
+
+def states() -> np.ndarray:
+    random = np.random.default_rng(4)
+    spans = (0.2, 0.2, 3, 3, 5, 0.1, 0.1)
+    return np.array([random.uniform(-span, span, COUNT) for span in spans])
+
+
+@pytest.mark.parametrize("name", ["slip+viscous", "slip+viscous+sigma"])
+def test_they_are_the_equations_of_the_full_model(name: str) -> None:
+    model, body, y = find(name), bodies(), states()
+    split = splits.of(model)
+    assert split is not None
+    full, p = model.constants.of(body), split.model.constants.of(body)
+    slopes, (_, power, R, denominator) = model.rhs(y, full)
+    z = np.array(split.momentum(y, p))
+    np.testing.assert_allclose(split.velocities(z, p), y, atol=1e-12)
+    # M' along the full model's motion, by a complex step through the change of variables.
+    moved = np.array(split.momentum(y + 1e-30j * np.array(slopes), p)).imag / 1e-30
+    ours, geometry = split.slow(*z, p)
+    np.testing.assert_allclose(ours, moved[:5], atol=1e-13 * np.abs(moved).max())
+    gamma = 1e-10
+    v1, v2, num, den = split.newton(*z[[0, 1, 5, 6]], geometry, p, gamma, y[5], y[6])
+    np.testing.assert_allclose((np.array([v1, v2]) - y[5:]) / gamma, slopes[5:], rtol=1e-4, atol=1e-2)
+    np.testing.assert_allclose([num / den, den], [R, denominator], rtol=1e-12)
+    np.testing.assert_allclose(split.power(R, y[5], y[6], geometry, p), power, rtol=1e-12)
+    np.testing.assert_allclose(split.model.energy(z, p), model.energy(y, full), rtol=1e-12, atol=1e-13)
+    if "sigma" in name:
+        assert (power > split.power(R, y[5], y[6], geometry, p._replace(damping=0.0))).all()
+
+
+def test_newton_leaves_little_of_the_residual() -> None:
+    model, body, y = find("slip+viscous+sigma"), bodies(mu=500), states()
+    y[5:] *= 0.01
+    split = splits.of(model)
+    assert split is not None
+    full, p = model.constants.of(body), split.model.constants.of(body)
+    z, gamma, v = np.array(split.momentum(y, p)), 0.01, y[5:]
+
+    def rate(v: np.ndarray) -> np.ndarray:
+        return np.array(model.rhs(split.velocities(np.array([*z[:5], *v]), p), full)[0][5:])
+
+    base, start = v - gamma * rate(v), v + 1e-6 * np.random.default_rng(5).uniform(-1, 1, v.shape)
+    _, geometry = split.slow(*z[:5], *start, p)
+    end = np.array(split.newton(z[0], z[1], *start, geometry, p, gamma, *base)[:2])
+    assert np.abs(end - v).max() < 0.03 * np.abs(start - v).max()
+
+
+def test_rocking_and_the_matrix_of_the_corrector_against_derivatives() -> None:
+    """At zero angular momentum about the vertical; the products of inertia with z are allowed for in `ROCKING`."""
+    body = bodies(Ixz=0.0, Iyz=0.0)
+    split = splits.of(find("slip+viscous"))
+    assert split is not None
+    p = split.model.constants.of(body)
+    slopes = [split.slow(*(1e-30j * np.eye(7)[i][:, None] * np.ones(COUNT)), p)[0][:4] for i in range(4)]
+    J = np.moveaxis(np.array(slopes).imag / 1e-30, 2, 0).swapaxes(1, 2)
+    weight = 0.004
+    inverse = np.moveaxis(np.array(np.broadcast_arrays(*split.implicit(weight, p))).reshape(4, 4, COUNT), 2, 0)
+    np.testing.assert_allclose(inverse @ (np.eye(4) - weight * J), np.eye(4) + 0 * J, atol=1e-12)
+    fastest = np.abs(np.linalg.eigvals(J).imag).max(axis=1)
+    np.testing.assert_allclose(split.fastest_rocking(p), fastest, rtol=1e-6)
+    skew = bodies()
+    _, higher = solid.frequencies(skew)
+    np.testing.assert_allclose(split.fastest_rocking(split.model.constants.of(skew)), higher, rtol=1e-12)
+
+
+def test_the_ripple_is_that_of_the_full_model() -> None:
+    """To first order in the rattle, which is all that it is good for."""
+    for body in (bodies(Ixz=0.0, Iyz=0.0), bodies()):
+        model, y = find("slip+viscous"), states()
+        split = splits.of(model)
+        assert split is not None
+        y[[0, 1, 2, 3, 5, 6]] *= 1e-6
+        full, p = model.constants.of(body), split.model.constants.of(body)
+        coefficients = model.ripple.of(body)
+        z = np.array(split.momentum(y, p))
+        ours, theirs = split.model.ripple.value(z, p, coefficients), model.ripple.value(y, full, coefficients)
+        assert np.abs(ours - theirs).max() < 1e-3 * np.abs(theirs).max()
+
+
+@pytest.mark.parametrize(
+    "name", ["slip+coulomb-sqrt", "slip+none", "slip+viscous+rolling", "slip+viscous+sigma+rolling", "noslip+solid"]
+)
+def test_models_that_have_no_split_form(name: str) -> None:
+    assert general_split.split(find(name)) is None
