@@ -13,13 +13,16 @@ from bokeh.models import Column, ColumnDataSource, CustomJS, Div
 
 from sweep.explore import controls, export, figure, page
 from sweep.explore import state as states
-from sweep.explore.cells import Curve, News, Runner, Setup, usable
+from sweep.explore.cells import News, Runner, Setup, usable
+from sweep.explore.chosen import CellControls
 from sweep.explore.colours import CURVES
 from sweep.explore.controls import escaped
 from sweep.explore.curves import Curves
+from sweep.explore.drawn import Drawn
 from sweep.explore.lines import critical_lines
+from sweep.explore.saving import Saving
 from sweep.explore.slices import Source
-from sweep.explore.state import MAX_CELLS, Cell, State
+from sweep.explore.state import Cell, State
 from sweep.plots import labels
 
 _BESIDE = ("reversals", "reversals_predicted", "status")
@@ -37,22 +40,15 @@ class View:
         runner: Runner,
         query: Mapping[str, Sequence[str]],
     ) -> None:
-        self._document, self._source, self._setup, self._runner = document, source, setup, runner
+        self._document, self._source, self._setup = document, source, setup
         self._base: Cell = setup.base if setup else {}
-        self.state, faults = states.read(query, source, self._base)
-        self._curves: list[Curve | None] = [None] * len(self.state.cells)
-        self._keys = list(range(len(self.state.cells)))
-        self._next_key = len(self._keys)
-        self._active = max(len(self.state.cells) - 1, 0)
-        self._running: dict[int, News] = {}
-        self._drawn: figure.Map | None = None
-        self._faults = faults
+        self.state, self._faults = states.read(query, source, self._base)
+        self._shown: figure.Map | None = None
         self._build()
+        self._drawn = Drawn(self.state.cells, setup, runner, self._tell)
         self._draw_map()
         self._draw_cells()
-        for key, cell in zip(self._keys, self.state.cells, strict=True):
-            self._submit(key, cell)
-        document.on_session_destroyed(self._leave)
+        document.on_session_destroyed(lambda _: self._drawn.leave())
 
     # ---- parts of the page
 
@@ -73,13 +69,13 @@ class View:
         self._document.js_on_event("document_ready", CustomJS(args=args, code=code))
         self._figures = Curves()
         self._controls = controls.MapControls(self._source, self._change)
-        self._chosen = controls.CellControls(self._source, self._base, self._edit, self._activate, self._remove)
+        self._chosen = CellControls(self._source, self._base, self._edit, self._activate, self._remove)
         self._hint = Div(text=controls.EMPTY, sizing_mode="stretch_width")
         plots = (self._figures.spin, self._figures.energy)
         curves = Column(self._hint, *plots, sizing_mode="stretch_width", name="curves")
         path = Column(self._figures.path, self._figures.player, sizing_mode="stretch_width", name="path")
         self._shown_with_curves = (*plots, *path.children)
-        self._saving = controls.Saving(
+        self._saving = Saving(
             self._source, self._netcdf, self._yaml if self._setup else None, self._map,
             [self._figures.spin, self._figures.energy, self._figures.path],
         )  # fmt: skip
@@ -106,12 +102,12 @@ class View:
         part = self._source.slice(state.show, state.x, state.y, state.at, beside)
         columns = {state.show: part.values, **{name: part.dataset[name].values for name in beside}}
         lines = critical_lines(self._source, part, state.at)
-        if self._drawn is None or self._drawn.axes != (state.x, state.y):
-            self._drawn = figure.Map(self._source, part.x, part.y, self._probe, self._request)
-            self._map.children = [self._drawn.figure]
-            controls.on(self._drawn.cursor, "data", lambda _: self._point())
+        if self._shown is None or self._shown.axes != (state.x, state.y):
+            self._shown = figure.Map(self._source, part.x, part.y, self._probe, self._request)
+            self._map.children = [self._shown.figure]
+            controls.on(self._shown.cursor, "data", lambda _: self._point())
         self._part = part
-        self._legend.text = page.legend(part, self._drawn.show(part, columns, lines), lines)
+        self._legend.text = page.legend(part, self._shown.show(part, columns, lines), lines)
         self._controls.show(state)
 
     def _index(self, i: int, j: int) -> dict[str, int] | None:
@@ -131,8 +127,8 @@ class View:
     def _point(self) -> None:
         """Tell about the cell under the pointer, or else about the chosen one."""
         index = self._place(self._probe)
-        if index is None and self._drawn:
-            index = self._place(self._drawn.cursor)
+        if index is None and self._shown:
+            index = self._place(self._shown.cursor)
         if index is None:
             self._cell.text = controls.HINT if self._setup else controls.HINT_STILL
             return
@@ -150,87 +146,54 @@ class View:
         self._add(cell, beside=bool(self._request.data["add"][0]) or self._chosen.keeps)
 
     def _add(self, cell: Cell, *, beside: bool) -> None:
-        if cell in self.state.cells:
-            self._activate(self.state.cells.index(cell))
+        if cell in self._drawn.cells:
+            self._activate(self._drawn.cells.index(cell))
             return
-        if not beside or not self._keys:
-            for key in self._keys:
-                self._forget(key)
-            self._keys, self._curves = [], []
-        cells = self.state.cells if self._keys else ()
-        if len(cells) == MAX_CELLS:
-            self._forget(self._keys.pop(0))
-            self._curves.pop(0)
-            cells = cells[1:]
-        self._keys.append(self._next_key)
-        self._next_key += 1
-        self._curves.append(None)
-        self.state = replace(self.state, cells=(*cells, cell))
-        self._active = len(self._keys) - 1
-        self._submit(self._keys[-1], cell)
+        self._faults = []
+        self._drawn.add(cell, beside=beside)
         self._draw_cells()
 
     def _edit(self, name: str, value: float) -> None:
         """Run the active cell with another value of a parameter."""
-        if not self.state.cells or not self._setup:
+        if not self._drawn.cells or not self._setup:
             return
-        cell = {**self.state.cells[self._active], name: value}
         if fault := states.wrong_value(name, value):
             self._faults = [fault]
             self._draw_progress()
             return
-        cells = list(self.state.cells)
-        cells[self._active] = cell
-        self.state = replace(self.state, cells=tuple(cells))
-        self._submit(self._keys[self._active], cell)
+        self._faults = []
+        self._drawn.change({**self._drawn.cells[self._drawn.active], name: value})
         self._draw_cells()
 
     def _activate(self, k: int) -> None:
-        self._active = k
+        self._drawn.active = k
         self._draw_cells()
 
     def _remove(self, k: int) -> None:
-        self._forget(self._keys.pop(k))
-        self._curves.pop(k)
-        self.state = replace(self.state, cells=(*self.state.cells[:k], *self.state.cells[k + 1 :]))
-        self._active = max(min(self._active, len(self._keys) - 1), 0)
+        self._drawn.remove(k)
         self._draw_cells()
-
-    def _forget(self, key: int) -> None:
-        self._running.pop(key, None)
-        self._runner.cancel(lambda other: other == (id(self), key))
-
-    def _submit(self, key: int, cell: Cell) -> None:
-        if self._setup:
-            self._faults = []
-            self._running[key] = News()
-            self._runner.submit((id(self), key), self._setup, cell, partial(self._tell, key))
 
     def _tell(self, key: int, news: News) -> None:
         """Called on the thread of the trajectories."""
         self._document.add_next_tick_callback(partial(self._hear, key, news))
 
     def _hear(self, key: int, news: News) -> None:
-        if key not in self._keys:
-            return
-        self._running[key] = news
-        if news.curve or news.fault:
-            del self._running[key]
+        if self._drawn.hear(key, news):
             self._faults = [news.fault] if news.fault else self._faults
-        if news.curve:
-            self._curves[self._keys.index(key)] = news.curve
-            self._draw_curves()
-        self._draw_progress()
+            if news.curve:
+                self._draw_curves()
+            self._draw_progress()
 
     def _draw_cells(self) -> None:
         """The list of cells, their pins on the map, the curves and the address."""
-        cells, source = self.state.cells, self._source
-        self._chosen.show(cells, self._names(), self._active)
+        cells, source = self._drawn.cells, self._source
+        self.state = replace(self.state, cells=tuple(cells))
+        self._chosen.show(cells, self._names(), self._drawn.active)
         x, y = self.state.x, self.state.y
         on_map = [(k, cell) for k, cell in enumerate(cells) if x in cell and (not y or y in cell)]
         here = {d: source.axes[d].values[i] for d, i in self.state.at.items() if d not in (x, y)}
-        assert self._drawn
-        self._drawn.pins.data = {
+        assert self._shown
+        self._shown.pins.data = {
             "x": [source.axes[x].place(cell[x]) for _, cell in on_map],
             "y": [source.axes[y].place(cell[y]) if y else 0.0 for _, cell in on_map],
             "colour": [CURVES[k] for k, _ in on_map],
@@ -245,30 +208,28 @@ class View:
     def _draw_curves(self) -> None:
         names = [
             f"{k + 1}: {name}" + (f", {len(curve.reversals)} reversals" if curve else "")
-            for k, (name, curve) in enumerate(zip(self._names(), self._curves, strict=True))
+            for k, (name, curve) in enumerate(zip(self._names(), self._drawn.curves, strict=True))
         ]
-        self._hint.visible = not any(self._curves)
+        self._hint.visible = not any(self._drawn.curves)
         for part in self._shown_with_curves:
-            part.visible = any(self._curves)
-        self._figures.show(self._curves, names, self._active)
-        self._chosen.tell(self._curves)
+            part.visible = any(self._drawn.curves)
+        self._figures.show(self._drawn.curves, names, self._drawn.active)
+        self._chosen.tell(self._drawn.curves)
 
     def _names(self) -> list[str]:
         """What tells the cells apart."""
-        cells, base = self.state.cells, self._base
+        cells, base = self._drawn.cells, self._base
         varied = [n for n in base if n not in self._source.dims and any(cell[n] != base[n] for cell in cells)]
         varied = [*(n for n in self._source.dims if n in base), *varied]
         return [", ".join(labels.value(n, cell[n]) for n in varied) or "the cell" for cell in cells]
 
     def _draw_progress(self) -> None:
-        lines = []
-        for key, news in self._running.items():
-            name = self._names()[self._keys.index(key)]
-            lines.append(controls.progress(f"{name}: {news.note or f'{news.share:.0%}'}", news.share))
-        self._say(self._faults, lines)
-
-    def _say(self, faults: Sequence[str], lines: Sequence[str] = ()) -> None:
-        told = [f'<div class="fault">{escaped(fault)}</div>' for fault in faults]
+        names = self._names()
+        told = [f'<div class="fault">{escaped(fault)}</div>' for fault in self._faults]
+        lines = [
+            controls.progress(f"{names[k]}: {news.note or f'{news.share:.0%}'}", news.share)
+            for k, news in self._drawn.running()
+        ]
         self._notice.text = "".join([*told, *lines])
 
     # ---- files
@@ -277,14 +238,11 @@ class View:
         return states.write(self.state, self._source, self._base)
 
     def _netcdf(self) -> bytes:
-        return export.netcdf(self._source, self._query(), self.state, [curve for curve in self._curves if curve])
+        return export.netcdf(self._source, self._query(), self.state, [curve for curve in self._drawn.curves if curve])
 
     def _yaml(self) -> bytes:
         assert self._setup
         return export.yaml(self._source, self._setup, self.state, f"{self._saving.stem}.yaml").encode()
-
-    def _leave(self, _context: object) -> None:
-        self._runner.cancel(lambda key: key != "first" and key[0] == id(self))
 
 
 def make(source: Source, runner: Runner) -> Callable[[Document], None]:
