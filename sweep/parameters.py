@@ -105,6 +105,14 @@ PARAMETERS: dict[str, Parameter] = {
             "speed_rolling", "friction", "1", "angular velocity below which rolling friction fades, in sqrt(g/c)", None,
             above=0, below=1e6,
         ),
+        Parameter("mu_spinning", "friction", "1", "coefficient of spinning friction", None, at_least=0, below=1e6),
+        Parameter(
+            "radius_spinning", "friction", "1", "contact radius of spinning friction, in c", None, above=0, below=1e6
+        ),
+        Parameter(
+            "speed_spinning", "friction", "1", "spin below which spinning friction fades, in sqrt(g/c)", None,
+            above=0, below=1e6,
+        ),
         Parameter(
             "n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05, above=-1e3, below=1e3
         ),

@@ -46,6 +46,9 @@ BASES = ("slip", "noslip")
 SOLID = "solid"
 """Stands in place of the law in the names of variants without slip."""
 
+_STILL = "still"
+"""The constant `Model.still` of variants with a couple that stops the body."""
+
 
 @cache
 def variant(name: str, parameters: tuple[str, ...] = ()) -> Model:
@@ -89,19 +92,65 @@ def _record(constants: Sequence[str], more: Any) -> type[Any]:
 
 def _couple_constants(couples: Sequence[Couple]) -> tuple[tuple[str, ...], Any]:
     names = tuple(name for couple in couples for name in couple.constants)
-    return names, lambda columns: tuple(value for couple in couples for value in couple.of(columns))
+    stopping = [couple.stops_below for couple in couples if couple.stops_below]
+
+    def values(columns: Columns) -> tuple[Array, ...]:
+        still = (_still(stops_below(columns), columns) for stops_below in stopping)
+        return (*(value for couple in couples for value in couple.of(columns)), *still)
+
+    return (*names, *(_STILL for _ in stopping)), values
+
+
+def _still(speed: Array, columns: Columns) -> Array:
+    """Energy that allows no angular velocity above `speed`, per unit mass, shape (cells,)."""
+    return np.asarray(0.5 * np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0] * speed**2)
 
 
 def _resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
     """The resistance by itself and the one per unit of the normal force."""
     found: list[Any] = [nothing, nothing]
     for couple in couples:
-        found[couple.needs_normal_force] = couple.resistance
+        if not couple.about_normal:
+            found[couple.needs_normal_force] = couple.resistance
     return found[0], found[1]
 
 
+def _drag(couples: Sequence[Couple]) -> tuple[Any, Any]:
+    """Inline, (k, ω, u, constants) -> (k', d): the couple per unit of the normal force is -k' d.
+
+    It is -k ω, and where a couple about the normal is among `couples` also that one.  The other function is
+    (R k', k0, ω², d · ω) -> power of all couples, where k0 is the resistance by itself.
+    """
+    about_normal = [couple.resistance for couple in couples if couple.about_normal]
+    if not about_normal:
+        return _isotropic, _isotropic_power
+    (resistance,) = about_normal
+
+    @inline
+    def drag(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+        n = u1 * w1 + u2 * w2 + u3 * w3
+        m = resistance(n * n, p) * n
+        return 1.0, k * w1 + m * u1, k * w2 + m * u2, k * w3 + m * u3
+
+    @inline
+    def lost(load: Any, k0: Any, turn_square: Any, turned: Any) -> Any:
+        return load * turned + k0 * turn_square
+
+    return drag, lost
+
+
+@inline
+def _isotropic_power(load: Any, k0: Any, turn_square: Any, turned: Any) -> Any:  # noqa: ARG001
+    return (load + k0) * turn_square
+
+
+@inline
+def _isotropic(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:  # noqa: ARG001
+    return k, w1, w2, w3
+
+
 def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[str, ...]) -> Model:
-    resistance, (plain, loaded) = law.resistance, _resistances(couples)
+    resistance, (plain, loaded), (drag, _) = law.resistance, _resistances(couples), _drag(couples)
     names, values = _couple_constants(couples)
 
     @inline
@@ -119,12 +168,13 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
         turn_square = w1 * w1 + w2 * w2 + w3 * w3
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
+        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
         al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
         al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
         al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
-        t1, t2, t3 = y_ * f3 - z * f2 - k1 * w1, z * f1 - x * f3 - k1 * w2, x * f2 - y_ * f1 - k1 * w3
+        t1, t2, t3 = y_ * f3 - z * f2 - k1 * d1, z * f1 - x * f3 - k1 * d2, x * f2 - y_ * f1 - k1 * d3
         be1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
         be2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
         be3 = p.inv_J13 * t1 + p.inv_J23 * t2 + p.inv_J33 * t3
@@ -138,7 +188,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         dv2 = R * f2 - p.g * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
 
         spin = u1 * w1 + u2 * w2 + u3 * w3
-        power = R * (k * slip_square + k1 * turn_square) + k0 * turn_square
+        power = R * (k * slip_square + k1 * (d1 * w1 + d2 * w2 + d3 * w3)) + k0 * turn_square
         return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, power, R, denominator)
 
     @inline
@@ -176,12 +226,13 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         observe=observe,
         spin_unit=solid.spin_unit,
         faint="" if law.linear_to is None else "faint",
+        still=_STILL if _STILL in names else "",
         extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
     )
 
 
 def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) -> Model:
-    plain, loaded = _resistances(couples)
+    (plain, loaded), (drag, lost) = _resistances(couples), _drag(couples)
     names, values = _couple_constants(couples)
 
     @inline
@@ -194,6 +245,7 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         h1, h2, h3 = p.g * u1 + c1, p.g * u2 + c2, p.g * u3 + c3
         turn_square = w1 * w1 + w2 * w2 + w3 * w3
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
+        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         t1 = m1 + y_ * h3 - z * h2 - k0 * w1
         t2 = m2 + z * h1 - x * h3 - k0 * w2
@@ -209,16 +261,16 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         a1 = inv * (C11 * t1 + C12 * t2 + C13 * t3)
         a2 = inv * (C12 * t1 + C22 * t2 + C23 * t3)
         a3 = inv * (C13 * t1 + C23 * t2 + C33 * t3)
-        b1 = inv * (C11 * w1 + C12 * w2 + C13 * w3)
-        b2 = inv * (C12 * w1 + C22 * w2 + C23 * w3)
-        b3 = inv * (C13 * w1 + C23 * w2 + C33 * w3)
+        b1 = inv * (C11 * d1 + C12 * d2 + C13 * d3)
+        b2 = inv * (C12 * d1 + C22 * d2 + C23 * d3)
+        b3 = inv * (C13 * d1 + C23 * d2 + C33 * d3)
 
         q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
         denominator = 1.0 + k1 * (q1 * b1 + q2 * b2 + q3 * b3)
         R = (p.g + (u1 * c1 + u2 * c2 + u3 * c3) + (q1 * a1 + q2 * a2 + q3 * a3)) / denominator
         load = R * k1
         spin = u1 * w1 + u2 * w2 + u3 * w3
-        power = (load + k0) * turn_square
+        power = lost(load, k0, turn_square, d1 * w1 + d2 * w2 + d3 * w3)
         return (du1, du2, a1 - load * b1, a2 - load * b2, a3 - load * b3), (spin, power, R, denominator)
 
     @inline
@@ -243,6 +295,7 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         tilt=noslip.MODEL.tilt,
         radians_a_step=noslip.MODEL.radians_a_step,
         ripple=Ripple(steady.NAMES, steady.form, steady.rolling),
+        still=_STILL if _STILL in names else "",
         observe=lambda y, p: _seen(rhs, y, p),
         spin_unit=solid.spin_unit,
     )
@@ -288,11 +341,14 @@ def _with_and_without(law: Law) -> Any:
 
 def _couples_decay(couples: Sequence[Couple], columns: Columns) -> Array:
     """Bound on the rate at which couples damp the angular velocity, shape (cells,)."""
-    rate = np.zeros_like(columns["a"])
+    rate, about_normal = np.zeros_like(columns["a"]), np.zeros_like(columns["a"])
     for couple in couples:
         strength = couple.strongest(columns)
-        rate = rate + (strength * _hardest_press(columns) if couple.needs_normal_force else strength)
-    return np.asarray(rate / np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0])
+        if couple.about_normal:
+            about_normal = about_normal + strength * _hardest_turn(columns)
+        else:
+            rate = rate + (strength * _hardest_press(columns) if couple.needs_normal_force else strength)
+    return np.asarray(rate / np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0] + about_normal)
 
 
 def _energy_start(columns: Columns) -> Array:
@@ -346,6 +402,14 @@ def _attitudes(columns: Columns) -> Iterator[tuple[Array, Array]]:
 def _hardest_press(columns: Columns) -> Array:
     """Bound on the normal force over the trajectory, per unit mass, shape (cells,)."""
     return np.asarray(np.max([R for _, R in _attitudes(columns)], axis=0))
+
+
+def _hardest_turn(columns: Columns) -> Array:
+    """Bound on R uᵀ J⁻¹ u over the trajectory, shape (cells,): the decay of the spin per unit of its resistance."""
+    inverse = solid.matrix(solid.inverse(solid.inertia(columns)))
+    return np.asarray(
+        np.max([R * np.einsum("...i,...ij,...j->...", u, inverse, u) for u, R in _attitudes(columns)], axis=0)
+    )
 
 
 def strongest_grip(columns: Columns) -> Array:

@@ -139,6 +139,9 @@ class Model(Tier):
     faint: str = ""
     """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
     rattle below it may settle."""
+    still: str = ""
+    """Name of the constant that is the energy above rest below which a body counts as at rest, so that the trajectory
+    settles; "" if there is none."""
     extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
     """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005

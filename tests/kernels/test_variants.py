@@ -107,3 +107,37 @@ def test_a_body_with_the_mass_at_the_centre_is_the_papers(tmp_path: Path) -> Non
     np.testing.assert_allclose(general["t_last_reversal"], paper["t_last_reversal"], rtol=1e-6)
     np.testing.assert_allclose(general["n_c1_plus_linear"], paper["n_c1_plus_linear"], rtol=1e-9)
     np.testing.assert_allclose(general["n_c1_minus_linear"], paper["n_c1_minus_linear"], rtol=1e-9)
+
+
+SPINNING = f"""\
+units: SI
+gravity: 9.81
+body: {BODY}
+friction: {{mu: 20, mu_spinning: 0.2, radius_spinning: 2.0e-3, speed_spinning: 0.5}}
+start: {{roll: [0, 1 deg], pitch: [0, 1 deg], omega3: [-5, 5]}}
+integrator: {{t_end: 1}}
+"""
+
+
+def test_spinning_friction_stops_the_spin(tmp_path: Path) -> None:
+    """Upright, dry friction takes the same spin in every second; a body that rattles does what Newton and Euler say."""
+    short, long = run(tmp_path, SPINNING), run(tmp_path, SPINNING, t_end=60.0)
+    config = load_config(tmp_path / "scene.yaml")
+    columns, model = Grid.of(config).columns(), config.equations
+    assert model.name == "slip+viscous+spinning"
+    fall = 0.2 * 2e-3 * 9.81 / 1.7e-3
+    upright = {"roll": 0.0, "pitch": 0.0}
+    assert float(short["spin_final"].sel(omega3=-5, **upright)) == pytest.approx(5 - fall, abs=1e-10)
+    rattling = short.stack(cell=("roll", "pitch", "omega3"))
+    start = stack(model.start(columns))
+    for i in (6, 7):
+        parameters = {name: float(values[i]) for name, values in columns.items()}
+        end = newton.follow(start[:, i], parameters, "viscous", np.array([0, 1.0]))[:, -1]
+        spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
+        assert float(rattling["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)
+    assert float(long["energy_error"].max()) < 1e-7
+    # It comes to rest, and the run ends then: it could only creep on.
+    assert (long["status"] == 1).all()
+    assert float(np.abs(long["spin_final"]).max()) < 0.1 * 0.5
+    end = float(long["t_stop"].sel(omega3=-5, **upright))
+    assert (5 - 0.5) / fall < end < 5 / fall + 1

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from support import STANDARD, columns, newton
 
 from sweep.models import find, linear, noslip, rocking, slip, solid, stability, steady
+from sweep.models.couples import COUPLES as KINDS
 from sweep.models.general import strongest_grip, variant
 from sweep.models.laws import LAWS, tanh_ratio
 from sweep.models.model import LINEAR, take
@@ -19,6 +20,7 @@ KANE_LEVINSON = BODY | {"mass": 1.0, "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, 
 SKEW = KANE_LEVINSON | {"mass": 0.7, "Ixz": 3e-5, "Iyz": -1e-5}
 FRICTION = {"mu": 0.4, "mu_static": 0.7, "mu_viscous": 0.3, "speed": 0.05, "speed_stick": 0.02}
 COUPLES = {"sigma": 1e-4, "mu_rolling": 0.1, "radius": 0.004, "speed_rolling": 0.5}
+COUPLES |= {"mu_spinning": 0.2, "radius_spinning": 0.003, "speed_spinning": 2.0}
 ANGLES = {"roll": np.pi / 360, "pitch": np.pi / 360, "omega1": 0.0, "omega2": 0.0, "omega3": -5.0}
 
 
@@ -40,12 +42,14 @@ def states(number: int, count: int) -> np.ndarray:
     return np.array([*tilt, *omega, *random.uniform(-0.1, 0.1, 2)])[:count]
 
 
-@pytest.mark.parametrize("couples", ["", "+sigma", "+rolling", "+sigma+rolling"])
+@pytest.mark.parametrize(
+    "couples", ["", "+sigma", "+rolling", "+spinning", "+sigma+rolling", "+sigma+rolling+spinning"]
+)
 @pytest.mark.parametrize("law", [*LAWS, None])
 def test_the_equations_are_those_of_newton_and_euler(law: str | None, couples: str) -> None:
-    parameters = SKEW | FRICTION | {
-        name: value for name, value in COUPLES.items() if ("sigma" if name == "sigma" else "rolling") in couples
-    }  # fmt: skip
+    parameters = SKEW | FRICTION
+    for couple in filter(None, couples.split("+")):
+        parameters = parameters | {name: COUPLES[name] for name in KINDS[couple].parameters}
     model, constants = one(f"slip+{law}{couples}" if law else f"noslip+solid{couples}", parameters)
     for number in range(30):
         y = states(number, len(model.states))
@@ -58,7 +62,14 @@ def test_the_equations_are_those_of_newton_and_euler(law: str | None, couples: s
 
 
 @pytest.mark.parametrize(
-    "name", [*(f"slip+{law}+sigma+rolling" for law in LAWS), "noslip+solid", "noslip+solid+rolling"]
+    "name",
+    [
+        *(f"slip+{law}+sigma+rolling" for law in LAWS),
+        "noslip+solid",
+        "noslip+solid+rolling",
+        "slip+viscous+spinning",
+        "noslip+solid+sigma+spinning",
+    ],
 )
 def test_only_friction_changes_the_energy(name: str) -> None:
     model, constants = one(name, SKEW | FRICTION | COUPLES)
@@ -185,6 +196,30 @@ def test_the_slip_decays_no_faster_than_the_bound() -> None:
     assert 0.4 * grip < largest <= 1.02 * grip
 
 
+def test_the_spin_decays_no_faster_than_the_bound() -> None:
+    """About zero spin, where spinning friction is steepest, at random attitudes that the energy at the start allows."""
+    spinning = {"mu_spinning": 0.2, "radius_spinning": 0.003, "speed_spinning": 0.01}
+    body = cells(**KANE_LEVINSON, **spinning, n0=3.0, x0=0.0, y0=0.0)
+    model = find("noslip+solid+spinning")
+    bound, constants, random = model.fastest_decay(body)[0], take(model.constants.of(body), 0), np.random.default_rng(7)
+    spin, rattle, inertia = model.energy(model.start(body), model.constants.of(body))
+    energy, largest = (rattle + 0.5 * inertia * spin**2)[0], 0.0
+    for _ in range(3000):
+        u1, u2 = random.normal(size=2) * 0.1
+        w1, w2 = random.normal(size=2) * 3
+        y = np.array([u1, u2, w1, w2, (u1 * w1 + u2 * w2) / np.sqrt(1 - u1**2 - u2**2)])
+        spin, rattle, inertia = model.energy(tuple(y), constants)
+        if rattle + 0.5 * inertia * spin**2 > energy:
+            continue
+        rates = np.zeros((3, 3))
+        for i in range(3):
+            at = y.astype(complex)
+            at[2 + i] += 1e-30j
+            rates[:, i] = [each.imag / 1e-30 for each in model.rhs(tuple(at), constants)[0][2:]]
+        largest = max(largest, -np.linalg.eigvals(rates).real.min())
+    assert 0.4 * bound < largest <= 1.02 * bound
+
+
 def crossings(sigma: float, omega3: float) -> np.ndarray:
     """Times in 20 s at which the spin of Kane and Levinson's body vanishes."""
     parameters = KANE_LEVINSON | ANGLES | {"sigma": sigma, "omega3": omega3}
@@ -236,7 +271,9 @@ def test_the_mirror_image_does_the_mirror_image(law: str) -> None:
     vector, turning = np.array([1, -1]), np.array([-1, 1, -1])
     image = np.array([*vector, *turning, *vector])
     body = SKEW | FRICTION | COUPLES
-    (model, p), (_, q) = (one(f"slip+{law}+sigma+rolling", each) for each in (body, body | {"Ixy": 2e-5, "Iyz": 1e-5}))
+    (model, p), (_, q) = (
+        one(f"slip+{law}+sigma+rolling+spinning", each) for each in (body, body | {"Ixy": 2e-5, "Iyz": 1e-5})
+    )
     for number in range(10):
         y = states(number, 7)
         np.testing.assert_allclose(
@@ -279,7 +316,7 @@ def test_narrower_regularisations_meet_dry_friction() -> None:
 def test_to_which_variants_the_linear_theory_applies() -> None:
     for name in ("slip+viscous+sigma", "slip+coulomb-tanh", "noslip+solid+sigma"):
         assert LINEAR in find(name).offers
-    for name in ("slip+viscous+rolling", "noslip+solid"):
+    for name in ("slip+viscous+rolling", "slip+viscous+spinning", "noslip+solid"):
         assert LINEAR not in find(name).offers
     assert LINEAR not in noslip.MODEL.offers
 
