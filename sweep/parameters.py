@@ -135,6 +135,14 @@ PARAMETERS: dict[str, Parameter] = {
 PAPER: dict[str, Parameter] = {name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")}
 """The parameters of the paper's model.  Their defaults are in the paper's units, and they have none in SI."""
 
+ON_PARABOLOID: dict[str, str] = {
+    "a": "coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
+    "b": "coefficient b of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
+    "c": "height of the paraboloid's origin above its lowest point, the unit of length",
+    "offset": "depth of the centre of mass below the paraboloid's origin, in c",
+}
+"""What parameters of the body mean if its surface is a paraboloid; `a` and `b` have no default then."""
+
 SECTIONS: tuple[str, ...] = tuple(dict.fromkeys(p.section for p in PARAMETERS.values() if p.section))
 
 START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")

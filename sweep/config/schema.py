@@ -31,7 +31,8 @@ from sweep.models.general import BASES
 from sweep.models.laws import LAWS
 from sweep.models.model import Model, Tier
 from sweep.models.scene import PAPER, PAPERS_LAW, SI, is_papers, variant
-from sweep.parameters import PARAMETERS, SECTIONS, Parameter
+from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES
+from sweep.parameters import ON_PARABOLOID, PARAMETERS, SECTIONS, Parameter
 from sweep.variables import in_si
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
@@ -262,7 +263,13 @@ class Law(_Words):
         return f"{self.law}-{self.regularisation}" if self.law == "coulomb" else self.law
 
 
-_WORDS: dict[str, type[_Words]] = {"friction": Law}
+class Shape(_Words):
+    surface: Literal[tuple(SURFACES)] = Field(  # type: ignore[valid-type]
+        default=ELLIPSOID.name, description="surface of the body, which says what `a`, `b` and `c` mean"
+    )
+
+
+_WORDS: dict[str, type[_Words]] = {"body": Shape, "friction": Law}
 
 
 class _Top(_Strict):
@@ -308,7 +315,8 @@ _sections: dict[str, Any] = {name: _section(name) for name in SECTIONS}
 Schema: Any = create_model("Configuration", __base__=_Top, **_physical(""), **_sections)
 
 SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fields.items() if name != "integrator"}
-SETTINGS |= {f"friction.{name}": field for name, field in Law.model_fields.items()}
+for _name, _words in _WORDS.items():
+    SETTINGS |= {f"{_name}.{name}": field for name, field in _words.model_fields.items()}
 SETTINGS |= {f"integrator.{name}": field for name, field in Integrator.model_fields.items()}
 """All values of a configuration but the physical parameters, by path; the `description` of each says what it means."""
 
@@ -317,11 +325,11 @@ PATHS |= {path: str(field.description) for path, field in SETTINGS.items()}
 """The path of every value of a configuration, and what it means."""
 
 
-def tier_of(model: str, law: str, units: str, names: Collection[str]) -> Tier:
+def tier_of(model: str, law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> Tier:
     """The model of a configuration that names these parameters."""
-    if model not in BASES or is_papers(law, units, names):
+    if model not in BASES or is_papers(law, units, names, surface):
         return TIERS[model]
-    return variant(model, law, units, names)
+    return variant(model, law, units, names, surface)
 
 
 @dataclass(frozen=True)
@@ -344,6 +352,8 @@ class Config:
     units: str = PAPER
     law: str = PAPERS_LAW
     """Name of the law of friction, as in `sweep.models.laws.LAWS`."""
+    surface: str = ELLIPSOID.name
+    """Name of the surface, as in `sweep.models.surfaces.SURFACES`."""
     source: Document | None = field(default=None, init=False, compare=False, repr=False)
     """What it was made from, so that single values can be replaced; a copy with other values has none."""
 
@@ -358,7 +368,7 @@ class Config:
     @property
     def tier(self) -> Tier:
         """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
-        return tier_of(self.model, self.law, self.units, (*self.parameters, *(self.cases or ())))
+        return tier_of(self.model, self.law, self.units, (*self.parameters, *(self.cases or ())), self.surface)
 
     @property
     def equations(self) -> Model:
@@ -372,6 +382,8 @@ class Config:
         if name in LAWS[self.law].pure:
             return {"long_name": "coefficient of friction", "units": "1"}
         units, long_name = parameter.units, parameter.long_name
+        if self.surface == PARABOLOID.name:
+            long_name = ON_PARABOLOID.get(name, long_name)
         if self.units == SI:
             units, long_name = in_si(units, long_name)
         return {"long_name": long_name, "units": units}
@@ -385,6 +397,8 @@ class Config:
         if self.law != PAPERS_LAW:
             law, _, regularisation = self.law.partition("-")
             sections["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
+        if self.surface != ELLIPSOID.name:
+            sections["body"] |= {"surface": self.surface}
         for name, value in self.parameters.items():
             sections.get(PARAMETERS[name].section, top)[name] = value.spec
         return {

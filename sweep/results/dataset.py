@@ -16,6 +16,7 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
 from sweep.models.scene import PAPER, SI
+from sweep.models.surfaces import ELLIPSOID
 from sweep.prediction import Prediction
 from sweep.variables import Variable, in_si
 
@@ -141,6 +142,7 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     for name, value in grid.constants.items():
         coordinates[name] = xr.Variable((), value, config.described(name))
     head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals of a rattleback ({config.model} model)"}
+    head |= {"surface": config.surface} if config.surface != ELLIPSOID.name else {}
     return xr.Dataset(variables, coordinates, {**head, **attributes})
 
 

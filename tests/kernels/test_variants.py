@@ -141,3 +141,30 @@ def test_spinning_friction_stops_the_spin(tmp_path: Path) -> None:
     assert float(np.abs(long["spin_final"]).max()) < 0.1 * 0.5
     end = float(long["t_stop"].sel(omega3=-5, **upright))
     assert (5 - 0.5) / fall < end < 5 / fall + 1
+
+
+def test_a_paraboloid_against_an_independent_integrator(tmp_path: Path) -> None:
+    """It starts from contact points far up its sides, where it differs from the ellipsoid of the same curvatures."""
+    text = f"""\
+units: SI
+gravity: 9.81
+body: {BODY.replace("a: 0.2, b: 0.03", "surface: paraboloid, a: 0.005, b: 0.22")}
+friction: {{mu: 20, sigma: 1.0e-4}}
+start: {{n0: [-5, 5], x0: 0.04, y0: [0.004, 0.02]}}
+integrator: {{t_end: 1}}
+"""
+    result = run(tmp_path, text).stack(cell=("n0", "y0"))
+    config = load_config(tmp_path / "scene.yaml")
+    columns, model = Grid.of(config).columns(), config.equations
+    assert model.name == "slip+viscous+sigma+paraboloid"
+    assert result.attrs["surface"] == "paraboloid"
+    assert "paraboloid" in result["a"].attrs["long_name"]
+    start = stack(model.start(columns))
+    for i in range(4):
+        parameters = {name: float(values[i]) for name, values in columns.items()} | {"surface": "paraboloid"}
+        u = np.array([*start[:2, i], -np.sqrt(1 - start[0, i] ** 2 - start[1, i] ** 2)])
+        assert newton._contact(u, parameters)[:2] == pytest.approx([parameters["x0"], parameters["y0"]], rel=1e-12)
+        end = newton.follow(start[:, i], parameters, "viscous", np.array([0, 1.0]))[:, -1]
+        spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
+        assert float(result["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)
+    assert float(result["energy_error"].max()) < 1e-7

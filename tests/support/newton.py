@@ -102,7 +102,10 @@ def _inertia(p: Mapping[str, float]) -> Vector:
 
 
 def _contact(u: Vector, p: Mapping[str, float]) -> Vector:
-    """The lowest point of the ellipsoid, from the centre of mass."""
+    """The lowest point of the surface, from the centre of mass."""
+    if p.get("surface") == "paraboloid":  # where the gradient of z + (a x² + b y²)/c is along -u
+        x, y = p["c"] / 2 / p["a"] * u[0] / u[2], p["c"] / 2 / p["b"] * u[1] / u[2]
+        return np.array([x, y, p["c"] * (1 - p["a"] * (x / p["c"]) ** 2 - p["b"] * (y / p["c"]) ** 2) - p["offset"]])
     semi = np.array([p["a"], p["b"], p["c"]])
     return -semi * _unit(semi * u) - np.array([0, 0, p["offset"]])
 
