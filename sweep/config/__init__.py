@@ -176,7 +176,10 @@ def _unusable_step(config: Config) -> str:
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
     with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
-        longest = min(float(methods.longest_step(model, columns).min()) for columns in distinct(Grid.of(config), BODY))
+        longest = min(
+            float(methods.longest_step(model, columns)[~model.impossible(columns)].min(initial=np.inf))
+            for columns in distinct(Grid.of(config), BODY)
+        )
     if step <= longest:
         return ""
     return f"{step:g}; allowed: auto, or at most {longest:.3g}, a quarter of the rattle's period"

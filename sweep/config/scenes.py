@@ -5,7 +5,9 @@ Parameters have to belong together, and there has to be such a body.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,11 +15,11 @@ import numpy as np
 from sweep.config.document import Document
 from sweep.config.faults import Fault
 from sweep.config.schema import Config
-from sweep.grid import BODY, Array, Grid, distinct
+from sweep.grid import BODY, Grid, distinct
 from sweep.models import bodies
 from sweep.models.general import BASES
 from sweep.models.scene import INERTIA, PAPER, PAPERS, PAPERS_LAW, SI, is_papers, strangers
-from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES, Surface
+from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES
 from sweep.parameters import PARAMETERS
 
 
@@ -48,19 +50,59 @@ def without_default(checked: Any) -> frozenset[str]:
     return frozenset({"a", "b"} if checked.body.surface == PARABOLOID.name else ())
 
 
+@dataclass(frozen=True)
+class _Reason:
+    """Why some bodies cannot be or cannot stand."""
+
+    words: str
+    cells: int
+    first: dict[str, float]
+    """The parameters of the first of them."""
+
+    def __str__(self) -> str:
+        return f"{self.words} at {_at(self.first)}"
+
+
 def impossible(config: Config) -> str:
+    """What is wrong with the first body if none can be or can stand; "" if any can."""
+    found = _reasons(config)
+    return str(found[0]) if sum(reason.cells for reason in found) == Grid.of(config).size else ""
+
+
+def unfit(config: Config) -> str:
     """What is wrong with the first body that cannot be or cannot stand; "" if all can."""
+    return next(map(str, _reasons(config)), "")
+
+
+def described_impossible(config: Config) -> dict[str, str]:
+    """The attribute of a dataset that says how many cells have a status of `impossible`, and why."""
+    varying = {*config.axes, *(config.cases or ())}
+    found = [
+        f"{reason.cells} cells, {reason.words.partition(';')[0]}, the first at "
+        + _at({name: value for name, value in reason.first.items() if name in varying})
+        for reason in _reasons(config)
+    ]
+    return {"impossible": "; ".join(found)} if found else {}
+
+
+def _at(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name}={value:g}" for name, value in values.items())
+
+
+def _reasons(config: Config) -> list[_Reason]:
+    """Each reason why bodies cannot be or cannot stand; a cell counts for the first that is true of it."""
     if not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
-        return ""
-    surface = SURFACES[config.surface]
-    return next(filter(None, (_impossible(columns, surface) for columns in distinct(Grid.of(config), BODY))), "")
-
-
-def _impossible(columns: Mapping[str, Array], surface: Surface) -> str:
-    given = [name for name in ("a", "b", "c", "offset", *INERTIA) if name in columns]
-    for bad, reason in bodies.wrongs(columns, surface):
-        cells = np.flatnonzero(bad)
-        if len(cells):
-            at = ", ".join(f"{name}={columns[name][cells[0]]:g}" for name in given)
-            return f"{reason} at {at}"
-    return ""
+        return []
+    grid, surface = Grid.of(config), SURFACES[config.surface]
+    counts, first, seen = Counter[str](), dict[str, dict[str, float]](), 0
+    for columns in distinct(grid, BODY):
+        left = np.ones(len(columns["a"]), bool)
+        seen += len(left)
+        for bad, words in bodies.wrongs(columns, surface):
+            cells = np.flatnonzero(bad & left)
+            if len(cells):
+                given = [name for name in ("a", "b", "c", "offset", *INERTIA) if name in columns]
+                first.setdefault(words, {name: float(columns[name][cells[0]]) for name in given})
+                counts[words] += len(cells)
+                left[cells] = False
+    return [_Reason(words, counts[words] * grid.size // seen, first[words]) for words in first]

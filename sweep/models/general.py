@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models import noslip, slip, solid, starts, steady
+from sweep.models import bodies, noslip, slip, solid, starts, steady
 from sweep.models.couples import COUPLES, Couple, nothing
 from sweep.models.laws import LAWS, Law
 from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, Ripple, named
@@ -232,6 +232,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
         tilt=slip.MODEL.tilt,
         observe=observe,
         spin_unit=solid.spin_unit,
+        impossible=lambda columns: bodies.impossible(columns, surface),
         faint="" if law.linear_to is None else "faint",
         still=_STILL if _STILL in names else "",
         extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
@@ -306,6 +307,7 @@ def _rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters:
         still=_STILL if _STILL in names else "",
         observe=lambda y, p: _seen(contact, rhs, y, p),
         spin_unit=solid.spin_unit,
+        impossible=lambda columns: bodies.impossible(columns, surface),
     )
 
 
@@ -427,7 +429,7 @@ def strongest_grip(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
     inverse = solid.matrix(solid.inverse(solid.inertia(columns)))
     worst = np.zeros_like(columns["a"])
     for u, R in _attitudes(columns, surface):
-        _, point = surface.elevation(*u.T, shape)
+        _, *point = surface.elevation(*u.T, shape)
         x_p = np.stack(point, axis=-1)
         X = np.cross(np.eye(3), x_p[:, None, :])
         G = X @ inverse @ np.swapaxes(X, 1, 2)

@@ -158,7 +158,7 @@ def energy_on(surface: Surface) -> Any:
             p.J12 * o1 * o2 + p.J13 * o1 * o3 + p.J23 * o2 * o3
         )
 
-        height, (x, y, z) = elevation(u1, u2, u3, p)
+        height, x, y, z = elevation(u1, u2, u3, p)
         v3 = -(v1 * u1 + v2 * u2) / u3
         g1, g2, g3 = v1 + y * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y * w1
         drift = 0.5 * (g1 * g1 + g2 * g2 + g3 * g3)

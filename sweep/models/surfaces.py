@@ -44,7 +44,7 @@ class Surface:
     of the contact point in the body."""
     elevation: Callable[..., Any]
     """Inline, (u1, u2, u3, constants) -> the height above that at rest, quadratic in u1 and u2 and precise however
-    small they are, and x_p."""
+    small they are, and x, y and z of x_p."""
     height: Callable[[tuple[Array, ...], Any, Any, Array], Array]
     """(values of `constants`, cos ψ, sin ψ, φ) -> the height if the body is tilted by φ towards the azimuth ψ."""
     normal: Callable[[Columns, Array, Array], tuple[Array, Array, Array]]
@@ -104,7 +104,8 @@ def _ellipsoid_elevation(u1: Any, u2: Any, u3: Any, p: Any) -> Any:
     c = np.sqrt(p.c2)
     height = ((p.a2 - p.c2) * u1 * u1 + (p.b2 - p.c2) * u2 * u2) / (r + c)
     height = height + p.offset * (u1 * u1 + u2 * u2) / (1.0 - u3)
-    return height, (-au1 / r, -au2 / r, -au3 / r - p.offset)
+    x, y, z = -au1 / r, -au2 / r, -au3 / r - p.offset
+    return height, x, y, z
 
 
 def _ellipsoid_height(shape: tuple[Array, ...], cos: Any, sin: Any, phi: Array) -> Array:
@@ -149,7 +150,7 @@ def _paraboloid_elevation(u1: Any, u2: Any, u3: Any, p: Any) -> Any:
     x, y = p.radius1 * t1, p.radius2 * t2
     # 1 + u3 = (u1² + u2²) / (1 - u3)
     height = -0.5 * (x * u1 + y * u2) - p.h * (u1 * u1 + u2 * u2) / (1.0 - u3)
-    return height, (x, y, p.h - 0.5 * (x * t1 + y * t2))
+    return height, x, y, p.h - 0.5 * (x * t1 + y * t2)
 
 
 def _paraboloid_height(shape: tuple[Array, ...], cos: Any, sin: Any, phi: Array) -> Array:

@@ -28,9 +28,10 @@ STATUSES = {
     status.DIVERGED: "diverged",
     status.PARADOX: "paradox",
     status.TOPPLED: "toppled",
+    status.IMPOSSIBLE: "impossible",
 }
 
-EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, DISAGREES, REVERSES_AT_N_C1, UNDECIDED, FAILED = range(8)
+EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, DISAGREES, REVERSES_AT_N_C1, UNDECIDED, FAILED, NO_BODY = range(9)
 REASONS = {
     EXISTS: "exists",
     NO_FRICTION: "no_friction",
@@ -40,6 +41,7 @@ REASONS = {
     REVERSES_AT_N_C1: "reverses_at_n_c1",
     UNDECIDED: "undecided",
     FAILED: "failed",
+    NO_BODY: "impossible",
 }
 """Whether simulation found a critical spin, and why not.  Where it `disagrees` with the eigenvalues there is a number
 all the same."""
