@@ -23,6 +23,7 @@ from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.kernels import measures, methods
 from sweep.kernels.measures import MEASURES
 from sweep.models.model import Model, Tier
+from sweep.models.scene import SI
 from sweep.parameters import PARAMETERS, SECTIONS
 
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
@@ -130,6 +131,8 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         law=law,
         surface=surface,
     )
+    if units == SI and "t_end" not in checked.integrator.model_fields_set:
+        config = config.with_time()
     for path, check in _CHECKS:
         if reason := check(config):
             raise ConfigError([source.fault(path, reason)])

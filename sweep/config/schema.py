@@ -8,7 +8,7 @@ import math
 import re
 import sys
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -23,6 +23,7 @@ from sweep.config.document import Document, number
 from sweep.config.faults import ConfigError, Fault, Path, quote, suggestion
 from sweep.config.messages import Allowed, describe, refusal, wrong
 from sweep.config.plain import plain
+from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
@@ -203,6 +204,9 @@ FOREVER = 1e7
 """What `t_end: .inf` stands for, in sqrt(c/g): longer than any rattleback spins.  A trajectory that has not settled by
 then has the status `time_limit` all the same."""
 
+T_END = 30_000.0
+"""Default of `t_end`, in sqrt(c/g); what that is in seconds says `Config.with_time`."""
+
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
 
@@ -225,8 +229,10 @@ class Integrator(_Strict):
         BeforeValidator(lambda raw: FOREVER if isinstance(raw, float) and raw == math.inf else raw),
         Allowed(f"a number > 0 and <= {LATEST:g}, or .inf"),
     ] = Field(
-        default=30_000.0, gt=0, le=LATEST,
-        description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}",
+        default=T_END, gt=0, le=LATEST,
+        description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}; "
+        f"with `units: SI` in s, by default {T_END:g} sqrt(c/g) of the largest c and the least gravity, rounded up to "
+        "hundreds",
     )  # fmt: skip
     stop_when_settled: bool = Field(
         default=True, description="whether a trajectory ends when neither spin nor count can change any more"
@@ -375,6 +381,14 @@ class Config:
         """The model of a configuration that is simulated."""
         assert isinstance(self.tier, Model)
         return self.tier
+
+    def with_time(self) -> Config:
+        """The same with a `t_end` in seconds for bodies in SI, which have given none."""
+        columns = {name: value.numbers for name, value in self.parameters.items()} | (self.cases or {})
+        longest = min(T_END * math.sqrt(max(columns["c"]) / min(columns["gravity"])), LATEST)
+        # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
+        t_end = STRETCH * math.ceil(longest / STRETCH)
+        return replace(self, integrator=self.integrator.model_copy(update={"t_end": t_end}))
 
     def described(self, name: str) -> dict[str, str]:
         """The CF attributes of a physical parameter."""

@@ -178,3 +178,13 @@ def test_angles_in_degrees_anywhere(tmp_path: Path) -> None:
     assert config.axes["roll"] == (pytest.approx(np.pi / 360), 0.02)
     assert config.axes["pitch"] == pytest.approx((0, np.pi / 360, np.pi / 180))
     assert load_config(config, {"roll": "2 deg"}).parameters["roll"].numbers == (pytest.approx(np.pi / 90),)
+
+
+def test_the_default_time_of_bodies_in_si(tmp_path: Path) -> None:
+    """It is the paper's, 30000 sqrt(c/g), rounded up to hundreds of seconds."""
+    config = read(tmp_path, stone(("integrator: {t_end: 5}\n", ""), ("c: 0.02", "c: [0.01, 0.02]")))
+    assert config.integrator.t_end == 1400
+    assert 1300 < 30_000 * np.sqrt(0.02 / 9.81) < 1400
+    assert read(tmp_path, config.to_yaml()) == config
+    assert read(tmp_path, "body: {offset: 0.1, c: 0.5}\nfriction: {mu: 6}").integrator.t_end == 30_000
+    assert read(tmp_path, STONE).integrator.t_end == 5
