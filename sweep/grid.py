@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.models.starts import point
+from sweep.models.surfaces import PARABOLOID
 from sweep.parameters import PARAMETERS, START
 
 Array = NDArray[Any]
@@ -27,6 +28,8 @@ class Sweepable(Protocol):
     def parameters(self) -> Mapping[str, Any]: ...
     @property
     def cases(self) -> Mapping[str, tuple[float, ...]] | None: ...
+    @property
+    def surface(self) -> str: ...
 
 
 @dataclass(frozen=True)
@@ -137,7 +140,12 @@ _PLACE = (*BODY, "x0", "y0")
 
 
 def off_the_body(config: Sweepable) -> str:
-    """What is wrong with the first cell whose start point lies off the ellipsoid; "" if no cell's does."""
+    """What is wrong with the first cell whose start point lies off the ellipsoid; "" if no cell's does.
+
+    Every point lies on a paraboloid.
+    """
+    if config.surface == PARABOLOID.name:
+        return ""
     return next(filter(None, map(_off_the_body, distinct(Grid.of(config), _PLACE))), "")
 
 

@@ -105,6 +105,14 @@ PARAMETERS: dict[str, Parameter] = {
             "speed_rolling", "friction", "1", "angular velocity below which rolling friction fades, in sqrt(g/c)", None,
             above=0, below=1e6,
         ),
+        Parameter("mu_spinning", "friction", "1", "coefficient of spinning friction", None, at_least=0, below=1e6),
+        Parameter(
+            "radius_spinning", "friction", "1", "contact radius of spinning friction, in c", None, above=0, below=1e6
+        ),
+        Parameter(
+            "speed_spinning", "friction", "1", "spin below which spinning friction fades, in sqrt(g/c)", None,
+            above=0, below=1e6,
+        ),
         Parameter(
             "n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05, above=-1e3, below=1e3
         ),
@@ -126,6 +134,14 @@ PARAMETERS: dict[str, Parameter] = {
 
 PAPER: dict[str, Parameter] = {name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")}
 """The parameters of the paper's model.  Their defaults are in the paper's units, and they have none in SI."""
+
+ON_PARABOLOID: dict[str, str] = {
+    "a": "coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
+    "b": "coefficient b of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
+    "c": "height of the paraboloid's origin above its lowest point, the unit of length",
+    "offset": "depth of the centre of mass below the paraboloid's origin, in c",
+}
+"""What parameters of the body mean if its surface is a paraboloid; `a` and `b` have no default then."""
 
 SECTIONS: tuple[str, ...] = tuple(dict.fromkeys(p.section for p in PARAMETERS.values() if p.section))
 

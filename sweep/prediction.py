@@ -10,7 +10,7 @@ from sweep.grid import Array, Grid
 from sweep.kernels.stability import stable_ranges
 from sweep.models import analytic, stability
 from sweep.models.linear import fastest_spin
-from sweep.models.model import FORMULAS, LINEAR, Model, Tier
+from sweep.models.model import FORMULAS, LINEAR, Columns, Model, Tier
 from sweep.models.scene import PAPERS
 
 
@@ -63,15 +63,28 @@ def predict(tier: Tier, grid: Grid) -> Prediction:
 def _stability(model: Model, grid: Grid) -> Stability:
     bodies, place = grid.bodies()
     columns = bodies.columns()
-    near, covered = stable_ranges(model, columns)
+    near, covered = _ranges(model, columns)
     ranges = near[:, place]
     # A body may have ranges at spins that only some of its trajectories reach.
-    far = fastest_spin(model, grid.columns()) > covered[place]
+    with np.errstate(invalid="ignore"):  # the energies of impossible bodies
+        far = fastest_spin(model, grid.columns()) > covered[place]
     if far.any():
         some, again = np.unique(place[far], return_inverse=True)
         all_of_them = stability.stable_ranges(model, {name: values[some] for name, values in columns.items()})
         ranges[:, far] = all_of_them[:, again]
     return Stability((near[1], near[0]), ranges)
+
+
+def _ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
+    """As `stable_ranges`; NaN for impossible bodies."""
+    impossible = model.impossible(columns)
+    if not impossible.any():
+        return stable_ranges(model, columns)
+    ranges, covered = np.full((6, len(impossible)), np.nan), np.full(len(impossible), np.inf)
+    if len(possible := np.flatnonzero(~impossible)):
+        theirs = {name: values[possible] for name, values in columns.items()}
+        ranges[:, possible], covered[possible] = stable_ranges(model, theirs)
+    return ranges, covered
 
 
 def formulas(tier: Tier, grid: Grid) -> Prediction:

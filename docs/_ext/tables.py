@@ -75,6 +75,7 @@ _STATUS_MEANINGS = {
     "diverged": "the integration did not hold, even with a shorter step; the numbers are worth nothing",
     "paradox": "Painlevé's paradox: no contact force solves the equations",
     "toppled": "the body is tilted by a right angle, where the variables end",
+    "impossible": "not simulated: there is no such body, or it does not stand upright at rest",
 }
 
 

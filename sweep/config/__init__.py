@@ -24,7 +24,7 @@ from sweep.kernels import measures, methods
 from sweep.kernels.measures import MEASURES
 from sweep.models.model import Model, Tier
 from sweep.models.scene import SI
-from sweep.parameters import PAPER, PARAMETERS, SECTIONS
+from sweep.parameters import PARAMETERS, SECTIONS
 
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 
@@ -95,15 +95,16 @@ def _resolve(checked: Any, source: document.Document) -> Config:
     given = _given(checked, source)
     columns = _table(checked.cases, source) if checked.cases is not None else None
     names, law, units = (*given, *(columns or ())), checked.friction.name, checked.units
+    surface, needed = checked.body.surface, scenes.without_default(checked)
     if faults := list(scenes.misfits(checked, names, source)):
         raise ConfigError(faults)
-    model = schema.tier_of(checked.model, law, units, names)
+    model = schema.tier_of(checked.model, law, units, names, surface)
     checked = _with_method(checked, model)
     faults = list(_misfits(checked, model, given, columns, source))
     order = sorted(model.parameters, key=lambda n: (_rank(n, schema.FIRST_AXES), _rank(n, tuple(given))))
     parameters = {}
     for name in order:
-        default = None if units == SI and name in PAPER else PARAMETERS[name].default
+        default = None if name in needed else PARAMETERS[name].default
         if name in given:
             parameters[name] = given[name]
         elif name in (columns or {}):
@@ -128,7 +129,10 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         cases_file=checked.cases,
         units=units,
         law=law,
+        surface=surface,
     )
+    if units == SI and "t_end" not in checked.integrator.model_fields_set:
+        config = config.with_time()
     for path, check in _CHECKS:
         if reason := check(config):
             raise ConfigError([source.fault(path, reason)])
@@ -175,7 +179,10 @@ def _unusable_step(config: Config) -> str:
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
     with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
-        longest = min(float(methods.longest_step(model, columns).min()) for columns in distinct(Grid.of(config), BODY))
+        longest = min(
+            float(methods.longest_step(model, columns)[~model.impossible(columns)].min(initial=np.inf))
+            for columns in distinct(Grid.of(config), BODY)
+        )
     if step <= longest:
         return ""
     return f"{step:g}; allowed: auto, or at most {longest:.3g}, a quarter of the rattle's period"

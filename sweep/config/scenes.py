@@ -5,7 +5,9 @@ Parameters have to belong together, and there has to be such a body.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,66 +15,94 @@ import numpy as np
 from sweep.config.document import Document
 from sweep.config.faults import Fault
 from sweep.config.schema import Config
-from sweep.grid import BODY, Array, Grid, distinct
-from sweep.models import solid
+from sweep.grid import BODY, Grid, distinct
+from sweep.models import bodies
 from sweep.models.general import BASES
-from sweep.models.scene import INERTIA, PAPER, PAPERS, PAPERS_LAW, is_papers, strangers
+from sweep.models.scene import INERTIA, PAPER, PAPERS, PAPERS_LAW, SI, is_papers, strangers
+from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES
 from sweep.parameters import PARAMETERS
 
 
 def misfits(checked: Any, names: Collection[str], source: Document) -> Iterator[Fault]:
     """Faults of parameters that do not belong together."""
-    law, units = checked.friction.name, checked.units
+    law, units, surface = checked.friction.name, checked.units, checked.body.surface
     if "regularisation" in checked.friction.model_fields_set and checked.friction.law != "coulomb":
         yield source.fault(
             ("friction", "regularisation"), f"not of the law {law}; allowed: with law: coulomb", at_key=True
         )
-    if is_papers(law, units, names):
+    if is_papers(law, units, names, surface):
         return
     if checked.model not in BASES:
         beyond = [name for name in names if name not in PAPERS]
         beyond += [f"law: {law}"] * (law != PAPERS_LAW) + [f"units: {units}"] * (units != PAPER)
+        beyond += [f"surface: {surface}"] * (surface != ELLIPSOID.name)
         words = f"the {checked.model} model knows no {', '.join(beyond)}; allowed: {', '.join(BASES)}"
         yield source.fault(("model",), words)
         return
-    for name, reason in strangers(law, units, names).items():
+    for name, reason in strangers(law, units, names, surface).items():
         yield source.fault(PARAMETERS[name].place, reason, at_key=True)
 
 
+def without_default(checked: Any) -> frozenset[str]:
+    """The parameters of the paper that a configuration has to give, because their defaults are of other bodies."""
+    if checked.units == SI:
+        return frozenset(PAPERS)
+    return frozenset({"a", "b"} if checked.body.surface == PARABOLOID.name else ())
+
+
+@dataclass(frozen=True)
+class _Reason:
+    """Why some bodies cannot be or cannot stand."""
+
+    words: str
+    cells: int
+    first: dict[str, float]
+    """The parameters of the first of them."""
+
+    def __str__(self) -> str:
+        return f"{self.words} at {_at(self.first)}"
+
+
 def impossible(config: Config) -> str:
+    """What is wrong with the first body if none can be or can stand; "" if any can."""
+    found = _reasons(config)
+    return str(found[0]) if sum(reason.cells for reason in found) == Grid.of(config).size else ""
+
+
+def unfit(config: Config) -> str:
     """What is wrong with the first body that cannot be or cannot stand; "" if all can."""
+    return next(map(str, _reasons(config)), "")
+
+
+def described_impossible(config: Config) -> dict[str, str]:
+    """The attribute of a dataset that says how many cells have a status of `impossible`, and why."""
+    varying = {*config.axes, *(config.cases or ())}
+    found = [
+        f"{reason.cells} cells, {reason.words.partition(';')[0]}, the first at "
+        + _at({name: value for name, value in reason.first.items() if name in varying})
+        for reason in _reasons(config)
+    ]
+    return {"impossible": "; ".join(found)} if found else {}
+
+
+def _at(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name}={value:g}" for name, value in values.items())
+
+
+def _reasons(config: Config) -> list[_Reason]:
+    """Each reason why bodies cannot be or cannot stand; a cell counts for the first that is true of it."""
     if not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
-        return ""
-    return next(filter(None, map(_impossible, distinct(Grid.of(config), BODY))), "")
-
-
-def _impossible(columns: Mapping[str, Array]) -> str:
-    given = [name for name in ("a", "b", "c", "offset", *INERTIA) if name in columns]
-    for bad, reason in _wrongs(columns):
-        cells = np.flatnonzero(bad)
-        if len(cells):
-            at = ", ".join(f"{name}={columns[name][cells[0]]:g}" for name in given)
-            return f"{reason} at {at}"
-    return ""
-
-
-_ROUNDING = 1e-12
-
-
-def _wrongs(columns: Mapping[str, Array]) -> Iterator[tuple[Array, str]]:
-    """Which bodies are impossible, shape (cells,), and why."""
-    offset, c = solid.offset(columns), columns["c"]
-    yield np.abs(offset) >= c, "centre of mass outside the ellipsoid; allowed: |offset| < c"
-    moments = np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))
-    yield moments[:, 0] <= 0, "matrix of inertia not positive definite; allowed: three positive principal moments"
-    least, middle, largest = moments.T
-    yield (
-        largest > (least + middle) * (1 + _ROUNDING),
-        "no body has such moments of inertia; allowed: no principal moment above the sum of the other two",
-    )
-    k1, k2 = solid.stiffness(columns)
-    yield (
-        np.minimum(k1, k2) <= 0,
-        "upright rest is unstable; allowed: the centre of mass below both centres of curvature, "
-        "offset > c - a²/c and offset > c - b²/c",
-    )
+        return []
+    grid, surface = Grid.of(config), SURFACES[config.surface]
+    counts, first, seen = Counter[str](), dict[str, dict[str, float]](), 0
+    for columns in distinct(grid, BODY):
+        left = np.ones(len(columns["a"]), bool)
+        seen += len(left)
+        for bad, words in bodies.wrongs(columns, surface):
+            cells = np.flatnonzero(bad & left)
+            if len(cells):
+                given = [name for name in ("a", "b", "c", "offset", *INERTIA) if name in columns]
+                first.setdefault(words, {name: float(columns[name][cells[0]]) for name in given})
+                counts[words] += len(cells)
+                left[cells] = False
+    return [_Reason(words, counts[words] * grid.size // seen, first[words]) for words in first]

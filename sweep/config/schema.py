@@ -8,7 +8,7 @@ import math
 import re
 import sys
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -23,6 +23,7 @@ from sweep.config.document import Document, number
 from sweep.config.faults import ConfigError, Fault, Path, quote, suggestion
 from sweep.config.messages import Allowed, describe, refusal, wrong
 from sweep.config.plain import plain
+from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
@@ -31,7 +32,8 @@ from sweep.models.general import BASES
 from sweep.models.laws import LAWS
 from sweep.models.model import Model, Tier
 from sweep.models.scene import PAPER, PAPERS_LAW, SI, is_papers, variant
-from sweep.parameters import PARAMETERS, SECTIONS, Parameter
+from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES
+from sweep.parameters import ON_PARABOLOID, PARAMETERS, SECTIONS, Parameter
 from sweep.variables import in_si
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
@@ -202,6 +204,9 @@ FOREVER = 1e7
 """What `t_end: .inf` stands for, in sqrt(c/g): longer than any rattleback spins.  A trajectory that has not settled by
 then has the status `time_limit` all the same."""
 
+T_END = 30_000.0
+"""Default of `t_end`, in sqrt(c/g); what that is in seconds says `Config.with_time`."""
+
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
 
@@ -224,8 +229,10 @@ class Integrator(_Strict):
         BeforeValidator(lambda raw: FOREVER if isinstance(raw, float) and raw == math.inf else raw),
         Allowed(f"a number > 0 and <= {LATEST:g}, or .inf"),
     ] = Field(
-        default=30_000.0, gt=0, le=LATEST,
-        description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}",
+        default=T_END, gt=0, le=LATEST,
+        description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}; "
+        f"with `units: SI` in s, by default {T_END:g} sqrt(c/g) of the largest c and the least gravity, rounded up to "
+        "hundreds",
     )  # fmt: skip
     stop_when_settled: bool = Field(
         default=True, description="whether a trajectory ends when neither spin nor count can change any more"
@@ -262,7 +269,13 @@ class Law(_Words):
         return f"{self.law}-{self.regularisation}" if self.law == "coulomb" else self.law
 
 
-_WORDS: dict[str, type[_Words]] = {"friction": Law}
+class Shape(_Words):
+    surface: Literal[tuple(SURFACES)] = Field(  # type: ignore[valid-type]
+        default=ELLIPSOID.name, description="surface of the body, which says what `a`, `b` and `c` mean"
+    )
+
+
+_WORDS: dict[str, type[_Words]] = {"body": Shape, "friction": Law}
 
 
 class _Top(_Strict):
@@ -308,7 +321,8 @@ _sections: dict[str, Any] = {name: _section(name) for name in SECTIONS}
 Schema: Any = create_model("Configuration", __base__=_Top, **_physical(""), **_sections)
 
 SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fields.items() if name != "integrator"}
-SETTINGS |= {f"friction.{name}": field for name, field in Law.model_fields.items()}
+for _name, _words in _WORDS.items():
+    SETTINGS |= {f"{_name}.{name}": field for name, field in _words.model_fields.items()}
 SETTINGS |= {f"integrator.{name}": field for name, field in Integrator.model_fields.items()}
 """All values of a configuration but the physical parameters, by path; the `description` of each says what it means."""
 
@@ -317,11 +331,11 @@ PATHS |= {path: str(field.description) for path, field in SETTINGS.items()}
 """The path of every value of a configuration, and what it means."""
 
 
-def tier_of(model: str, law: str, units: str, names: Collection[str]) -> Tier:
+def tier_of(model: str, law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> Tier:
     """The model of a configuration that names these parameters."""
-    if model not in BASES or is_papers(law, units, names):
+    if model not in BASES or is_papers(law, units, names, surface):
         return TIERS[model]
-    return variant(model, law, units, names)
+    return variant(model, law, units, names, surface)
 
 
 @dataclass(frozen=True)
@@ -344,6 +358,8 @@ class Config:
     units: str = PAPER
     law: str = PAPERS_LAW
     """Name of the law of friction, as in `sweep.models.laws.LAWS`."""
+    surface: str = ELLIPSOID.name
+    """Name of the surface, as in `sweep.models.surfaces.SURFACES`."""
     source: Document | None = field(default=None, init=False, compare=False, repr=False)
     """What it was made from, so that single values can be replaced; a copy with other values has none."""
 
@@ -358,7 +374,7 @@ class Config:
     @property
     def tier(self) -> Tier:
         """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
-        return tier_of(self.model, self.law, self.units, (*self.parameters, *(self.cases or ())))
+        return tier_of(self.model, self.law, self.units, (*self.parameters, *(self.cases or ())), self.surface)
 
     @property
     def equations(self) -> Model:
@@ -366,12 +382,22 @@ class Config:
         assert isinstance(self.tier, Model)
         return self.tier
 
+    def with_time(self) -> Config:
+        """The same with a `t_end` in seconds for bodies in SI, which have given none."""
+        columns = {name: value.numbers for name, value in self.parameters.items()} | (self.cases or {})
+        longest = min(T_END * math.sqrt(max(columns["c"]) / min(columns["gravity"])), LATEST)
+        # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
+        t_end = STRETCH * math.ceil(longest / STRETCH)
+        return replace(self, integrator=self.integrator.model_copy(update={"t_end": t_end}))
+
     def described(self, name: str) -> dict[str, str]:
         """The CF attributes of a physical parameter."""
         parameter = PARAMETERS[name]
         if name in LAWS[self.law].pure:
             return {"long_name": "coefficient of friction", "units": "1"}
         units, long_name = parameter.units, parameter.long_name
+        if self.surface == PARABOLOID.name:
+            long_name = ON_PARABOLOID.get(name, long_name)
         if self.units == SI:
             units, long_name = in_si(units, long_name)
         return {"long_name": long_name, "units": units}
@@ -385,6 +411,8 @@ class Config:
         if self.law != PAPERS_LAW:
             law, _, regularisation = self.law.partition("-")
             sections["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
+        if self.surface != ELLIPSOID.name:
+            sections["body"] |= {"surface": self.surface}
         for name, value in self.parameters.items():
             sections.get(PARAMETERS[name].section, top)[name] = value.spec
         return {

@@ -29,7 +29,7 @@ def estimate(config: Config) -> str:
     sample = grid.sample(_SAMPLE)
     with uncompiled():
         chosen, share = choose(config, sample), grid.size / sample.size
-    steps = [np.ceil(config.integrator.t_end / each.step) for each in chosen]
+    steps = [np.ceil(config.integrator.t_end / each.step) for each in chosen if len(each.cells)]
     total, seconds = sum(each.sum() for each in steps) * share, sum(map(nominal_seconds, steps)) * share
     numbers = sum(len(each.cells) * len(each.kernel.layout.names) for each in chosen)
     bytes_a_cell = np.dtype(float).itemsize * numbers / sample.size

@@ -15,6 +15,7 @@ from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.methods import AUTO, METHODS
+from sweep.kernels.status import IMPOSSIBLE
 from sweep.models.model import Columns
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
@@ -59,7 +60,8 @@ class Plan:
     grid: Grid
     prediction: Prediction
     parts: tuple[Part, ...]
-    """One part, unless the configuration has the method chosen for each cell (`method: auto`)."""
+    """One part, unless the configuration has the method chosen for each cell (`method: auto`).  Cells of impossible
+    bodies are in none."""
 
     def results(self) -> dict[str, Array]:
         """The variables of the dataset, over the cells and over their bodies, once all trajectories have ended."""
@@ -72,7 +74,11 @@ class Plan:
             if self.config.integrator.method == AUTO:
                 found["method"] = np.full(len(part.cells), list(METHODS).index(part.method))
             for name, values in found.items():
-                arrays.setdefault(name, np.empty((self.grid.size, *values.shape[1:])))[part.cells] = values
+                nothing = np.nan if dataset.VARIABLES[name].dtype.startswith("float") else 0
+                blank = np.full((self.grid.size, *values.shape[1:]), nothing)
+                arrays.setdefault(name, blank)[part.cells] = values
+        simulated = np.concatenate([part.cells for part in self.parts])
+        arrays["status"][np.delete(np.arange(self.grid.size), simulated)] = IMPOSSIBLE
         return arrays | dataset.predicted(self.prediction)
 
 
@@ -100,22 +106,31 @@ def kernel_of(method: str, config: Config) -> Kernel:
 
 
 def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
-    """Give each cell of `grid` its method and step; no kernel is compiled for it."""
+    """Give each cell of `grid` that has a possible body its method and step; no kernel is compiled for it.
+
+    Without any there is one choice, of no cells.
+    """
     model, integrator = config.equations, config.integrator
     columns = grid.columns()
+    possible = np.flatnonzero(~model.impossible(columns))
+    if len(possible) < grid.size:
+        columns = {name: values[possible] for name, values in columns.items()}
+    if not len(possible):
+        nothing, kernel = np.empty(0), kernel_of(kernels(config)[0].method, config)
+        return (Choice(kernel.method, possible, kernel, columns, nothing, nothing),)
     if integrator.method == AUTO:
         chosen, steps, rules = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:
-        chosen = np.full(grid.size, list(METHODS).index(integrator.method))
+        chosen = np.full(len(possible), list(METHODS).index(integrator.method))
         if integrator.step == "auto":
             steps, rules = methods.automatic_step(integrator.method, model, columns, integrator.tolerance)
         else:
-            steps, rules = np.full(grid.size, integrator.step), np.full(grid.size, FIXED)
+            steps, rules = np.full(len(possible), integrator.step), np.full(len(possible), FIXED)
     choices = []
     for i in np.unique(chosen):
         method, cells = list(METHODS)[i], np.flatnonzero(chosen == i)
         theirs = {name: values[cells] for name, values in columns.items()}
-        choices.append(Choice(method, cells, kernel_of(method, config), theirs, steps[cells], rules[cells]))
+        choices.append(Choice(method, possible[cells], kernel_of(method, config), theirs, steps[cells], rules[cells]))
     return tuple(choices)
 
 
@@ -126,7 +141,9 @@ def fill(config: Config, grid: Grid, chosen: Sequence[Choice]) -> Plan:
     stable = prediction.stability.ranges
     parts = []
     for each in chosen:
-        images = each.kernel.images(each.columns, each.step, config.integrator.t_end, stable[:, each.cells])
+        images = np.empty((0, len(each.kernel.layout.names)))
+        if len(each.cells):
+            images = each.kernel.images(each.columns, each.step, config.integrator.t_end, stable[:, each.cells])
         parts.append(Part(**vars(each), images=images))
     return Plan(config, grid, prediction, tuple(parts))
 

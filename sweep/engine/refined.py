@@ -14,9 +14,12 @@ from sweep.config import Config
 from sweep.engine import refinement
 from sweep.engine.whole import attributes, gather
 from sweep.grid import Array, Grid, Tile
+from sweep.kernels.status import IMPOSSIBLE
 from sweep.prediction import formulas
 from sweep.results import dataset, netcdf
 from sweep.results.store import Store
+
+_STATUSES = max(dataset.STATUSES) + 1
 
 _TILE = 1 << 18
 """Cells for which the formulas are evaluated at a time."""
@@ -34,6 +37,8 @@ class Refined:
         self.tiles: list[Tile] = []
         self._nodes = np.empty(0, np.intp)
         self._outcome = np.full(self.grid.shape, refinement.UNKNOWN, np.int32)
+        self._impossible = self._impossible_nodes()
+        self._outcome.ravel()[self._impossible] = IMPOSSIBLE
         self._learned = 0
         """Tiles whose outcomes are known."""
 
@@ -91,9 +96,16 @@ class Refined:
         for name in ("reversals", "status"):
             simulated = np.empty(self.grid.size, found[name].dtype)
             simulated[self._nodes] = found[name]
+            simulated[self._impossible] = IMPOSSIBLE if name == "status" else 0
             arrays[name] = simulated[source]
         arrays["inferred"] = self._outcome == refinement.UNKNOWN
         return arrays
+
+    def _impossible_nodes(self) -> Array:
+        """Indices of the nodes without a possible body, whose outcome need not be simulated."""
+        tiles = self.grid.tiles(_TILE)
+        bad = (self.config.equations.impossible(self.grid.part(tile).columns()) for tile in tiles)
+        return np.flatnonzero(np.concatenate(list(bad)))
 
     def _formulas(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
         for tile in self.grid.tiles(_TILE):
@@ -102,4 +114,4 @@ class Refined:
 
 def _outcome(found: Mapping[str, Array]) -> Array:
     """Number of reversals and status of each cell, as one number."""
-    return found["reversals"].astype(np.int32) * len(dataset.STATUSES) + found["status"].astype(np.int32)
+    return found["reversals"].astype(np.int32) * _STATUSES + found["status"].astype(np.int32)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config
+from sweep.config.scenes import described_impossible
 from sweep.grid import Array, Grid, Tile
 from sweep.results import dataset, netcdf
 from sweep.results.provenance import provenance
@@ -38,7 +39,7 @@ def attributes(config: Config, cells: int, apart: Iterable[Apart]) -> dict[str, 
     for tile in apart:
         seconds += float(tile["seconds"])
         cpus.add(str(tile["cpu"]))
-    return provenance(config, seconds, cells, cpus)
+    return provenance(config, seconds, cells, cpus) | described_impossible(config)
 
 
 def _apart(arrays: Mapping[str, Array]) -> Apart:

@@ -40,6 +40,7 @@ const sweep = (() => {
   const PATTERNS = {
     not_run: () => LIGHT,
     failed: (x, y) => (ALONG(x, y) === 0 || BACK(x, y) === 0 ? LIGHT : DARK),
+    impossible: (x, y) => (y % 6 === 0 ? DARK : LIGHT),
     no_value: () => LIGHT,
     time_limit: (x, y) => [WHITE, BLACK][ALONG(x, y)] ?? 0,
     inferred: (x, y) => (x % 6 < 2 && y % 6 === 0 ? WHITE : x % 6 < 2 && y % 6 === 1 ? BLACK : 0),

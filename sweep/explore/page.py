@@ -29,6 +29,7 @@ _SWATCHES = {
     "not_run": "#9ea3a8",
     "failed": "repeating-linear-gradient(45deg,#9ea3a8 0 1px,transparent 1px 6px),"
     "repeating-linear-gradient(-45deg,#9ea3a8 0 1px,transparent 1px 6px),#404347",
+    "impossible": "repeating-linear-gradient(0deg,#474340 0 1px,transparent 1px 6px),#9ea3a8",
     "no_value": "#9ea3a8",
     "time_limit": "repeating-linear-gradient(45deg,#fff 0 1px,#222 1px 2px,transparent 2px 6px),#21918c",
     "inferred": "radial-gradient(circle at 2px 2px,#fff 1px,transparent 1.4px) 0 0/5px 5px,#21918c",

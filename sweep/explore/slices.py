@@ -85,7 +85,7 @@ class Slice:
     @property
     def shown(self) -> Array:
         """The values that are drawn: those of all cells that have one, shape (cells,)."""
-        blank = sum(1 << k for k, kind in enumerate(marks.WORDS) if kind in ("not_run", "failed", "no_value"))
+        blank = sum(1 << k for k, kind in enumerate(marks.WORDS) if kind in marks.BLANK)
         values = self.values[(self.kinds & blank) == 0]
         return np.asarray(values[np.isfinite(values)] if values.dtype.kind == "f" else values)
 

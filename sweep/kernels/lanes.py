@@ -117,6 +117,8 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
     saturates = bool(model.faint)
     will_settle, measure = _make_will_settle(layout, given.may_settle, saturates), given.measure
     FAINT = layout.at(f"constant.{model.faint}") if saturates else 0
+    stops = bool(model.still)
+    STILL = layout.at(f"constant.{model.still}") if stops else 0
     GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP = map(layout.at, ("goal", "done", "status", "energy", "stable_step"))
     lanes, allowed, conserved = LANES, 1.0 + given.energy_gain, ENERGY in model.offers
     wide = full_width()
@@ -138,6 +140,8 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
             bounded, settled, followed = will_settle(group, lane, spin, energy_ratio)
             if saturates:
                 settled = settled & (rattle < group[FAINT + lane])
+            if stops:
+                settled = settled | ((total < group[STILL + lane]) & followed)
             ends = SETTLED if settled & stop_when_settled else RUNNING
             if pauses:
                 small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])

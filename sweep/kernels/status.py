@@ -8,6 +8,9 @@ RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX, TOPPLED = range(7)
 # Not an end: the rattle is so small that the kernel's `carry` may be able to do without steps.
 QUIET = 7
 
+IMPOSSIBLE = 8
+"""Not run: there is no such body, or it does not stand upright at rest (`Model.impossible`)."""
+
 FAILURES = (LIFT_OFF, DIVERGED, PARADOX, TOPPLED)
 """Ends before the time limit.  A kernel gives the first three as first impressions, from the stages of a step that may
 have been too long; what really happened is found out by `sweep.kernels.failure` and `sweep.engine.repeats`."""

@@ -19,7 +19,7 @@ from sweep.models.solid import mass
 
 @dataclass(frozen=True)
 class Couple:
-    """A couple -k(ω²) ω, isotropic like the laws of friction."""
+    """A couple -k(ω²) ω, isotropic like the laws of friction; or one about the normal, -k(n²) n u with n = ω · u."""
 
     name: str
     parameters: tuple[str, ...]
@@ -27,12 +27,17 @@ class Couple:
     of: Callable[[Columns], tuple[Array, ...]]
     """(columns) -> values of `constants`, each of shape (cells,)."""
     resistance: Callable[..., Any]
-    """Inline, (ω², constants) -> k, per unit mass."""
+    """Inline, (ω² or n², constants) -> k, per unit mass."""
     strongest: Callable[[Columns], Array]
     """(columns) -> bound on k, shape (cells,)."""
     needs_normal_force: bool = False
     """Whether k is per unit of the normal force."""
+    about_normal: bool = False
+    """Whether it resists the spin alone; it is per unit of the normal force then."""
     linear: bool = True
+    stops_below: Callable[[Columns], Array] | None = None
+    """(columns) -> angular velocity, shape (cells,), below which its resistance is that of creeping.  A body whose
+    energy allows no faster motion counts as at rest; None if it never does."""
 
 
 @inline
@@ -43,6 +48,15 @@ def _damping(square: Any, p: Any) -> Any:  # noqa: ARG001
 @inline
 def _rolling(square: Any, p: Any) -> Any:
     return p.arm / rounded(np.sqrt(square), p.speed_rolling)
+
+
+@inline
+def _spinning(square: Any, p: Any) -> Any:
+    return p.arm_spinning / rounded(np.sqrt(square), p.speed_spinning)
+
+
+_CREEPING = 0.1
+"""Share of `speed_spinning` below which the resistance is linear to 0.03."""
 
 
 @inline
@@ -63,6 +77,13 @@ COUPLES: dict[str, Couple] = {
             lambda columns: (columns["mu_rolling"] * columns["radius"], columns["speed_rolling"]), _rolling,
             lambda columns: 3 * columns["mu_rolling"] * columns["radius"] / columns["speed_rolling"],
             needs_normal_force=True, linear=False,
+        ),
+        Couple(
+            "spinning", ("mu_spinning", "radius_spinning", "speed_spinning"), ("arm_spinning", "speed_spinning"),
+            lambda columns: (columns["mu_spinning"] * columns["radius_spinning"], columns["speed_spinning"]), _spinning,
+            lambda columns: 3 * columns["mu_spinning"] * columns["radius_spinning"] / columns["speed_spinning"],
+            needs_normal_force=True, about_normal=True, linear=False,
+            stops_below=lambda columns: _CREEPING * columns["speed_spinning"],
         ),
     )
 }  # fmt: skip

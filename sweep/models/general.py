@@ -1,9 +1,10 @@
 """Any body and any law of friction: the equations of `slip` and `noslip` for a `sweep.models.solid`.
 
 A model of this file is a *variant* of `slip` or `noslip`, specialised for a law of friction and for couples, whose
-names make up its own: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`.  What a variant does not name leaves no
-instruction in its kernel.  The states are those of `slip` and `noslip`, in the axes of the ellipsoid.  All forces are
-per unit mass: R is the acceleration N/m by the normal force.
+names make up its own: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`, and for a surface that is no ellipsoid
+`slip+viscous+paraboloid`.  What a variant does not name leaves no instruction in its kernel.  The states are those of
+`slip` and `noslip`, in the axes of the surface.  All forces are per unit mass: R is the acceleration N/m by the normal
+force.
 
 With slip.  Gravity, the contact force R (u + f) with f = -k v_p, and the couple τ0 + R τ1 give
 
@@ -28,23 +29,27 @@ Without slip.  v_g = v_0, and the contact force is g u + v_g' + ω × v_g whatev
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cache
+from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models import noslip, slip, solid, starts, steady
+from sweep.models import bodies, noslip, slip, solid, starts, steady
 from sweep.models.couples import COUPLES, Couple, nothing
 from sweep.models.laws import LAWS, Law
 from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, Ripple, named
-from sweep.models.solid import contact, gyroscopic
+from sweep.models.solid import gyroscopic
+from sweep.models.surfaces import ELLIPSOID, SURFACES, Surface
 
 BASES = ("slip", "noslip")
 
 SOLID = "solid"
 """Stands in place of the law in the names of variants without slip."""
+
+_STILL = "still"
+"""The constant `Model.still` of variants with a couple that stops the body."""
 
 
 @cache
@@ -60,48 +65,104 @@ def variant(name: str, parameters: tuple[str, ...] = ()) -> Model:
     KeyError
         if a part of the name is unknown.
     """
-    base, law, *couples = name.split("+")
-    resisting = [COUPLES[couple] for couple in couples]
+    base, law, couples, surface = parts(name)
     if base == "slip":
-        return _slipping(name, LAWS[law], resisting, parameters)
+        return _slipping(name, LAWS[law], couples, surface, parameters)
     if (base, law) == ("noslip", SOLID):
-        return _rolling(name, resisting, parameters)
+        return _rolling(name, couples, surface, parameters)
     raise KeyError(name)
 
 
-def name_of(base: str, law: str, couples: Sequence[str]) -> str:
+def parts(name: str) -> tuple[str, str, list[Couple], Surface]:
+    """What the name of a variant, or of another model, says: base, law, couples and surface."""
+    base, _, rest = name.partition("+")
+    law, *more = rest.split("+")
+    surface = SURFACES[more.pop()] if more and more[-1] in SURFACES else ELLIPSOID
+    return base, law, [COUPLES[couple] for couple in more], surface
+
+
+def name_of(base: str, law: str, couples: Sequence[str], surface: str = ELLIPSOID.name) -> str:
     """The name of a variant; of a model without slip whatever the law is."""
-    return "+".join([base, law if base == "slip" else SOLID, *couples])
+    shape = [surface] if surface != ELLIPSOID.name else []
+    return "+".join([base, law if base == "slip" else SOLID, *couples, *shape])
 
 
-def _record(constants: Sequence[str], more: Any) -> type[Any]:
+def _record(surface: Surface, constants: Sequence[str], more: Any) -> type[Any]:
     """The constants of a variant: shape, inertia, its inverse, and `more`, a function of the columns."""
+    shape = solid.shape_names(surface)
     inverse = tuple(name.replace("J", "inv_J") for name in solid.INERTIA)
 
-    class Constants(named(*solid.SHAPE, *solid.INERTIA, *inverse, *constants)):  # type: ignore[misc]
+    class Constants(named(*shape, *solid.INERTIA, *inverse, *constants)):  # type: ignore[misc]
         @classmethod
         def of(cls, columns: Columns) -> Constants:
             J = solid.inertia(columns)
-            return cls(*solid.shape(columns), *J, *solid.inverse(J), *more(columns))
+            return cls(*solid.shape(columns, surface), *J, *solid.inverse(J), *more(columns))
 
     return Constants
 
 
 def _couple_constants(couples: Sequence[Couple]) -> tuple[tuple[str, ...], Any]:
     names = tuple(name for couple in couples for name in couple.constants)
-    return names, lambda columns: tuple(value for couple in couples for value in couple.of(columns))
+    stopping = [couple.stops_below for couple in couples if couple.stops_below]
+
+    def values(columns: Columns) -> tuple[Array, ...]:
+        still = (_still(stops_below(columns), columns) for stops_below in stopping)
+        return (*(value for couple in couples for value in couple.of(columns)), *still)
+
+    return (*names, *(_STILL for _ in stopping)), values
+
+
+def _still(speed: Array, columns: Columns) -> Array:
+    """Energy that allows no angular velocity above `speed`, per unit mass, shape (cells,)."""
+    return np.asarray(0.5 * np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0] * speed**2)
 
 
 def resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
     """The resistance by itself and the one per unit of the normal force."""
     found: list[Any] = [nothing, nothing]
     for couple in couples:
-        found[couple.needs_normal_force] = couple.resistance
+        if not couple.about_normal:
+            found[couple.needs_normal_force] = couple.resistance
     return found[0], found[1]
 
 
-def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[str, ...]) -> Model:
-    resistance, (plain, loaded) = law.resistance, resistances(couples)
+def _drag(couples: Sequence[Couple]) -> tuple[Any, Any]:
+    """Inline, (k, ω, u, constants) -> (k', d): the couple per unit of the normal force is -k' d.
+
+    It is -k ω, and where a couple about the normal is among `couples` also that one.  The other function is
+    (R k', k0, ω², d · ω) -> power of all couples, where k0 is the resistance by itself.
+    """
+    about_normal = [couple.resistance for couple in couples if couple.about_normal]
+    if not about_normal:
+        return _isotropic, _isotropic_power
+    (resistance,) = about_normal
+
+    @inline
+    def drag(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+        n = u1 * w1 + u2 * w2 + u3 * w3
+        m = resistance(n * n, p) * n
+        return 1.0, k * w1 + m * u1, k * w2 + m * u2, k * w3 + m * u3
+
+    @inline
+    def lost(load: Any, k0: Any, turn_square: Any, turned: Any) -> Any:
+        return load * turned + k0 * turn_square
+
+    return drag, lost
+
+
+@inline
+def _isotropic_power(load: Any, k0: Any, turn_square: Any, turned: Any) -> Any:  # noqa: ARG001
+    return (load + k0) * turn_square
+
+
+@inline
+def _isotropic(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:  # noqa: ARG001
+    return k, w1, w2, w3
+
+
+def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
+    contact, general_energy = surface.contact, solid.energy_on(surface)
+    resistance, (plain, loaded), (drag, _) = law.resistance, resistances(couples), _drag(couples)
     names, values = _couple_constants(couples)
 
     @inline
@@ -119,12 +180,13 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
         turn_square = w1 * w1 + w2 * w2 + w3 * w3
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
+        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
         al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
         al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
         al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
-        t1, t2, t3 = y_ * f3 - z * f2 - k1 * w1, z * f1 - x * f3 - k1 * w2, x * f2 - y_ * f1 - k1 * w3
+        t1, t2, t3 = y_ * f3 - z * f2 - k1 * d1, z * f1 - x * f3 - k1 * d2, x * f2 - y_ * f1 - k1 * d3
         be1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
         be2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
         be3 = p.inv_J13 * t1 + p.inv_J23 * t2 + p.inv_J33 * t3
@@ -138,22 +200,23 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         dv2 = R * f2 - p.g * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
 
         spin = u1 * w1 + u2 * w2 + u3 * w3
-        power = R * (k * slip_square + k1 * turn_square) + k0 * turn_square
+        power = R * (k * slip_square + k1 * (d1 * w1 + d2 * w2 + d3 * w3)) + k0 * turn_square
         return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, power, R, denominator)
 
     @inline
     def energy(y: Any, p: Any) -> Any:
         u1, u2, w1, w2, w3, v1, v2 = y
-        return solid.energy(u1, u2, w1, w2, w3, v1, v2, p)
+        return general_energy(u1, u2, w1, w2, w3, v1, v2, p)
 
     def observe(y: Array, p: Any) -> dict[str, Array]:
-        return {**_seen(rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
+        return {**_seen(contact, rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
 
     def fastest_decay(columns: Columns) -> Array:
-        return np.asarray(law.strongest(columns) * strongest_grip(columns) + couples_decay(couples, columns))
+        grip = strongest_grip(columns, surface)
+        return np.asarray(law.strongest(columns) * grip + couples_decay(couples, columns, surface))
 
     def more(columns: Columns) -> tuple[Array, ...]:
-        faint = () if law.linear_to is None else (_faint(law.linear_to(columns), columns),)
+        faint = () if law.linear_to is None else (_faint(law.linear_to(columns), columns, surface),)
         return (*(columns[each] for each in law.parameters), *values(columns), *faint)
 
     fields = (*law.parameters, *names, *(() if law.linear_to is None else ("faint",)))
@@ -164,24 +227,27 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         spin_state=slip.MODEL.spin_state,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
         offers=_offers(couples, dissipates=True),
-        constants=_record(fields, more),
-        start=starts.slipping,
-        slower_period=solid.slower_period,
+        constants=_record(surface, fields, more),
+        start=lambda columns: starts.slipping(columns, surface),
+        slower_period=lambda columns: solid.slower_period(columns, surface),
         fastest_decay=fastest_decay,
         upright=slip.MODEL.upright,
         rhs=rhs,
         energy=energy,
-        ripple=Ripple(steady.NAMES, steady.form, steady.slipping),
+        ripple=Ripple(steady.NAMES, lambda columns: steady.form(columns, surface), steady.slipping),
         tilt=slip.MODEL.tilt,
         observe=observe,
         spin_unit=solid.spin_unit,
+        impossible=lambda columns: bodies.impossible(columns, surface),
         faint="" if law.linear_to is None else "faint",
+        still=_STILL if _STILL in names else "",
         extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
     )
 
 
-def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) -> Model:
-    plain, loaded = resistances(couples)
+def _rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
+    contact, general_energy = surface.contact, solid.energy_on(surface)
+    (plain, loaded), (drag, lost) = resistances(couples), _drag(couples)
     names, values = _couple_constants(couples)
 
     @inline
@@ -194,6 +260,7 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         h1, h2, h3 = p.g * u1 + c1, p.g * u2 + c2, p.g * u3 + c3
         turn_square = w1 * w1 + w2 * w2 + w3 * w3
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
+        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         t1 = m1 + y_ * h3 - z * h2 - k0 * w1
         t2 = m2 + z * h1 - x * h3 - k0 * w2
@@ -209,22 +276,22 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         a1 = inv * (C11 * t1 + C12 * t2 + C13 * t3)
         a2 = inv * (C12 * t1 + C22 * t2 + C23 * t3)
         a3 = inv * (C13 * t1 + C23 * t2 + C33 * t3)
-        b1 = inv * (C11 * w1 + C12 * w2 + C13 * w3)
-        b2 = inv * (C12 * w1 + C22 * w2 + C23 * w3)
-        b3 = inv * (C13 * w1 + C23 * w2 + C33 * w3)
+        b1 = inv * (C11 * d1 + C12 * d2 + C13 * d3)
+        b2 = inv * (C12 * d1 + C22 * d2 + C23 * d3)
+        b3 = inv * (C13 * d1 + C23 * d2 + C33 * d3)
 
         q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
         denominator = 1.0 + k1 * (q1 * b1 + q2 * b2 + q3 * b3)
         R = (p.g + (u1 * c1 + u2 * c2 + u3 * c3) + (q1 * a1 + q2 * a2 + q3 * a3)) / denominator
         load = R * k1
         spin = u1 * w1 + u2 * w2 + u3 * w3
-        power = (load + k0) * turn_square
+        power = lost(load, k0, turn_square, d1 * w1 + d2 * w2 + d3 * w3)
         return (du1, du2, a1 - load * b1, a2 - load * b2, a3 - load * b3), (spin, power, R, denominator)
 
     @inline
     def energy(y: Any, p: Any) -> Any:
         u1, u2, w1, w2, w3 = y
-        return solid.energy(u1, u2, w1, w2, w3, 0.0, 0.0, p)
+        return general_energy(u1, u2, w1, w2, w3, 0.0, 0.0, p)
 
     return Model(
         name=name,
@@ -233,18 +300,20 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         spin_state=noslip.MODEL.spin_state,
         parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
         offers=_offers(couples, dissipates=bool(couples)),
-        constants=_record(names, values),
-        start=starts.rolling,
-        slower_period=solid.slower_period,
-        fastest_decay=lambda columns: couples_decay(couples, columns),
+        constants=_record(surface, names, values),
+        start=lambda columns: starts.rolling(columns, surface),
+        slower_period=lambda columns: solid.slower_period(columns, surface),
+        fastest_decay=lambda columns: couples_decay(couples, columns, surface),
         upright=noslip.MODEL.upright,
         rhs=rhs,
         energy=energy,
         tilt=noslip.MODEL.tilt,
         radians_a_step=noslip.MODEL.radians_a_step,
-        ripple=Ripple(steady.NAMES, steady.form, steady.rolling),
-        observe=lambda y, p: _seen(rhs, y, p),
+        ripple=Ripple(steady.NAMES, lambda columns: steady.form(columns, surface), steady.rolling),
+        still=_STILL if _STILL in names else "",
+        observe=lambda y, p: _seen(contact, rhs, y, p),
         spin_unit=solid.spin_unit,
+        impossible=lambda columns: bodies.impossible(columns, surface),
     )
 
 
@@ -254,22 +323,23 @@ def _offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
     return frozenset({COUNT, SPIN, ENERGY} | theory)
 
 
-def _faint(speed: Array, columns: Columns) -> Array:
+def _faint(speed: Array, columns: Columns, surface: Surface) -> Array:
     """Energy of a rattle whose slip velocity is below `speed`, per unit mass, shape (cells,).
 
     With ω = n u + o the slip v_p = v_g - x_p × o - n x_p × u is at most sqrt(2 E G) + |n| ρ.  G is the largest
-    eigenvalue of 1 - [x_p] J⁻¹ [x_p], and ρ <= (a²/c) sqrt(2 E / (g k)) the distance of the contact point from the
-    vertical through G, with the stiffness k.  Spins up to sqrt(g/c) are allowed for.
+    eigenvalue of 1 - [x_p] J⁻¹ [x_p], and ρ <= s sqrt(2 E / (g k)) the distance of the contact point from the
+    vertical through G, with the larger radius of curvature s and the stiffness k.  Spins up to sqrt(g/c) are allowed
+    for.
     """
     c, g = columns["c"], solid.gravity(columns)
     inverse = np.linalg.eigvalsh(solid.matrix(solid.inverse(solid.inertia(columns))))[:, -1]
-    grip = 1 + (c - solid.offset(columns)) ** 2 * inverse
-    arm = np.maximum(columns["a"], columns["b"]) ** 2 / c
-    per_root = np.sqrt(2 * grip) + np.sqrt(g / c) * arm * np.sqrt(2 / (g * np.minimum(*solid.stiffness(columns))))
+    grip, arm = 1 + solid.height(columns) ** 2 * inverse, np.maximum(*surface.radii(columns))
+    stiffness = np.minimum(*solid.stiffness(columns, surface))
+    per_root = np.sqrt(2 * grip) + np.sqrt(g / c) * arm * np.sqrt(2 / (g * stiffness))
     return np.asarray((speed / per_root) ** 2)
 
 
-def _seen(rhs: Any, y: Array, p: Any) -> dict[str, Array]:
+def _seen(contact: Any, rhs: Any, y: Array, p: Any) -> dict[str, Array]:
     """The contact point and the normal force."""
     _, point, _, _ = contact(*y[:5], p)
     _, (_, _, R, _) = rhs(y, p)
@@ -286,28 +356,31 @@ def _with_and_without(law: Law) -> Any:
     return extremes
 
 
-def couples_decay(couples: Sequence[Couple], columns: Columns) -> Array:
+def couples_decay(couples: Sequence[Couple], columns: Columns, surface: Surface) -> Array:
     """Bound on the rate at which couples damp the angular velocity, shape (cells,)."""
-    rate = np.zeros_like(columns["a"])
+    rate, about_normal = np.zeros_like(columns["a"]), np.zeros_like(columns["a"])
     for couple in couples:
         strength = couple.strongest(columns)
-        rate = rate + (strength * _hardest_press(columns) if couple.needs_normal_force else strength)
-    return np.asarray(rate / np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0])
+        if couple.about_normal:
+            about_normal = about_normal + strength * _hardest_turn(columns, surface)
+        else:
+            rate = rate + (strength * _hardest_press(columns, surface) if couple.needs_normal_force else strength)
+    return np.asarray(rate / np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0] + about_normal)
 
 
-def _energy_start(columns: Columns) -> Array:
+def _energy_start(columns: Columns, surface: Surface) -> Array:
     """Energy above rest at the start, per unit mass, shape (cells,)."""
     J = solid.inertia(columns)
-    y = starts.slipping(columns) if "slip1" in columns else (*starts.rolling(columns), 0.0, 0.0)
-    fields = dict(zip((*solid.SHAPE, *solid.INERTIA), (*solid.shape(columns), *J), strict=True))
-    spin, rattle, inertia = solid.energy(*y, SimpleNamespace(**fields))
+    y = starts.slipping(columns, surface) if "slip1" in columns else (*starts.rolling(columns, surface), 0.0, 0.0)
+    names, values = (*solid.shape_names(surface), *solid.INERTIA), (*solid.shape(columns, surface), *J)
+    spin, rattle, inertia = solid.energy_on(surface)(*y, SimpleNamespace(**dict(zip(names, values, strict=True))))
     return np.asarray(rattle + 0.5 * inertia * spin**2)
 
 
 _AZIMUTHS, _SHARES = 12, 9
 
 
-def _attitudes(columns: Columns) -> Iterator[tuple[Array, Array]]:
+def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Array, Array]]:
     """Attitudes that a body may reach: normals u, shape (cells, 3), with bounds on the normal force R, shape (cells,).
 
     A body tilts at most until the height of G takes up the whole energy at the start, E0.  If it tilts towards the
@@ -317,14 +390,11 @@ def _attitudes(columns: Columns) -> Iterator[tuple[Array, Array]]:
 
     where J_t is the least moment of inertia about the axis of tilting, with free spin.
     """
-    (a2, b2, c2, below, g), J = solid.shape(columns), solid.matrix(solid.inertia(columns))
-    E0, r0 = _energy_start(columns), columns["c"] - below
+    shape, g, J = surface.of(columns), solid.gravity(columns), solid.matrix(solid.inertia(columns))
+    E0, r0 = _energy_start(columns, surface), solid.height(columns)
     for psi in np.linspace(0, np.pi, _AZIMUTHS, endpoint=False):
         cos, sin = np.cos(psi), np.sin(psi)
-        flat = a2 * cos**2 + b2 * sin**2
-
-        def height(phi: Array, flat: Array = flat) -> Array:
-            return np.asarray(np.sqrt(flat * np.sin(phi) ** 2 + c2 * np.cos(phi) ** 2) - below * np.cos(phi))
+        height = partial(surface.height, shape, cos, sin)
 
         # The largest tilt that the energy allows, by bisection; heights grow with the tilt, at least at first.
         low, high = np.zeros_like(E0), np.full_like(E0, 1.5)
@@ -343,23 +413,30 @@ def _attitudes(columns: Columns) -> Iterator[tuple[Array, Array]]:
             yield u, g + np.maximum(bend, 0) * square
 
 
-def _hardest_press(columns: Columns) -> Array:
+def _hardest_press(columns: Columns, surface: Surface) -> Array:
     """Bound on the normal force over the trajectory, per unit mass, shape (cells,)."""
-    return np.asarray(np.max([R for _, R in _attitudes(columns)], axis=0))
+    return np.asarray(np.max([R for _, R in _attitudes(columns, surface)], axis=0))
 
 
-def strongest_grip(columns: Columns) -> Array:
+def _hardest_turn(columns: Columns, surface: Surface) -> Array:
+    """Bound on R uᵀ J⁻¹ u over the trajectory, shape (cells,): the decay of the spin per unit of its resistance."""
+    inverse = solid.matrix(solid.inverse(solid.inertia(columns)))
+    return np.asarray(
+        np.max([R * np.einsum("...i,...ij,...j->...", u, inverse, u) for u, R in _attitudes(columns, surface)], axis=0)
+    )
+
+
+def strongest_grip(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
     """Bound on the decay rate of the slip per unit of friction's resistance, shape (cells,).
 
     Friction on a slip v changes it by -R k (1 - [x_p] J⁻¹ [x_p]) v, where [x] is the matrix of x ×.
     """
-    a2, b2, c2, below, _ = solid.shape(columns)
+    shape = SimpleNamespace(**dict(zip(surface.constants, surface.of(columns), strict=True)))
     inverse = solid.matrix(solid.inverse(solid.inertia(columns)))
-    A = np.stack([a2, b2, c2], axis=-1)
-    worst = np.zeros_like(a2)
-    for u, R in _attitudes(columns):
-        x_p = -A * u / np.sqrt((A * u * u).sum(axis=-1))[:, None]
-        x_p[:, 2] -= below
+    worst = np.zeros_like(columns["a"])
+    for u, R in _attitudes(columns, surface):
+        _, *point = surface.elevation(*u.T, shape)
+        x_p = np.stack(point, axis=-1)
         X = np.cross(np.eye(3), x_p[:, None, :])
         G = X @ inverse @ np.swapaxes(X, 1, 2)
         # One eigenvalue is zero, along x_p; the larger of the others follows from the traces of G and G².

@@ -21,12 +21,13 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models import general, solid, steady
-from sweep.models.couples import COUPLES, Couple
+from sweep.models.couples import Couple
 from sweep.models.laws import LAWS, Law
 from sweep.models.model import Array, Columns, Model, Ripple, named
 from sweep.models.slip_split import Geometry
 from sweep.models.solid import gyroscopic
 from sweep.models.split import Split
+from sweep.models.surfaces import Surface
 
 ROCKING = ("B11", "B12", "B21", "B22", "C12", "C21")
 """Elements of B and C in u' = B M, M' = C u: rocking about upright rest without slip.  C has no others."""
@@ -41,16 +42,15 @@ def split(model: Model) -> Split | None:
     slip remains at the value that follows from the slow motion.  With the other laws slip sets in and ends within times
     that dopri5's steps are short enough for.
     """
-    base, _, parts = model.name.partition("+")
-    law, *couples = parts.split("+")
-    if base != "slip" or law != "viscous" or any(COUPLES[each].needs_normal_force for each in couples):
+    base, law, couples, surface = general.parts(model.name)
+    if (base, law) != ("slip", "viscous") or any(couple.needs_normal_force for couple in couples):
         return None
-    return _split(model, LAWS[law], tuple(COUPLES[each] for each in couples))
+    return _split(model, LAWS[law], tuple(couples), surface)
 
 
 @cache
-def _split(full: Model, law: Law, couples: tuple[Couple, ...]) -> Split:
-    resistance = law.resistance
+def _split(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface) -> Split:
+    resistance, contact, general_energy = law.resistance, surface.contact, solid.energy_on(surface)
     couple, _ = general.resistances(couples)
     fields = (*full.constants._fields, *ROCKING)
 
@@ -59,18 +59,27 @@ def _split(full: Model, law: Law, couples: tuple[Couple, ...]) -> Split:
 
         @classmethod
         def of(cls, columns: Columns) -> Constants:
-            return cls(*full.constants.of(columns), *_rocking(columns))
+            return cls(*full.constants.of(columns), *_rocking(columns, surface))
+
+    @inline
+    def momentum(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3, v1, v2 = y
+        (_, inv_u3), (x, y_, z), _, _ = contact(u1, u2, 0.0, 0.0, 0.0, p)
+        v3 = -(v1 * u1 + v2 * u2) * inv_u3
+        g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
+        M1 = p.J11 * w1 + p.J12 * w2 + p.J13 * w3 - (y_ * g3 - z * g2)
+        M2 = p.J12 * w1 + p.J22 * w2 + p.J23 * w3 - (z * g1 - x * g3)
+        M3 = p.J13 * w1 + p.J23 * w2 + p.J33 * w3 - (x * g2 - y_ * g1)
+        return u1, u2, M1, M2, M3, v1, v2
 
     @inline
     def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) -> Any:
-        u3, inv_u3, (e1, e2, e3), inv_r, (x, y, z) = _contact(u1, u2, p)
+        # What is computed twice the compiler computes once.
+        (u3, inv_u3), (x, y, z), _, _ = contact(u1, u2, 0.0, 0.0, 0.0, p)
         t1, t2 = u1 * inv_u3, u2 * inv_u3
         v3 = -(v1 * t1 + v2 * t2)
         w1, w2, w3 = _turn(M1 + (y * v3 - z * v2), M2 + (z * v1 - x * v3), M3 + (x * v2 - y * v1), x, y, z, p)
-        du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
-        # x_p' = -(A u' - e (u' · e)) / r, with e = -A u / r
-        s = du1 * e1 + du2 * e2 + du3 * e3
-        dx, dy, dz = -inv_r * (p.a2 * du1 - e1 * s), -inv_r * (p.b2 * du2 - e2 * s), -inv_r * (p.c2 * du3 - e3 * s)
+        _, _, (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
         s1, s2, s3 = y * w3 - z * w2, z * w1 - x * w3, x * w2 - y * w1
         g1, g2, g3 = s1 + v1, s2 + v2, s3 + v3
         s1, s2, s3 = s1 - dx, s2 - dy, s3 - dz
@@ -127,7 +136,7 @@ def _split(full: Model, law: Law, couples: tuple[Couple, ...]) -> Split:
     def energy(y: Any, p: Any) -> Any:
         u1, u2, M1, M2, M3, v1, v2 = y
         _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
-        return solid.energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
+        return general_energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
 
     def velocities(y: Array, p: Any) -> Array:
         _, geometry = slow(*y, p)
@@ -149,7 +158,7 @@ def _split(full: Model, law: Law, couples: tuple[Couple, ...]) -> Split:
             start=start,
             energy=energy,
             observe=lambda y, p: full.observe(velocities(y, p), full_constants(p)),
-            ripple=Ripple(steady.NAMES, steady.form, _ripple),
+            ripple=Ripple(steady.NAMES, lambda columns: steady.form(columns, surface), _ripple),
         ),
         momentum=momentum,
         velocities=velocities,
@@ -160,23 +169,11 @@ def _split(full: Model, law: Law, couples: tuple[Couple, ...]) -> Split:
         fastest_rocking=_fastest_rocking,
         time_unit=lambda columns: 1 / solid.spin_unit(columns),
         slip_decay=lambda columns: full.fastest_decay(columns) + 2.2 * solid.spin_unit(columns),
-        rise=_rise,
+        rise=lambda columns: _rise(columns, surface),
         resistance=lambda columns: law.strongest(columns) * np.sqrt(solid.gravity(columns) * columns["c"]),
-        damping=lambda columns: general.couples_decay(couples, columns),
+        damping=lambda columns: general.couples_decay(couples, columns, surface),
         resolves_modes=False,
     )
-
-
-@inline
-def _contact(u1: Any, u2: Any, p: Any) -> Any:
-    """u3, 1/u3, e = -A u / r, 1/r and the contact point x_p."""
-    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    au1, au2, au3 = p.a2 * u1, p.b2 * u2, p.c2 * u3
-    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
-    shared = 1.0 / (r * u3)
-    inv_r, inv_u3 = shared * u3, shared * r
-    e1, e2, e3 = -au1 * inv_r, -au2 * inv_r, -au3 * inv_r
-    return u3, inv_u3, (e1, e2, e3), inv_r, (e1, e2, e3 - p.offset)
 
 
 @inline
@@ -206,26 +203,13 @@ def _compliance(x: Any, y: Any, z: Any, p: Any) -> Any:
     return (T11, T12, T13), (T12, T22, T23), (T13, T23, T33)
 
 
-@inline
-def momentum(y: Any, p: Any) -> Any:
-    """The states from those of the full model."""
-    u1, u2, w1, w2, w3, v1, v2 = y
-    _, inv_u3, _, _, (x, y_, z) = _contact(u1, u2, p)
-    v3 = -(v1 * u1 + v2 * u2) * inv_u3
-    g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
-    M1 = p.J11 * w1 + p.J12 * w2 + p.J13 * w3 - (y_ * g3 - z * g2)
-    M2 = p.J12 * w1 + p.J22 * w2 + p.J23 * w3 - (z * g1 - x * g3)
-    M3 = p.J13 * w1 + p.J23 * w2 + p.J33 * w3 - (x * g2 - y_ * g1)
-    return u1, u2, M1, M2, M3, v1, v2
-
-
-def _rocking(columns: Columns) -> tuple[Array, ...]:
+def _rocking(columns: Columns, surface: Surface) -> tuple[Array, ...]:
     """Values of `ROCKING`, each of shape (cells,), at zero angular momentum about the vertical."""
     J11, J22, J33, J12, J13, J23 = solid.inertia(columns)
-    h2, g = (columns["c"] - solid.offset(columns)) ** 2, solid.gravity(columns)
+    h2, g = solid.height(columns) ** 2, solid.gravity(columns)
     P11, P22, P12 = J11 + h2 - J13**2 / J33, J22 + h2 - J23**2 / J33, J12 - J13 * J23 / J33
     det = P11 * P22 - P12**2
-    k1, k2 = solid.stiffness(columns)
+    k1, k2 = solid.stiffness(columns, surface)
     # u1' = ω2, u2' = -ω1
     return -P12 / det, P11 / det, -P22 / det, P12 / det, g * k2, -g * k1
 
@@ -248,11 +232,11 @@ def _fastest_rocking(p: Any) -> Array:
     return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
-def _rise(columns: Columns) -> Array:
-    h2 = (columns["c"] - solid.offset(columns)) ** 2
+def _rise(columns: Columns, surface: Surface) -> Array:
+    h2 = solid.height(columns) ** 2
     i11, i22, _, i12, _, _ = solid.inverse(solid.inertia(columns))
     largest = 0.5 * (i11 + i22) + np.sqrt(0.25 * (i11 - i22) ** 2 + i12**2)
-    return np.asarray(general.strongest_grip(columns) / (solid.gravity(columns) * (1 + h2 * largest)) - 1)
+    return np.asarray(general.strongest_grip(columns, surface) / (solid.gravity(columns) * (1 + h2 * largest)) - 1)
 
 
 @inline

@@ -56,6 +56,11 @@ def nothing_decays(columns: Columns) -> Array:
     return np.zeros_like(columns["a"])
 
 
+def nothing_is_impossible(columns: Columns) -> Array:
+    """The default `impossible`."""
+    return np.zeros(len(columns["a"]), bool)
+
+
 @dataclass(frozen=True)
 class Ripple:
     """How the spin of a model ripples with its rattle."""
@@ -133,12 +138,18 @@ class Model(Tier):
     0.1, μ = 20, where accuracy determines the step); they fall as its fifth power."""
     ripple: Ripple = NO_RIPPLE
     """How the spin ripples with the rattle, for the ripple-free spin whose changes of sign are counted."""
+    impossible: Callable[[Columns], Array] = nothing_is_impossible
+    """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
+    function is called for such a body."""
     spin_unit: Callable[[Columns], Array] = lambda columns: np.ones_like(columns["a"])
     """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
     largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""
     faint: str = ""
     """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
     rattle below it may settle."""
+    still: str = ""
+    """Name of the constant that is the energy above rest below which a body counts as at rest, so that the trajectory
+    settles; "" if there is none."""
     extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
     """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005

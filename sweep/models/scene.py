@@ -8,6 +8,7 @@ from sweep.models import general, solid, starts
 from sweep.models.couples import COUPLES
 from sweep.models.laws import LAWS
 from sweep.models.model import Tier
+from sweep.models.surfaces import ELLIPSOID, SURFACES
 
 PAPER, SI = "paper", "SI"
 """Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
@@ -20,29 +21,32 @@ PAPERS = frozenset({"a", "b", "c", "delta", "mu", *starts.POINT})
 INERTIA = (*solid.MOMENTS, *solid.PRODUCTS)
 
 
-def is_papers(law: str, units: str, names: Collection[str]) -> bool:
-    """Whether the paper's models know all of a scene: the law of friction, the units, and the parameters `names`."""
-    return law == PAPERS_LAW and units == PAPER and set(names) <= PAPERS
+def is_papers(law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> bool:
+    """Whether the paper's models know all of a scene: law of friction, units, the parameters `names`, and surface."""
+    return law == PAPERS_LAW and units == PAPER and set(names) <= PAPERS and surface == ELLIPSOID.name
 
 
-def variant(base: str, law: str, units: str, names: Collection[str]) -> Tier:
+def variant(base: str, law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> Tier:
     """The variant of `slip` or `noslip` for a scene; its parameters are those that follow from `names`."""
-    moments = INERTIA if set(INERTIA) & set(names) else ("delta",)
+    homogeneous = SURFACES[surface].homogeneous and not set(INERTIA) & set(names)
+    moments = ("delta",) if homogeneous else INERTIA
     system = ("mass", "gravity") if units == SI else ()
     by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
     start = by_angles if {*starts.ANGLES, *starts.SLIP} & set(names) else starts.POINT
     couples = [name for name, couple in COUPLES.items() if set(couple.parameters) & set(names)]
     parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-    return general.variant(general.name_of(base, law, couples), parameters)
+    return general.variant(general.name_of(base, law, couples, surface), parameters)
 
 
-def strangers(law: str, units: str, names: Collection[str]) -> dict[str, str]:
+def strangers(law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> dict[str, str]:
     """The parameters that do not belong to a scene, with the reason."""
     names = set(names)
     found: dict[str, str] = {}
     inertia, angles, point = names & set(INERTIA), names & {*starts.ANGLES, *starts.SLIP}, names & set(starts.POINT)
     if inertia:
         found |= {"delta": f"beside {_some(inertia)}; allowed: delta or the elements of inertia"}
+    elif not SURFACES[surface].homogeneous:
+        found |= {"delta": f"with surface: {surface}; allowed: the elements of inertia"}
     if angles:
         words = f"beside {_some(angles)}; allowed: {', '.join(starts.POINT)}, or angles, omega1 … omega3 and slip"
         found |= dict.fromkeys(starts.POINT, words)

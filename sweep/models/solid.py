@@ -1,24 +1,21 @@
-"""A rigid body with an ellipsoidal surface: any inertia, and the centre of mass below the ellipsoid's centre.
+"""A rigid body with a surface of `sweep.models.surfaces`: any inertia, and the centre of mass at any height.
 
-The body axes are those of the ellipsoid, x along a, y along b, z down, and begin at the centre of mass G; u is the
-upward normal of the plane in these axes.  With A = diag(a², b², c²) and r = sqrt(uᵀ A u), the contact point is
-
-    x_p = -A u / r - offset ẑ,
-
-and G is at the height -x_p · u = r + offset u3.  J is the matrix of inertia about G divided by the mass.  The equations
-hold in any units: gravity g is one of the constants.
+The body axes are those of the surface, x along a, y along b, z down, and begin at the centre of mass G; u is the
+upward normal of the plane in these axes.  J is the matrix of inertia about G divided by the mass.  The equations hold
+in any units: gravity g is one of the constants.
 """
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.models.model import Array, Columns
+from sweep.models.surfaces import ELLIPSOID, Surface, offset
 
-SHAPE = ("a2", "b2", "c2", "offset", "g")
 INERTIA = ("J11", "J22", "J33", "J12", "J13", "J23")
 
 MOMENTS = ("Ixx", "Iyy", "Izz")
@@ -39,20 +36,19 @@ def mass(columns: Columns) -> Array:
     return columns["mass"] if "mass" in columns else np.ones_like(columns["a"])
 
 
-def offset(columns: Columns) -> Array:
-    """How far G lies below the ellipsoid's centre, shape (cells,)."""
-    return columns["offset"] if "offset" in columns else np.zeros_like(columns["a"])
-
-
 def spin_unit(columns: Columns) -> Array:
     """sqrt(g/c), shape (cells,)."""
     return np.asarray(np.sqrt(gravity(columns) / columns["c"]))
 
 
-def shape(columns: Columns) -> tuple[Array, ...]:
-    """Values of `SHAPE`, each of shape (cells,)."""
-    a, b, c = columns["a"], columns["b"], columns["c"]
-    return a**2, b**2, c**2, offset(columns), gravity(columns)
+def shape_names(surface: Surface) -> tuple[str, ...]:
+    """The constants of a surface, and g."""
+    return *surface.constants, "g"
+
+
+def shape(columns: Columns, surface: Surface) -> tuple[Array, ...]:
+    """Values of `shape_names`, each of shape (cells,)."""
+    return *surface.of(columns), gravity(columns)
 
 
 def inertia(columns: Columns) -> tuple[Array, ...]:
@@ -87,22 +83,27 @@ def matrix(elements: tuple[Array, ...]) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def stiffness(columns: Columns) -> tuple[Array, Array]:
+def height(columns: Columns) -> Array:
+    """How high G is above the plane at upright rest, shape (cells,)."""
+    return columns["c"] - offset(columns)
+
+
+def stiffness(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """Second derivatives of the height of G with respect to u1 and u2 at upright rest, each of shape (cells,)."""
-    a, b, c = columns["a"], columns["b"], columns["c"]
-    return (a**2 - c**2) / c + offset(columns), (b**2 - c**2) / c + offset(columns)
+    first, second = surface.excess(columns)
+    return first + offset(columns), second + offset(columns)
 
 
-def frequencies(columns: Columns) -> tuple[Array, Array]:
+def frequencies(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """The lower and the higher frequency of rocking about upright rest without slip, each of shape (cells,).
 
     With the coordinates u1 and u2 the angular velocity is (-u2', u1', ω3), and ω3 is such that the angular momentum
     about the vertical vanishes.
     """
     J11, J22, J33, J12, J13, J23 = inertia(columns)
-    h2, g = (columns["c"] - offset(columns)) ** 2, gravity(columns)
+    h2, g = height(columns) ** 2, gravity(columns)
     M11, M22, M12 = J22 + h2 - J23**2 / J33, J11 + h2 - J13**2 / J33, J13 * J23 / J33 - J12
-    k1, k2 = stiffness(columns)
+    k1, k2 = stiffness(columns, surface)
     determinant, first, second = M11 * M22 - M12**2, k1 * M22, k2 * M11
     with np.errstate(divide="ignore", invalid="ignore"):
         higher = first + second + np.sqrt((first - second) ** 2 + 4 * k1 * k2 * M12**2)
@@ -112,29 +113,11 @@ def frequencies(columns: Columns) -> tuple[Array, Array]:
     return np.sqrt(np.maximum(scale * lower, 0.0)), np.sqrt(np.maximum(scale * higher, 0.0))
 
 
-def slower_period(columns: Columns) -> Array:
+def slower_period(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
     """Period of the slower rocking, shape (cells,); infinite for a body that is round about one axis."""
-    lower, _ = frequencies(columns)
+    lower, _ = frequencies(columns, surface)
     with np.errstate(divide="ignore"):
         return np.asarray(2 * np.pi / lower)
-
-
-@inline
-def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
-    """(u3, 1/u3), the contact point x_p, u' = u × ω, and x_p', the velocity of the contact point in the body."""
-    a2, b2, c2 = p.a2, p.b2, p.c2
-    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    au1, au2, au3 = a2 * u1, b2 * u2, c2 * u3
-    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
-    # One division is enough for both 1/r and 1/u3.
-    shared = 1.0 / (r * u3)
-    inv_r, inv_u3 = shared * u3, shared * r
-    x, y, below = -au1 * inv_r, -au2 * inv_r, -au3 * inv_r
-
-    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
-    s = (du1 * au1 + du2 * au2 + du3 * au3) * inv_r
-    dx, dy, dz = -inv_r * (a2 * du1 + x * s), -inv_r * (b2 * du2 + y * s), -inv_r * (c2 * du3 + below * s)
-    return (u3, inv_u3), (x, y, below - p.offset), (du1, du2, du3), (dx, dy, dz)
 
 
 @inline
@@ -146,38 +129,39 @@ def gyroscopic(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
     return w3 * L2 - w2 * L3, w1 * L3 - w3 * L1, w2 * L1 - w1 * L2
 
 
-@inline
-def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any) -> Any:
-    """(spin n, energy of the rattle, J33), per unit mass, as `sweep.models.ellipsoid.energy`.
+@cache
+def energy_on(surface: Surface) -> Any:
+    """Inline (u1, u2, ω1, ω2, ω3, v1, v2, constants) -> (spin n, energy of the rattle, J33), per unit mass.
+
+    As `sweep.models.ellipsoid.energy`.
 
     With ω = n u + o, o ⊥ u, every term except J33 n²/2 is quadratic in small quantities and is computed as such.  (If
     J13 or J23 does not vanish, one is n² times a small quantity.)
     """
-    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    n = u1 * w1 + u2 * w2 + u3 * w3
-    o1, o2 = w1 - n * u1, w2 - n * u2
-    o3 = -(u1 * o1 + u2 * o2) / u3
-    D1, D2 = p.J11 - p.J33, p.J22 - p.J33
-    spin_part = n * n * (
-        0.5 * (D1 * u1 * u1 + D2 * u2 * u2) + p.J12 * u1 * u2 + u3 * (p.J13 * u1 + p.J23 * u2)
-    )  # fmt: skip
-    cross_part = n * (
-        D1 * u1 * o1 + D2 * u2 * o2 + p.J12 * (u1 * o2 + u2 * o1)
-        + p.J13 * (u1 * o3 + u3 * o1) + p.J23 * (u2 * o3 + u3 * o2)
-    )  # fmt: skip
-    tilt_part = 0.5 * (p.J11 * o1 * o1 + p.J22 * o2 * o2 + p.J33 * o3 * o3) + (
-        p.J12 * o1 * o2 + p.J13 * o1 * o3 + p.J23 * o2 * o3
-    )
+    elevation = surface.elevation
 
-    au1, au2, au3 = p.a2 * u1, p.b2 * u2, p.c2 * u3
-    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
-    # r - c = (r² - c²) / (r + c) and 1 + u3 = (u1² + u2²) / (1 - u3)
-    c = np.sqrt(p.c2)
-    height = ((p.a2 - p.c2) * u1 * u1 + (p.b2 - p.c2) * u2 * u2) / (r + c)
-    height = height + p.offset * (u1 * u1 + u2 * u2) / (1.0 - u3)
+    @inline
+    def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any) -> Any:
+        u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
+        n = u1 * w1 + u2 * w2 + u3 * w3
+        o1, o2 = w1 - n * u1, w2 - n * u2
+        o3 = -(u1 * o1 + u2 * o2) / u3
+        D1, D2 = p.J11 - p.J33, p.J22 - p.J33
+        spin_part = n * n * (
+            0.5 * (D1 * u1 * u1 + D2 * u2 * u2) + p.J12 * u1 * u2 + u3 * (p.J13 * u1 + p.J23 * u2)
+        )  # fmt: skip
+        cross_part = n * (
+            D1 * u1 * o1 + D2 * u2 * o2 + p.J12 * (u1 * o2 + u2 * o1)
+            + p.J13 * (u1 * o3 + u3 * o1) + p.J23 * (u2 * o3 + u3 * o2)
+        )  # fmt: skip
+        tilt_part = 0.5 * (p.J11 * o1 * o1 + p.J22 * o2 * o2 + p.J33 * o3 * o3) + (
+            p.J12 * o1 * o2 + p.J13 * o1 * o3 + p.J23 * o2 * o3
+        )
 
-    x, y, z = -au1 / r, -au2 / r, -au3 / r - p.offset
-    v3 = -(v1 * u1 + v2 * u2) / u3
-    g1, g2, g3 = v1 + y * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y * w1
-    drift = 0.5 * (g1 * g1 + g2 * g2 + g3 * g3)
-    return n, spin_part + cross_part + tilt_part + p.g * height + drift, p.J33
+        height, x, y, z = elevation(u1, u2, u3, p)
+        v3 = -(v1 * u1 + v2 * u2) / u3
+        g1, g2, g3 = v1 + y * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y * w1
+        drift = 0.5 * (g1 * g1 + g2 * g2 + g3 * g3)
+        return n, spin_part + cross_part + tilt_part + p.g * height + drift, p.J33
+
+    return energy

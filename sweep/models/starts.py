@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.models.model import Array, Columns
+from sweep.models.surfaces import ELLIPSOID, Surface
 
 POINT = ("n0", "x0", "y0")
 """Parameters of the paper's start."""
@@ -16,10 +17,10 @@ ANGLES = ("roll", "pitch", "omega1", "omega2", "omega3")
 SLIP = ("slip1", "slip2")
 
 
-def rolling(columns: Columns) -> tuple[Array, ...]:
+def rolling(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...]:
     """u1, u2, ω1, ω2 and ω3 at t = 0, each of shape (cells,)."""
     if "n0" in columns:
-        u1, u2, u3 = _normal(columns)
+        u1, u2, u3 = surface.normal(columns, *point(columns))
         n0 = columns["n0"]
         return u1, u2, n0 * u1, n0 * u2, n0 * u3
     roll, pitch = columns["roll"], columns["pitch"]
@@ -27,13 +28,13 @@ def rolling(columns: Columns) -> tuple[Array, ...]:
     return u1, u2, columns["omega1"], columns["omega2"], columns["omega3"]
 
 
-def slipping(columns: Columns) -> tuple[Array, ...]:
+def slipping(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...]:
     """As `rolling`, and the slip v1 and v2.
 
     `slip1` and `slip2` are components along the ground: along the direction that x has, seen from above, when the body
     is turned from upright first by `roll` about x and then by `pitch` about y, and across it.
     """
-    states = rolling(columns)
+    states = rolling(columns, surface)
     if "n0" in columns:
         return *states, np.zeros_like(states[0]), np.zeros_like(states[0])
     roll, pitch, along, across = (columns[name] for name in ("roll", "pitch", *SLIP))
@@ -41,17 +42,7 @@ def slipping(columns: Columns) -> tuple[Array, ...]:
 
 
 def point(columns: Columns) -> tuple[Array, Array]:
-    """The start contact point in the axes of the ellipsoid; `x0` and `y0` are along axes that are turned by δ."""
+    """The start contact point in the axes of the surface; `x0` and `y0` are along axes that are turned by δ."""
     x, y, delta = columns["x0"], columns["y0"], columns.get("delta", 0.0)
     cos, sin = np.cos(delta), np.sin(delta)
     return x * cos - y * sin, x * sin + y * cos
-
-
-def _normal(columns: Columns) -> tuple[Array, Array, Array]:
-    """u for a contact point that lies within the outline of the body seen from above."""
-    x, y = point(columns)
-    a, b, c = columns["a"], columns["b"], columns["c"]
-    w1, w2 = x / a**2, y / b**2
-    w3 = np.sqrt(1 - (x * w1 + y * w2)) / c
-    norm = np.sqrt(w1**2 + w2**2 + w3**2)
-    return -w1 / norm, -w2 / norm, -w3 / norm

@@ -2,8 +2,10 @@
 
 With h = c - offset, the height of the centre of mass, and without slip at n = 0, to second order in the rattle,
 
-    d(M · u)/dt = -(h/c) (a² - b²) ω1 ω2,
-    M · u = J33 n + P,   P = Σ u_i (J_ij + (h² - J33 - h s_i) δ_ij) ω_j,   s = (a²/c, b²/c).
+    d(M · u)/dt = -h (s1 - s2) ω1 ω2,
+    M · u = J33 n + P,   P = Σ u_i (J_ij + (h² - J33 - h s_i) δ_ij) ω_j
+
+with the radii of curvature s at the lowest point; for the ellipsoid they are a²/c and b²/c.
 
 P is a ripple.  In the eigenbasis of the rocking z' = L z, z = (u1, u2, ω1, ω2), with eigenvalues λ, the right-hand side
 G of the first line is the derivative of κ_jk = G_jk / (λ_j + λ_k), but for the pairs with λ_j + λ_k = 0, which change
@@ -23,25 +25,23 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models import solid
 from sweep.models.model import Array, Columns
+from sweep.models.surfaces import ELLIPSOID, Surface
 
 NAMES = ("K11", "K12", "K21", "K22", "P11", "P12", "P22", "h", "turn1", "turn2", "J13", "J23")
 
 
-def form(columns: Columns) -> tuple[Array, ...]:
+def form(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...]:
     """Values of `NAMES`, each of shape (cells,): K, the matrix P of M = P ω at rest, and what M has of n, v and n."""
     names = sorted(set(solid.PARAMETERS) & set(columns))
     bodies, which = np.unique(np.stack([columns[name] for name in names]), axis=1, return_inverse=True)
-    values = _form(dict(zip(names, bodies, strict=True)))
+    values = _form(dict(zip(names, bodies, strict=True)), surface)
     return tuple(each[which.reshape(-1)] for each in values)
 
 
-def _form(columns: Columns) -> tuple[Array, ...]:
+def _form(columns: Columns, surface: Surface) -> tuple[Array, ...]:
     J11, J22, J33, J12, J13, J23 = solid.inertia(columns)
-    a2, b2, c2, offset, g = solid.shape(columns)
-    c = np.sqrt(c2)
-    h = c - offset
-    s1, s2 = a2 / c, b2 / c
-    k1, k2 = solid.stiffness(columns)
+    h, g, (s1, s2) = solid.height(columns), solid.gravity(columns), surface.radii(columns)
+    k1, k2 = solid.stiffness(columns, surface)
     nothing, one = np.zeros_like(h), np.ones_like(h)
     P = _rows((J11 + h**2, J12), (J12, J22 + h**2))
     # u' = (ω2, -ω1), M' = g (k2 u2, -k1 u1)
@@ -49,7 +49,7 @@ def _form(columns: Columns) -> tuple[Array, ...]:
     L = np.zeros((len(h), 4, 4))
     L[:, :2, 2:], L[:, 2:, :2] = B, np.linalg.solve(P, C)
     G = np.zeros_like(L)
-    G[:, 2, 3] = G[:, 3, 2] = -0.5 * (h / c) * (a2 - b2)
+    G[:, 2, 3] = G[:, 3, 2] = -0.5 * h * (s1 - s2)
 
     rates, V = np.linalg.eig(L)
     # A body that is round about one axis, or falls over, has one mode only, and no slower period to average over.

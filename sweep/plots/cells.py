@@ -17,6 +17,7 @@ from sweep.grid import Array
 GROUNDS: dict[str, dict[str, Any]] = {
     "failed": {"facecolor": "0.15", "edgecolor": "0.8", "hatch": "xxxx"},
     "not_run": {"facecolor": "white", "edgecolor": "0.6", "hatch": "++"},
+    "impossible": {"facecolor": "0.92", "edgecolor": "0.6", "hatch": "----"},
     "no_value": {"facecolor": "0.8", "edgecolor": "none"},
 }
 """Grounds of the kinds of cell without a result, in no colour of any scale."""

@@ -24,6 +24,7 @@ _STYLES: dict[str, dict[str, Any]] = {
     "reversals_predicted": {"marker": "s", "fillstyle": "none", "color": "C1"},
     "failed": {"marker": "v", "color": "crimson"},
     "not_run": {"marker": "v", "color": "0.6", "fillstyle": "none"},
+    "impossible": {"marker": "_", "color": "0.6"},
     "no_value": {"marker": "|", "color": "0.6"},
     "time_limit": {"marker": "^", "color": "C0", "fillstyle": "none", "markersize": 8},
     "inferred": {"marker": "o", "color": "0.5", "fillstyle": "none", "markersize": 9},

@@ -7,6 +7,7 @@ import re
 import xarray as xr
 
 from sweep.kernels import status
+from sweep.models.surfaces import PARABOLOID
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 
@@ -20,6 +21,7 @@ STATUS_WORDS = {
     status.DIVERGED: "diverged",
     status.PARADOX: "met Painlevé's paradox",
     status.TOPPLED: "toppled",
+    status.IMPOSSIBLE: "no such body, or none that stands",
 }
 """How a trajectory ended, by the values of `status`."""
 
@@ -34,6 +36,12 @@ _PARAMETER_WORDS = {
     "y0": "start contact point y₀",
     "case": "case",
     "trajectory": "trajectory",
+}
+
+_PARABOLOID_WORDS = {
+    "a": "coefficient a of the paraboloid",
+    "b": "coefficient b of the paraboloid",
+    "c": "height c of the paraboloid's origin over the table",
 }
 
 _VARIABLE_WORDS = {
@@ -82,7 +90,8 @@ def unit(dataset: xr.Dataset, name: str) -> str:
 
 def words(dataset: xr.Dataset, name: str) -> str:
     """What a variable or coordinate is, without its unit."""
-    short = {**_PARAMETER_WORDS, **_VARIABLE_WORDS}.get(name)
+    of_surface = _PARABOLOID_WORDS if dataset.attrs.get("surface") == PARABOLOID.name else {}
+    short = {**_PARAMETER_WORDS, **_VARIABLE_WORDS, **of_surface}.get(name)
     return short or _SCALE.sub("", _long_name(dataset, name)) or name.replace("_", " ")
 
 

@@ -31,7 +31,7 @@ _BAR = 0.05
 _SMALL = 4
 """Maps beside each other beyond which they are too small for labels at lines."""
 
-_OF_DIFFERENCES = ("failed", "not_run", "time_limit")
+_OF_DIFFERENCES = ("failed", "not_run", "impossible", "time_limit")
 """Kinds of cell marked on maps of differences too; the map of the simulated counts beside it has all."""
 
 _TITLES = {"reversals": "simulated", "reversals_predicted": "predicted (Takano 2011)"}

@@ -5,24 +5,31 @@ From the dataset alone, and without any library that draws.
 
 from __future__ import annotations
 
+import operator
+from functools import reduce
+
 import numpy as np
 import xarray as xr
 
 from sweep.grid import Array
-from sweep.kernels.status import FAILURES, TIME_LIMIT
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT
 from sweep.plots.labels import STATUS_WORDS, flag_words
 from sweep.results.dataset import VARIABLES
 
 WORDS = {
     "not_run": "not run",
     "failed": "failed",
+    "impossible": "no such body, or none that stands",
     "no_value": "no value",
     "time_limit": "lower bound: ended at the time limit, may still grow",
     "inferred": "inferred from the cells around, not simulated",
     "noise_limited": "limited by round-off: the count is firm, late times are not",
     "uncertain": "count not certain: it depends on the windows or on the start's 10th digit",
 }
-"""The kinds of cell, and what they mean.  A cell may be of several kinds, but of one of the first three at most."""
+"""The kinds of cell, and what they mean.  A cell may be of several kinds, but of one of the first four at most."""
+
+BLANK = ("not_run", "failed", "impossible", "no_value")
+"""The kinds of cell without a result to draw."""
 
 _GROWING = {"reversals", "raw_reversals", "reversals_low", "reversals_high", "t_last_reversal", "difference"}
 """What a longer trajectory can only raise; of the difference, the simulated part."""
@@ -78,12 +85,14 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
         return np.asarray(np.broadcast_to(where[places], found.shape))
 
     not_run, failed, inferred = among("status", 0), among("status", *FAILURES), among("inferred", 1)
+    impossible = among("status", IMPOSSIBLE)
     missing = np.isnan(found.values) if found.dtype.kind == "f" else np.zeros(found.shape, bool)
-    sound = ~(not_run | failed)
+    sound = ~(not_run | failed | impossible)
     grows, limited = name in _GROWING, name in _GROWING or (name, "time_limit") in _PER_VARIABLE
     kinds = {
         "not_run": not_run,
         "failed": failed,
+        "impossible": impossible,
         "no_value": missing & sound & ~inferred,
         "time_limit": among("status", TIME_LIMIT) & ~missing & limited,
         "inferred": inferred,
@@ -110,7 +119,7 @@ def legend(dataset: xr.Dataset, name: str, among: dict[str, xr.DataArray] | None
 
 def blank(kinds: dict[str, xr.DataArray]) -> xr.DataArray:
     """Where there is no result to draw, by the kinds of the cells."""
-    return kinds["not_run"] | kinds["failed"] | kinds["no_value"]
+    return reduce(operator.or_, (kinds[kind] for kind in BLANK))
 
 
 def in_words(dataset: xr.Dataset, name: str) -> xr.DataArray:

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from sweep.grid import Array
 from sweep.models import solid
+from sweep.models.surfaces import ELLIPSOID, SURFACES
 from sweep.parameters import PARAMETERS
 from sweep.plots import labels, legends, theory
 from sweep.plots.panels import heading
@@ -157,7 +158,8 @@ def reversal_times(one: xr.Dataset) -> Array:
     good = np.isfinite(one["time"].values)
     time, spin = one["time"].values[good], one["ripple_free_spin"].values[good]
     columns = {name: np.atleast_1d(one[name].values) for name in solid.PARAMETERS if name in one}
-    tau = float(solid.slower_period(columns)[0])
+    surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
+    tau = float(solid.slower_period(columns, surface)[0])
     total = np.concatenate([[0], np.cumsum(np.diff(time) * (spin[1:] + spin[:-1]) / 2)])
     ends = np.arange(0, time[-1], tau)
     means = np.diff(np.interp(ends, time, total)) / tau

@@ -16,6 +16,7 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
 from sweep.models.scene import PAPER, SI
+from sweep.models.surfaces import ELLIPSOID
 from sweep.prediction import Prediction
 from sweep.variables import Variable, in_si
 
@@ -27,9 +28,10 @@ STATUSES = {
     status.DIVERGED: "diverged",
     status.PARADOX: "paradox",
     status.TOPPLED: "toppled",
+    status.IMPOSSIBLE: "impossible",
 }
 
-EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, DISAGREES, REVERSES_AT_N_C1, UNDECIDED, FAILED = range(8)
+EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, DISAGREES, REVERSES_AT_N_C1, UNDECIDED, FAILED, NO_BODY = range(9)
 REASONS = {
     EXISTS: "exists",
     NO_FRICTION: "no_friction",
@@ -39,6 +41,7 @@ REASONS = {
     REVERSES_AT_N_C1: "reverses_at_n_c1",
     UNDECIDED: "undecided",
     FAILED: "failed",
+    NO_BODY: "impossible",
 }
 """Whether simulation found a critical spin, and why not.  Where it `disagrees` with the eigenvalues there is a number
 all the same."""
@@ -141,6 +144,7 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     for name, value in grid.constants.items():
         coordinates[name] = xr.Variable((), value, config.described(name))
     head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals of a rattleback ({config.model} model)"}
+    head |= {"surface": config.surface} if config.surface != ELLIPSOID.name else {}
     return xr.Dataset(variables, coordinates, {**head, **attributes})
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.kernels.method import STEP_RULES
-from sweep.kernels.status import FAILURES, SETTLED, TIME_LIMIT
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import EXISTS, REASONS, STATUSES
 from sweep.results.kind import CRITICAL, TRAJECTORY, kind
@@ -63,6 +63,8 @@ def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
 def _critical(dataset: xr.Dataset) -> Iterator[str]:
     """How many critical spins were found, and why the others were not."""
     yield f"critical spins of {_count(dataset['critical_reason'], 'bodies')}"
+    if "impossible" in dataset.attrs:
+        yield f"impossible: {dataset.attrs['impossible']}"
     for name in ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus"):
         codes, spins = dataset[f"{name}_reason"].values, dataset[f"{name}_simulated"].values
         counts = {words: int((codes == code).sum()) for code, words in REASONS.items()}
@@ -83,6 +85,8 @@ def _summary(dataset: xr.Dataset) -> Iterator[str]:
     dims = " × ".join(f"{d} {n}" for d, n in dataset["status"].sizes.items()) or "one cell"
     ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if code in status)
     yield f"{status.size} cells ({dims}): {ends}"
+    if "impossible" in dataset.attrs:
+        yield f"impossible: {dataset.attrs['impossible']}"
     if "simulated_share" in dataset.attrs:
         yield f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the others are inferred"
     if "reversals" in dataset:
@@ -93,7 +97,8 @@ def _summary(dataset: xr.Dataset) -> Iterator[str]:
         error = np.ravel(dataset["energy_error"].values)
         yield f"energy error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}"
     if "step_rule" in dataset:
-        rule, step = np.ravel(dataset["step_rule"].values), np.ravel(dataset["step"].values)
+        simulated = status != IMPOSSIBLE
+        rule, step = (np.ravel(dataset[name].values)[simulated] for name in ("step_rule", "step"))
         who = ", ".join(f"{name} in {(rule == code).sum()}" for code, name in STEP_RULES.items() if code in rule)
         yield f"step: {step.min():.3g} to {step.max():.3g}, set by {who} cells"
     if "verified_cell" in dataset:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, Values
+from sweep.config.scenes import described_impossible
 from sweep.engine.reporter import Reporter
 from sweep.grid import Array, Grid
 from sweep.jit import fingerprint
@@ -52,6 +53,7 @@ _REMARKS = {
     dataset.REVERSES_AT_N_C1: "reverse at n_c1 already",
     dataset.UNDECIDED: "undecided at t_end",
     dataset.FAILED: "failed",
+    dataset.NO_BODY: "impossible",
 }
 
 _REASON_OF = {
@@ -161,6 +163,7 @@ def _search(config: Config, width: float, store: Store, reporter: Reporter) -> x
     arrays.pop("reversals_predicted", None)
     reasons = np.full((2, 2, grid.size), NO_FRICTION)
     ends = np.full((2, 2, 2, grid.size), np.nan)
+    reasons[:, :, config.equations.impossible(grid.columns())] = dataset.NO_BODY
     searched = np.flatnonzero(_decays_at_rest(prediction, grid))
     settled = Settled(reporter, grid.size, len(searched))
     rounds = Rounds(store, settled.advanced)
@@ -179,7 +182,7 @@ def _search(config: Config, width: float, store: Store, reporter: Reporter) -> x
     four = reasons.reshape(4, -1)
     arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(grid.size)]
     origin = provenance(config, rounds.seconds, grid.size) | _identify(config, width).__dict__
-    attributes = {"relative_width": width, **origin}
+    attributes = {"relative_width": width, **origin, **described_impossible(config)}
     return dataset.label(config, grid, arrays, attributes).drop_vars("n0")
 
 

@@ -98,6 +98,8 @@ def find_n_c2(
 def body_seconds(config: Config, bodies: Columns) -> tuple[float, float]:
     """Rough time to find n_c2 of both signs for a body like these, one of many: as a rule, and at most."""
     model, integrator = config.equations, config.integrator
+    possible = ~model.impossible(bodies)
+    bodies = {name: values[possible] for name, values in bodies.items()}
     decay = -linear.growth_rate(model, model.constants.of(bodies), np.zeros(len(bodies["a"])))
     bodies, decay = {name: values[decay > 0] for name, values in bodies.items()}, decay[decay > 0]
     if not len(decay):

@@ -14,7 +14,7 @@ import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
 from sweep.config.faults import suggestion
-from sweep.config.scenes import impossible
+from sweep.config.scenes import unfit
 from sweep.config.schema import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS
@@ -180,7 +180,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     cells = [dict(zip(wanted, values, strict=True)) for values in product(*wanted.values())]
     cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)
-    if beyond := impossible(chosen) or off_the_body(chosen):
+    if beyond := unfit(chosen) or off_the_body(chosen):
         raise ConfigError([Fault("", None, None, (), beyond)])
     return chosen
 

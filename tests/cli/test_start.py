@@ -42,7 +42,12 @@ def start(*arguments: str | Path) -> subprocess.Popen[str]:
 
 COMPLETED = {
     "run c.yaml --set integrator.t": ["integrator.tolerance=", "integrator.t_end="],
-    "run c.yaml --set friction.mu_": ["friction.mu_static=", "friction.mu_viscous=", "friction.mu_rolling="],
+    "run c.yaml --set friction.mu_": [
+        "friction.mu_static=",
+        "friction.mu_viscous=",
+        "friction.mu_rolling=",
+        "friction.mu_spinning=",
+    ],
     "trajectory c.yaml --at d": ["delta="],
     "run c.yaml --dry": ["--dry-run"],
     "traj": ["trajectory"],

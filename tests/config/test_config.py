@@ -29,7 +29,7 @@ def change(old: str, new: str) -> str:
 # name: (configuration, line of the fault, path, part of what is said)
 BROKEN: dict[str, tuple[str, int, str, str]] = {
     "unknown key": (SMALL + "colour: 3\n", 6, "colour", "unknown key; allowed: name, model,"),
-    "unknown key in a section": (change("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); allowed: a, b, c, delta"),
+    "unknown key in a section": (change("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); allowed: surface, a, b, c, delta"),
     "duplicate key": (SMALL + "name: again\n", 6, "name", "duplicate key, first on line 1"),
     "duplicate key in a section": (change("mu: [40, 60]", "mu: 40, mu: 60"), 3, "friction.mu", "first on line 3"),
     "empty axis": (change("[40, 60]", "[]"), 3, "friction.mu", "an empty axis"),

@@ -129,3 +129,64 @@ def test_the_stiff_method_takes_any_body_with_viscous_friction(tmp_path: Path) -
     assert (stiff["step"] > 3 * plain["step"]).sel(mu=1000).all()
     chosen = run(tmp_path, text)
     assert set(chosen["method"].values.ravel()) == {0, 1}
+
+
+SPINNING = f"""\
+units: SI
+gravity: 9.81
+body: {BODY}
+friction: {{mu: 20, mu_spinning: 0.2, radius_spinning: 2.0e-3, speed_spinning: 0.5}}
+start: {{roll: [0, 1 deg], pitch: [0, 1 deg], omega3: [-5, 5]}}
+integrator: {{t_end: 1}}
+"""
+
+
+def test_spinning_friction_stops_the_spin(tmp_path: Path) -> None:
+    """Upright, dry friction takes the same spin in every second; a body that rattles does what Newton and Euler say."""
+    short, long = run(tmp_path, SPINNING), run(tmp_path, SPINNING, t_end=60.0)
+    config = load_config(tmp_path / "scene.yaml")
+    columns, model = Grid.of(config).columns(), config.equations
+    assert model.name == "slip+viscous+spinning"
+    fall = 0.2 * 2e-3 * 9.81 / 1.7e-3
+    upright = {"roll": 0.0, "pitch": 0.0}
+    assert float(short["spin_final"].sel(omega3=-5, **upright)) == pytest.approx(5 - fall, abs=1e-10)
+    rattling = short.stack(cell=("roll", "pitch", "omega3"))
+    start = stack(model.start(columns))
+    for i in (6, 7):
+        parameters = {name: float(values[i]) for name, values in columns.items()}
+        end = newton.follow(start[:, i], parameters, "viscous", np.array([0, 1.0]))[:, -1]
+        spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
+        assert float(rattling["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)
+    assert float(long["energy_error"].max()) < 1e-7
+    # It comes to rest, and the run ends then: it could only creep on.
+    assert (long["status"] == 1).all()
+    assert float(np.abs(long["spin_final"]).max()) < 0.1 * 0.5
+    end = float(long["t_stop"].sel(omega3=-5, **upright))
+    assert (5 - 0.5) / fall < end < 5 / fall + 1
+
+
+def test_a_paraboloid_against_an_independent_integrator(tmp_path: Path) -> None:
+    """It starts from contact points far up its sides, where it differs from the ellipsoid of the same curvatures."""
+    text = f"""\
+units: SI
+gravity: 9.81
+body: {BODY.replace("a: 0.2, b: 0.03", "surface: paraboloid, a: 0.005, b: 0.22")}
+friction: {{mu: 20, sigma: 1.0e-4}}
+start: {{n0: [-5, 5], x0: 0.04, y0: [0.004, 0.02]}}
+integrator: {{t_end: 1}}
+"""
+    result = run(tmp_path, text).stack(cell=("n0", "y0"))
+    config = load_config(tmp_path / "scene.yaml")
+    columns, model = Grid.of(config).columns(), config.equations
+    assert model.name == "slip+viscous+sigma+paraboloid"
+    assert result.attrs["surface"] == "paraboloid"
+    assert "paraboloid" in result["a"].attrs["long_name"]
+    start = stack(model.start(columns))
+    for i in range(4):
+        parameters = {name: float(values[i]) for name, values in columns.items()} | {"surface": "paraboloid"}
+        u = np.array([*start[:2, i], -np.sqrt(1 - start[0, i] ** 2 - start[1, i] ** 2)])
+        assert newton._contact(u, parameters)[:2] == pytest.approx([parameters["x0"], parameters["y0"]], rel=1e-12)
+        end = newton.follow(start[:, i], parameters, "viscous", np.array([0, 1.0]))[:, -1]
+        spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
+        assert float(result["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)
+    assert float(result["energy_error"].max()) < 1e-7

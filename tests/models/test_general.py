@@ -10,19 +10,25 @@ from scipy.integrate import solve_ivp
 from support import STANDARD, columns, newton
 
 from sweep.models import find, linear, noslip, rocking, slip, solid, stability, steady
+from sweep.models.couples import COUPLES as KINDS
 from sweep.models.general import strongest_grip, variant
 from sweep.models.laws import LAWS, tanh_ratio
 from sweep.models.model import LINEAR, take
+from sweep.models.surfaces import ELLIPSOID, PARABOLOID, Surface
 
 BODY = {"a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 0.7, "gravity": 9.81}
 KANE_LEVINSON = BODY | {"mass": 1.0, "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5}
 SKEW = KANE_LEVINSON | {"mass": 0.7, "Ixz": 3e-5, "Iyz": -1e-5}
 FRICTION = {"mu": 0.4, "mu_static": 0.7, "mu_viscous": 0.3, "speed": 0.05, "speed_stick": 0.02}
 COUPLES = {"sigma": 1e-4, "mu_rolling": 0.1, "radius": 0.004, "speed_rolling": 0.5}
+COUPLES |= {"mu_spinning": 0.2, "radius_spinning": 0.003, "speed_spinning": 2.0}
+BOWL = SKEW | {"a": 0.012, "b": 0.35, "surface": "paraboloid"}
+"""A paraboloid: radii of curvature 0.83 and 0.029 at the lowest point."""
 ANGLES = {"roll": np.pi / 360, "pitch": np.pi / 360, "omega1": 0.0, "omega2": 0.0, "omega3": -5.0}
 
 
 def cells(**parameters: Any) -> dict[str, np.ndarray]:
+    parameters = {name: value for name, value in parameters.items() if name != "surface"}
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, float)) for value in parameters.values()))
     return {name: array.copy() for name, array in zip(parameters, arrays, strict=True)}
 
@@ -40,13 +46,17 @@ def states(number: int, count: int) -> np.ndarray:
     return np.array([*tilt, *omega, *random.uniform(-0.1, 0.1, 2)])[:count]
 
 
-@pytest.mark.parametrize("couples", ["", "+sigma", "+rolling", "+sigma+rolling"])
+@pytest.mark.parametrize(
+    "couples", ["", "+sigma", "+rolling", "+spinning", "+sigma+rolling", "+sigma+rolling+spinning"]
+)
 @pytest.mark.parametrize("law", [*LAWS, None])
-def test_the_equations_are_those_of_newton_and_euler(law: str | None, couples: str) -> None:
-    parameters = SKEW | FRICTION | {
-        name: value for name, value in COUPLES.items() if ("sigma" if name == "sigma" else "rolling") in couples
-    }  # fmt: skip
-    model, constants = one(f"slip+{law}{couples}" if law else f"noslip+solid{couples}", parameters)
+@pytest.mark.parametrize("body", [SKEW, BOWL], ids=["ellipsoid", "paraboloid"])
+def test_the_equations_are_those_of_newton_and_euler(body: dict[str, Any], law: str | None, couples: str) -> None:
+    parameters = body | FRICTION
+    for couple in filter(None, couples.split("+")):
+        parameters = parameters | {name: COUPLES[name] for name in KINDS[couple].parameters}
+    name = f"slip+{law}{couples}" if law else f"noslip+solid{couples}"
+    model, constants = one(f"{name}+paraboloid" if body is BOWL else name, parameters)
     for number in range(30):
         y = states(number, len(model.states))
         slopes, (spin, power, force, _) = model.rhs(tuple(y), constants)
@@ -58,10 +68,19 @@ def test_the_equations_are_those_of_newton_and_euler(law: str | None, couples: s
 
 
 @pytest.mark.parametrize(
-    "name", [*(f"slip+{law}+sigma+rolling" for law in LAWS), "noslip+solid", "noslip+solid+rolling"]
+    "name",
+    [
+        *(f"slip+{law}+sigma+rolling" for law in LAWS),
+        "noslip+solid",
+        "noslip+solid+rolling",
+        "slip+viscous+spinning",
+        "noslip+solid+sigma+spinning",
+        "slip+coulomb-tanh+sigma+paraboloid",
+        "noslip+solid+paraboloid",
+    ],
 )
 def test_only_friction_changes_the_energy(name: str) -> None:
-    model, constants = one(name, SKEW | FRICTION | COUPLES)
+    model, constants = one(name, (BOWL if "paraboloid" in name else SKEW) | FRICTION | COUPLES)
     for number in range(20):
         y = states(number, len(model.states))
         slopes, (_, power, _, _) = model.rhs(tuple(y), constants)
@@ -71,12 +90,13 @@ def test_only_friction_changes_the_energy(name: str) -> None:
         assert change == pytest.approx(-power, rel=1e-11, abs=1e-11 * scale * np.abs(slopes).max())
 
 
-def test_the_energy_is_that_of_a_rigid_body() -> None:
-    model, constants = one("slip+viscous", SKEW | FRICTION)
+@pytest.mark.parametrize(("name", "body"), [("slip+viscous", SKEW), ("slip+viscous+paraboloid", BOWL)])
+def test_the_energy_is_that_of_a_rigid_body(name: str, body: dict[str, Any]) -> None:
+    model, constants = one(name, body | FRICTION)
     for number in range(20):
         y = states(number, 7)
         u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
-        x_p, v = newton._contact(u, SKEW), np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
+        x_p, v = newton._contact(u, body), np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
         v_g, rest = v + np.cross(x_p, y[2:5]), SKEW["c"] - SKEW["offset"]
         expected = y[2:5] @ newton._inertia(SKEW) @ y[2:5] / 2 / SKEW["mass"] + v_g @ v_g / 2
         expected += SKEW["gravity"] * (-x_p @ u - rest)
@@ -162,11 +182,13 @@ def test_tanh_to_round_off() -> None:
     np.testing.assert_allclose(tanh_ratio(x**2), expected, rtol=4e-15)
 
 
-def test_the_slip_decays_no_faster_than_the_bound() -> None:
+@pytest.mark.parametrize("surface", [ELLIPSOID, PARABOLOID])
+def test_the_slip_decays_no_faster_than_the_bound(surface: Surface) -> None:
     """On random states that the energy at the start allows."""
-    start = {"n0": 4.0, "x0": 0.0, "y0": 0.0}
-    body = cells(**KANE_LEVINSON, **FRICTION, **start)
-    model, grip = find("slip+viscous"), strongest_grip(body)[0]
+    bowl = {"a": 0.005, "b": 0.222} if surface is PARABOLOID else {}
+    body = cells(**(KANE_LEVINSON | bowl | FRICTION), n0=4.0, x0=0.0, y0=0.0)
+    model = find("slip+viscous+paraboloid" if surface is PARABOLOID else "slip+viscous")
+    grip = strongest_grip(body, surface)[0]
     spin, rattle, inertia = model.energy(model.start(body), model.constants.of(body))
     energy = (rattle + 0.5 * inertia * spin**2)[0]
     constants, largest, random = take(model.constants.of(body), 0), 0.0, np.random.default_rng(3)
@@ -183,6 +205,68 @@ def test_the_slip_decays_no_faster_than_the_bound() -> None:
             rates[:, i] = [each.imag / 1e-30 for each in model.rhs(tuple(at), constants)[0][5:]]
         largest = max(largest, -np.linalg.eigvals(rates).real.min() / FRICTION["mu"])
     assert 0.4 * grip < largest <= 1.02 * grip
+
+
+def test_the_spin_decays_no_faster_than_the_bound() -> None:
+    """About zero spin, where spinning friction is steepest, at random attitudes that the energy at the start allows."""
+    spinning = {"mu_spinning": 0.2, "radius_spinning": 0.003, "speed_spinning": 0.01}
+    body = cells(**KANE_LEVINSON, **spinning, n0=3.0, x0=0.0, y0=0.0)
+    model = find("noslip+solid+spinning")
+    bound, constants, random = model.fastest_decay(body)[0], take(model.constants.of(body), 0), np.random.default_rng(7)
+    spin, rattle, inertia = model.energy(model.start(body), model.constants.of(body))
+    energy, largest = (rattle + 0.5 * inertia * spin**2)[0], 0.0
+    for _ in range(3000):
+        u1, u2 = random.normal(size=2) * 0.1
+        w1, w2 = random.normal(size=2) * 3
+        y = np.array([u1, u2, w1, w2, (u1 * w1 + u2 * w2) / np.sqrt(1 - u1**2 - u2**2)])
+        spin, rattle, inertia = model.energy(tuple(y), constants)
+        if rattle + 0.5 * inertia * spin**2 > energy:
+            continue
+        rates = np.zeros((3, 3))
+        for i in range(3):
+            at = y.astype(complex)
+            at[2 + i] += 1e-30j
+            rates[:, i] = [each.imag / 1e-30 for each in model.rhs(tuple(at), constants)[0][2:]]
+        largest = max(largest, -np.linalg.eigvals(rates).real.min())
+    assert 0.4 * bound < largest <= 1.02 * bound
+
+
+def test_no_point_of_a_paraboloid_is_below_the_contact_point() -> None:
+    _, constants = one("noslip+solid+paraboloid", BOWL)
+    x, y = np.meshgrid(np.linspace(-2, 2, 401), np.linspace(-0.2, 0.2, 401))
+    z = 0.02 * (1 - 0.012 * (x / 0.02) ** 2 - 0.35 * (y / 0.02) ** 2) - 0.01
+    for number in range(10):
+        u1, u2, *omega = states(number, 5)
+        u3 = -np.sqrt(1 - u1**2 - u2**2)
+        _, point, _, _ = PARABOLOID.contact(u1, u2, *omega, constants)
+        lowest = np.array(point) @ [u1, u2, u3]
+        heights = x * u1 + y * u2 + z * u3
+        assert lowest <= heights.min()
+        assert heights.min() < lowest + 1e-3
+        (rest,) = solid.height(cells(**BOWL))
+        assert PARABOLOID.elevation(u1, u2, u3, constants)[0] == pytest.approx(-lowest - rest, rel=1e-12)
+
+
+def test_a_small_rattle_knows_only_the_curvatures() -> None:
+    """An ellipsoid and a paraboloid with the same radii of curvature and the same height of the centre of mass."""
+    curved = KANE_LEVINSON | {"offset": np.array([0.0, 0.01]), "Ixy": -3e-5}
+    bowl = curved | {"a": 0.02**2 / (2 * 0.2**2), "b": 0.02**2 / (2 * 0.03**2)}
+    for name in ("slip+viscous+sigma", "noslip+solid+sigma"):
+        theirs = []
+        for each, body in ((name, curved), (f"{name}+paraboloid", bowl)):
+            model, columns = find(each), cells(**body, mu=30.0, sigma=1e-4)
+            near = {"n0": np.full(2, 1.0), "x0": np.full(2, 1e-7), "y0": np.full(2, -1e-7)}
+            theirs.append(
+                [
+                    linear.jacobian(model, model.constants.of(columns), np.array([3.0, -2.0])),
+                    model.slower_period(columns),
+                    stability.stable_ranges(model, columns),
+                    np.array(model.ripple.of(columns)),
+                    np.array(model.start(columns | near)),
+                ]
+            )
+        for one_, other in zip(*theirs, strict=True):
+            np.testing.assert_allclose(one_, other, rtol=1e-8, atol=1e-8 * np.nanmax(np.abs(one_[np.isfinite(one_)])))
 
 
 def crossings(sigma: float, omega3: float) -> np.ndarray:
@@ -230,13 +314,16 @@ def test_natural_units_and_si_are_the_same() -> None:
         np.testing.assert_allclose(np.array(slopes) * T / units, others, rtol=1e-11, atol=1e-12)
 
 
+@pytest.mark.parametrize("surface", ["", "+paraboloid"])
 @pytest.mark.parametrize("law", ["viscous", "coulomb-sqrt", "coulomb-tanh", "coulomb-cubic", "stribeck"])
-def test_the_mirror_image_does_the_mirror_image(law: str) -> None:
+def test_the_mirror_image_does_the_mirror_image(law: str, surface: str) -> None:
     """y → -y: u and v are vectors, ω is a pseudovector."""
     vector, turning = np.array([1, -1]), np.array([-1, 1, -1])
     image = np.array([*vector, *turning, *vector])
-    body = SKEW | FRICTION | COUPLES
-    (model, p), (_, q) = (one(f"slip+{law}+sigma+rolling", each) for each in (body, body | {"Ixy": 2e-5, "Iyz": 1e-5}))
+    body = (BOWL if surface else SKEW) | FRICTION | COUPLES
+    (model, p), (_, q) = (
+        one(f"slip+{law}+sigma+rolling+spinning{surface}", each) for each in (body, body | {"Ixy": 2e-5, "Iyz": 1e-5})
+    )
     for number in range(10):
         y = states(number, 7)
         np.testing.assert_allclose(
@@ -279,7 +366,7 @@ def test_narrower_regularisations_meet_dry_friction() -> None:
 def test_to_which_variants_the_linear_theory_applies() -> None:
     for name in ("slip+viscous+sigma", "slip+coulomb-tanh", "noslip+solid+sigma"):
         assert LINEAR in find(name).offers
-    for name in ("slip+viscous+rolling", "noslip+solid"):
+    for name in ("slip+viscous+rolling", "slip+viscous+spinning", "noslip+solid"):
         assert LINEAR not in find(name).offers
     assert LINEAR not in noslip.MODEL.offers
 

@@ -28,9 +28,10 @@ def states() -> np.ndarray:
     return np.array([random.uniform(-span, span, COUNT) for span in spans])
 
 
-@pytest.mark.parametrize("name", ["slip+viscous", "slip+viscous+sigma"])
+@pytest.mark.parametrize("name", ["slip+viscous", "slip+viscous+sigma", "slip+viscous+sigma+paraboloid"])
 def test_they_are_the_equations_of_the_full_model(name: str) -> None:
-    model, body, y = find(name), bodies(), states()
+    sides = {"a": 0.005, "b": 0.22} if name.endswith("paraboloid") else {}
+    model, body, y = find(name), bodies(**sides), states()
     split = splits.of(model)
     assert split is not None
     full, p = model.constants.of(body), split.model.constants.of(body)

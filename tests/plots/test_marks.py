@@ -40,6 +40,7 @@ def test_the_kinds_of_a_count(cells: xr.Dataset) -> None:
     assert kinds == {
         "not_run": [4],
         "failed": [2, 3],
+        "impossible": [],
         "no_value": [],
         "time_limit": [1],
         "inferred": [],

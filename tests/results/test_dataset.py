@@ -43,7 +43,16 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
     }  # fmt: skip
     flags = dict(zip(small["status"].attrs["flag_values"], small["status"].attrs["flag_meanings"].split(), strict=True))
     assert flags == STATUSES
-    known = {0: "not_run", 1: "settled", 2: "time_limit", 3: "lift_off", 4: "diverged", 5: "paradox", 6: "toppled"}
+    known = {
+        0: "not_run",
+        1: "settled",
+        2: "time_limit",
+        3: "lift_off",
+        4: "diverged",
+        5: "paradox",
+        6: "toppled",
+        8: "impossible",
+    }
     assert flags == known
 
 

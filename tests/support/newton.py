@@ -62,6 +62,11 @@ def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vect
     right[3:6] = -np.cross(omega, inertia @ omega) - p.get("sigma", 0.0) * omega
     rolling = p["mu_rolling"] * p["radius"] / _rounded(speed, p["speed_rolling"]) if "mu_rolling" in p else 0.0
     matrix[3:6, 8] += rolling * omega
+    n = omega[2]
+    spinning = (
+        p["mu_spinning"] * p["radius_spinning"] / _rounded(abs(n), p["speed_spinning"]) if "mu_spinning" in p else 0
+    )
+    matrix[5, 8] += spinning * n
     # The acceleration of the point of the body in contact, plus that of the contact moving on in the body, is v'.
     acceleration = np.hstack([np.eye(3), -_cross(x_p)])
     drift = -np.cross(omega, moving)
@@ -78,7 +83,7 @@ def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vect
     if law:
         in_space = acceleration @ found[:6] - drift
         slopes += list((space.T @ in_space - np.cross(y[2:5], space.T @ v))[:2])
-    power = -found[6:] @ v + (p.get("sigma", 0.0) + N * rolling) * speed**2
+    power = -found[6:] @ v + (p.get("sigma", 0.0) + N * rolling) * speed**2 + N * spinning * n**2
     return np.array(slopes), N, power
 
 
@@ -97,7 +102,10 @@ def _inertia(p: Mapping[str, float]) -> Vector:
 
 
 def _contact(u: Vector, p: Mapping[str, float]) -> Vector:
-    """The lowest point of the ellipsoid, from the centre of mass."""
+    """The lowest point of the surface, from the centre of mass."""
+    if p.get("surface") == "paraboloid":  # where the gradient of z + (a x² + b y²)/c is along -u
+        x, y = p["c"] / 2 / p["a"] * u[0] / u[2], p["c"] / 2 / p["b"] * u[1] / u[2]
+        return np.array([x, y, p["c"] * (1 - p["a"] * (x / p["c"]) ** 2 - p["b"] * (y / p["c"]) ** 2) - p["offset"]])
     semi = np.array([p["a"], p["b"], p["c"]])
     return -semi * _unit(semi * u) - np.array([0, 0, p["offset"]])
 

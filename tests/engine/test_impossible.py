@@ -1,0 +1,135 @@
+"""Sweeps in which some bodies cannot be: their cells have a status, cost nothing and harm no neighbour."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from support.runs import Stop, same_numbers
+
+import sweep
+from sweep import ConfigError
+from sweep.config import load_config
+from sweep.engine import local, run
+from sweep.engine.estimate import estimate
+from sweep.grid import Grid
+from sweep.kernels.status import IMPOSSIBLE
+from sweep.plots.marks import blank, legend, marks
+from sweep.results.summary import failed_fraction, summarize
+
+Write = Callable[..., Path]
+
+TEXT = """\
+name: edge
+body: {b: [0.9, 3.0, 5.0], offset: [0.0, 0.3, 1.0]}
+friction: {mu: 60}
+start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
+integrator: {t_end: 300}
+"""
+"""With b = 0.9 and offset = 0 the body falls over; with offset = 1 the centre of mass lies on the surface."""
+
+GONE = np.array([[True, False, True], [False, False, True], [False, False, True]])
+
+
+@pytest.fixture(autouse=True)
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.engine.run._draw", lambda *_: None)
+
+
+@pytest.fixture
+def edge(write: Write) -> xr.Dataset:
+    return sweep.run(write(TEXT)).transpose("b", "offset", "n0", ...)
+
+
+def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> None:
+    np.testing.assert_array_equal((edge["status"] == IMPOSSIBLE).values, np.repeat(GONE[:, :, None], 2, axis=2))
+    for name, values in edge.data_vars.items():
+        if values.dtype.kind == "f":
+            gone = np.broadcast_to(GONE.reshape(3, 3, *[1] * (values.ndim - 2)), values.shape)
+            assert np.isnan(values.values[gone]).all(), name
+    assert not edge["reversals"].values[GONE].any()
+    assert failed_fraction(edge) == 0
+    assert edge.attrs["impossible"] == (
+        "6 cells, centre of mass outside the ellipsoid, the first at b=0.9, offset=1; "
+        "2 cells, upright rest is unstable, the first at b=0.9, offset=0"
+    )
+    words = summarize(edge)
+    assert "8 impossible" in words
+    assert "2 cells, upright rest is unstable" in words
+    assert "set by accuracy in 5, stability in 5 cells" in words
+
+
+def test_neighbours_do_not_notice(edge: xr.Dataset, write: Write) -> None:
+    alone = sweep.run(write(TEXT), b=[3.0, 5.0], offset=[0.0, 0.3]).transpose("b", "offset", "n0", ...)
+    same_numbers(edge.sel(b=[3.0, 5.0], offset=[0.0, 0.3]), alone)
+
+
+def test_maps_leave_them_blank(edge: xr.Dataset) -> None:
+    kinds = marks(edge, "reversals")
+    np.testing.assert_array_equal(kinds["impossible"].values, blank(kinds).values)
+    assert legend(edge, "reversals")["impossible"] == "no such body, or none that stands (8 of 18)"
+    assert int(marks(edge, "spin_final")["no_value"].sum()) == 0
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_tiles_of_impossible_bodies_and_a_resumed_run(
+    edge: xr.Dataset, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    monkeypatch.setattr(run, "tile_size", lambda cells: size)  # noqa: ARG005
+    monkeypatch.setattr(local, "GROUP", size)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(write(TEXT), tmp_path, reporter=Stop(3))
+    reporter = Stop(10**6)
+    found = sweep.run(write(TEXT), tmp_path, reporter=reporter).transpose("b", "offset", "n0", ...)
+    same_numbers(found, edge)
+    assert (reporter.seen[-1].done, reporter.seen[-1].failed) == (18, 0)
+
+
+def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_path: Path) -> None:
+    sweep.run(write(TEXT), tmp_path, offset=[0.0, 0.3])
+    reporter = Stop(10**6)
+    found = sweep.run(write(TEXT), tmp_path, reporter=reporter).transpose("b", "offset", "n0", ...)
+    same_numbers(found, edge)
+    assert "12 of 18 cells are taken over" in reporter.notes[0]
+    assert found.attrs["impossible"] == edge.attrs["impossible"]
+
+
+def test_a_refined_map(write: Write) -> None:
+    text = TEXT.replace("[0.9, 3.0, 5.0]", "{start: 0.7, stop: 1.9, num: 13}").replace("[0.02, 0.05]", "0.05")
+    text = text.replace("[0.0, 0.3, 1.0]", "{start: 0.0, stop: 1.0, num: 11}")
+    full = sweep.run(write(text))
+    refined = sweep.run(write(text + "refine: 2\n"))
+    gone = full["status"] == IMPOSSIBLE
+    assert 20 < int(gone.sum()) < 100
+    np.testing.assert_array_equal(refined["status"] == IMPOSSIBLE, gone)
+    assert not refined["inferred"].values[gone.values].any()
+    assert refined.attrs["simulated_share"] <= 1 - float(gone.mean())
+    same = refined["inferred"] == 0
+    np.testing.assert_array_equal(refined["reversals"].where(same), full["reversals"].where(same))
+
+
+def test_critical_spins_of_the_others(write: Write) -> None:
+    found = sweep.critical(write(TEXT.replace("[0.02, 0.05]", "0.05")), width=1e-2, b=[0.9, 3.0], offset=[0.0, 0.3])
+    gone = np.array([[True, False], [False, False]])
+    reason = found["n_c1_plus_reason"].transpose("b", "offset").values
+    np.testing.assert_array_equal(reason == 8, gone)
+    np.testing.assert_array_equal(np.isnan(found["n_c1_plus_linear"].transpose("b", "offset")).values, gone)
+    near = found["n_c1_plus_simulated"] / found["n_c1_plus_linear"]
+    assert float(np.abs(near.sel(b=3.0) - 1).max()) < 0.02
+
+
+def test_what_is_refused(write: Write) -> None:
+    for change in ({"b": 0.9, "offset": 0.0}, {"offset": 1.0}, {"b": [0.8, 0.9], "offset": [0.0, 1.0]}):
+        with pytest.raises(ConfigError, match=r"upright rest is unstable|centre of mass outside"):
+            load_config(write(TEXT), change)
+    with pytest.raises(ConfigError, match="upright rest is unstable"):
+        sweep.trajectory(write(TEXT), b=[0.9, 3.0], offset=0.0)
+    # A fixed step is judged by the bodies that there are.
+    config = load_config(write(TEXT), {"step": 0.02})
+    assert Grid.of(config).size == 18
+    assert "cells:  18" in estimate(config)
+    predicted = sweep.predict(config)["n_c1_plus_linear"].transpose("b", "offset").values
+    np.testing.assert_array_equal(np.isnan(predicted), GONE)
