@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import chain
 
+import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
@@ -79,5 +80,9 @@ def _name(dataset: xr.Dataset) -> str:
 def _constants(datasets: list[xr.Dataset]) -> str:
     """The parameters that are the same in all datasets."""
     first, *others = datasets
-    own = [n for n, v in first.variables.items() if not all(n in d.coords and v.equals(d.variables[n]) for d in others)]
+
+    def shared(name: str) -> bool:
+        return all(name in other.coords and np.array_equal(other[name], first[name]) for other in others)
+
+    own = [name for name in map(str, first.coords) if not shared(name)]
     return labels.constants(first.drop_vars(own))
