@@ -92,8 +92,8 @@ def draw(
     if cmap is not None:
         scales.colour_map(cmap)  # raises if there is none
     if not isinstance(dataset, xr.Dataset):
-        if len(dataset) > 1:
-            return beside.draw([panels.choose(each, variable, x=x, y=y, sel=sel) for each in dataset], limits, cmap)
+        if len(dataset) != 1:
+            return _beside(dataset, variable, limits, cmap, x=x, y=y, sel=sel)
         (dataset,) = dataset
     found = kind(dataset)
     if found == TRAJECTORY or (found == CRITICAL and variable is None):
@@ -103,6 +103,15 @@ def draw(
         return trajectories.draw(dataset, variable) if found == TRAJECTORY else critical.draw(dataset)
     chosen = panels.choose(dataset, variable, x=x, y=y, sel=sel)
     return maps.draw(chosen, limits, cmap) if len(chosen.across) == 2 else curves.draw(chosen, limits)
+
+
+def _beside(
+    datasets: Sequence[xr.Dataset], variable: str | None, limits: Limits | None, cmap: str | None, **axes: Any
+) -> Figure:
+    """The figure of several datasets."""
+    if not datasets or any(kind(each) in (CRITICAL, TRAJECTORY) for each in datasets):
+        raise ValueError("several datasets; allowed: side by side, those of runs")
+    return beside.draw([panels.choose(each, variable, **axes) for each in datasets], limits, cmap)
 
 
 def suffix(path: Path) -> str:

@@ -60,6 +60,10 @@ def test_what_cannot_stand_side_by_side(two: list[xr.Dataset], small: xr.Dataset
         picture.draw([two[0], two[1].isel(mu=0)], x="b")
     with pytest.raises(ValueError, match="10 maps side by side; allowed: 8"):
         picture.draw([small] * 5, x="b", y="mu")
+    critical = xr.Dataset({"critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]})
+    for several in ([], [critical, critical]):
+        with pytest.raises(ValueError, match="allowed: side by side, those of runs"):
+            picture.draw(several)
 
 
 def test_from_the_shell(two: list[xr.Dataset], tmp_path: Path) -> None:
