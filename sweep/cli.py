@@ -264,7 +264,7 @@ def bench(output: Path) -> None:
 
 
 @main.command()
-@FILE
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_PATH)
 @click.option(
     "--var", "variable", help="Variable to draw [default: reversals, simulated and predicted, and their difference]."
 )
@@ -280,27 +280,35 @@ def bench(output: Path) -> None:
     help="Picture to write; its suffix names the format: png, pdf or svg [default: a PNG beside FILE].",
 )
 def plot(
-    file: Path, variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...], limits: str | None,
-    cmap: str | None, output: Path | None,
+    files: tuple[Path, ...], variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...],
+    limits: str | None, cmap: str | None, output: Path | None,
 ) -> None:  # fmt: skip
-    """Draw a dataset: maps or curves of a run, single trajectories, or critical spins."""
+    """Draw a dataset: maps or curves of a run, single trajectories, or critical spins.
+
+    Of several runs, the maps of one variable are drawn side by side, with one scale.
+    """
     with _explained():
         sel = dict(_parse_pair(cell, "--sel") for cell in cells)
         span = _parse_span(limits, "--limits") if limits is not None else None
         from sweep.plots import panels, picture
 
         interrupt.raise_again()
-        target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
+        stem = "-".join(file.stem for file in files)
+        target = output or files[0].with_name(f"{stem}{f'_{variable}' if variable else ''}.png")
         if picture.suffix(target) == "html":
-            _plot_page(file, target, variable, x, y, sel, limits, cmap)
+            if len(files) > 1:
+                _refuse(f"--output {target}", f"a page shows one dataset; allowed: {picture.ALLOWED}")
+            _plot_page(files[0], target, variable, x, y, sel, limits, cmap)
             return
         if picture.suffix(target) not in picture.FORMATS:
             _refuse(f"--output {target}", f"unknown format; allowed: {picture.ALLOWED}, .html")
-        dataset = _open(file)
-        with _about(file):
-            for name, taken in panels.nearest(dataset, sel).items():
-                _say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
-            picture.plot(dataset, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, output=target)
+        datasets = [_open(file) for file in files]
+        for file, dataset in zip(files, datasets, strict=True):
+            with _about(file):
+                for name, taken in panels.nearest(dataset, sel).items():
+                    _say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
+        with _about(files[0]):
+            picture.plot(datasets, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, output=target)
         _say(f"wrote {target}")
 
 

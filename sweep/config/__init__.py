@@ -93,6 +93,8 @@ def _full_path(key: str) -> tuple[str, ...]:
 def _resolve(checked: Any, source: document.Document) -> Config:
     """Fill in defaults, order the axes, and check that the values fit together."""
     given = _given(checked, source)
+    if "offset" in given and not given["offset"].is_axis and given["offset"].numbers == (0.0,):
+        del given["offset"]  # the default: it does not make a body other than the paper's
     columns = _table(checked.cases, source) if checked.cases is not None else None
     names, law, units = (*given, *(columns or ())), checked.friction.name, checked.units
     surface, needed = checked.body.surface, scenes.without_default(checked)

@@ -32,7 +32,7 @@ def draw(dataset: xr.Dataset) -> Figure:
     panels = list(indices(dataset, dims[1:]))[:MAX_PANELS]
     rows, columns = arrangement(len(panels), 2)
     figure = Figure(figsize=(min(8 * columns, 14), 2 + 3.2 * rows), dpi=110, layout="constrained")
-    figure.suptitle(heading(dataset), fontsize=10)
+    figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
         chosen = dataset.isel(panel)

@@ -40,7 +40,7 @@ def draw(panels: Panels, limits: Limits | None = None) -> Figure:
     rows, columns = arrangement(len(panels.each), 2)
     width = min(7.0, 14 / columns)
     figure = Figure(figsize=(width * columns, 1.9 + 2.6 * rows), dpi=110, layout="constrained")
-    figure.suptitle(heading(dataset), fontsize=10)
+    figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
     x = panels.across[0] if panels.across else None
     entries: dict[str, Artist] = {}

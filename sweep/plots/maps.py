@@ -44,26 +44,25 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) 
     columns = groups * len(panels.names)
     width = min(_PAGE / columns, _WIDEST)
     figure = Figure(figsize=(width * columns + 1.2, 1.6 + width * _RATIO * rows), dpi=110, layout="constrained")
-    figure.suptitle(heading(panels.dataset), fontsize=10)
+    figure.suptitle(heading(panels.dataset, figure.get_figwidth()), fontsize=10)
     kinds = _columns(panels)
     grid = figure.add_gridspec(rows, groups * len(kinds), width_ratios=groups * [_BAR if k == "" else 1 for k in kinds])
-    thin = {d: slice(None, None, -(-panels.dataset.sizes[d] // _MAX_VALUES)) for d in panels.across}
     entries: dict[str, Artist] = {}
     first: Axes | None = None
     for k, panel in enumerate(panels.each):
         row, group = divmod(k, groups)
-        chosen = panels.dataset.isel(thin).isel(panel)
+        chosen = thinned(panels).isel(panel)
         for i, name in enumerate(kinds):
             place = grid[row, group * len(kinds) + i]
             scale = _scale(chosen, panels, name or kinds[i - 1], limits, cmap)
             if name == "":
-                _bar(figure.add_subplot(place), panels.dataset, kinds[i - 1], scale)
+                draw_bar(figure.add_subplot(place), panels.dataset, kinds[i - 1], scale)
                 continue
             axes = figure.add_subplot(place, sharex=first, sharey=first)
             first = first or axes
-            entries |= _map(axes, chosen, name, panels.across, scale, small=columns > _SMALL)
+            entries |= draw_map(axes, chosen, name, panels.across, scale, small=columns > _SMALL)
             axes.set_title(_title(panels, name, panel, small=columns > _SMALL), fontsize=9)
-            _label_axes(axes, panels, left=i == 0, lowest=k + groups >= len(panels.each))
+            label_axes(axes, panels, left=i == 0, lowest=k + groups >= len(panels.each))
     _legend(figure, panels, entries)
     return figure
 
@@ -86,7 +85,14 @@ def arrangement(panels: int, maps: int) -> tuple[int, int]:
     return -(-panels // groups), groups
 
 
-def _map(
+def thinned(panels: Panels) -> xr.Dataset:
+    """The dataset with as many values of the axes as can be seen."""
+    return panels.dataset.isel(
+        {d: slice(None, None, -(-panels.dataset.sizes[d] // _MAX_VALUES)) for d in panels.across}
+    )
+
+
+def draw_map(
     axes: Axes, chosen: xr.Dataset, name: str, across: list[str], scale: Scale, *, small: bool
 ) -> dict[str, Artist]:
     """Draw one map; returns the entries that its lines need in the legend."""
@@ -126,6 +132,18 @@ def _scale(chosen: xr.Dataset, panels: Panels, name: str, limits: Limits | None,
     return scales.continuous(_values(chosen, name), limits, cmap)
 
 
+def shared_scale(each: list[Panels], limits: Limits | None, cmap: str | None) -> Scale:
+    """The scale of the first variable of several datasets."""
+    name = each[0].names[0]
+    flagged = [panels.dataset[name] for panels in each if "flag_values" in panels.dataset[name].attrs]
+    if flagged:
+        return scales.flags(sorted({value for flags in flagged for value in _flags_present(flags)}), cmap)
+    values = np.concatenate([_values(panels.dataset, name) for panels in each])
+    if name == "difference":
+        return scales.differences(values, limits, cmap)
+    return (scales.counts if values.dtype.kind == "i" else scales.continuous)(values, limits, cmap)
+
+
 def _values(chosen: xr.Dataset, name: str) -> Array:
     """The values of the cells that have a result; a zero if none has."""
     values = chosen[name].values[~blank(marks(chosen, name)).values]
@@ -147,7 +165,8 @@ def _title(panels: Panels, name: str, panel: dict[str, int], *, small: bool) -> 
     return ", ".join(filter(None, [words, where]))
 
 
-def _label_axes(axes: Axes, panels: Panels, *, left: bool, lowest: bool) -> None:
+def label_axes(axes: Axes, panels: Panels, *, left: bool = True, lowest: bool = True) -> None:
+    """Write what the axes of a map show, on the left and below."""
     down, right = panels.across
     axes.tick_params(labelsize=8, labelleft=left, labelbottom=lowest)
     if left:
@@ -156,7 +175,8 @@ def _label_axes(axes: Axes, panels: Panels, *, left: bool, lowest: bool) -> None
         axes.set_xlabel(labels.label(panels.dataset, right), fontsize=9)
 
 
-def _bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
+def draw_bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
+    """Draw the bar of a scale, with what it shows."""
     bar = Colorbar(axes, scale.mappable())
     words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name)
     bar.set_label(words, fontsize=8)

@@ -113,7 +113,7 @@ def legend(dataset: xr.Dataset, name: str, among: dict[str, xr.DataArray] | None
     kinds = marks(dataset, name) if among is None else among
     counts = {kind: (int(where.sum()), where.size) for kind, where in kinds.items()}
     return {
-        kind: f"{_meaning(dataset, name, kind)} ({count} of {size})" for kind, (count, size) in counts.items() if count
+        kind: f"{meaning(dataset, name, kind)} ({count} of {size})" for kind, (count, size) in counts.items() if count
     }
 
 
@@ -132,7 +132,8 @@ def in_words(dataset: xr.Dataset, name: str) -> xr.DataArray:
     return xr.DataArray(found, values.coords, values.dims, name)
 
 
-def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
+def meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
+    """What a kind of cell means for a variable, in words."""
     if kind == "failed":
         codes, counts = np.unique(dataset["status"], return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]

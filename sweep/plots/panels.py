@@ -22,8 +22,8 @@ from sweep.plots.marks import field
 MAX_PANELS = 8
 """Panels that a figure may have."""
 
-_HEADING = 90
-"""Letters in a line of the constant parameters above a figure."""
+_HEADING, _LETTERS = 90, 13.0
+"""Most letters in a line of the constant parameters above a figure, and letters that an inch of the figure holds."""
 
 _PANEL_VALUES = 4
 """An axis of more values is drawn as an axis; one of fewer gets a panel for each value."""
@@ -104,9 +104,15 @@ def title(dataset: xr.Dataset, panel: dict[str, int]) -> str:
     return ", ".join(labels.value(d, float(dataset[d][i])) for d, i in panel.items())
 
 
-def heading(dataset: xr.Dataset) -> str:
-    """The dataset's title and its constant parameters."""
-    return f"{dataset.attrs.get('title', '')}\n{fill(labels.constants(dataset), _HEADING)}".strip()
+def heading(dataset: xr.Dataset, width: float) -> str:
+    """The dataset's title and its constant parameters, in lines for a figure of so many inches."""
+    return f"{dataset.attrs.get('title', '')}\n{in_lines(labels.constants(dataset), width)}".strip()
+
+
+def in_lines(constants: str, width: float) -> str:
+    """Constants in lines that break between them, for a figure of so many inches."""
+    space = "\N{NO-BREAK SPACE}"
+    return fill(constants.replace(" = ", f"{space}={space}"), min(_HEADING, int(_LETTERS * width))).replace(space, " ")
 
 
 def best_shape(dataset: xr.Dataset) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import matplotlib as mpl
 import xarray as xr
 from matplotlib.figure import Figure
 
-from sweep.plots import critical, curves, maps, panels, scales, trajectories
+from sweep.plots import beside, critical, curves, maps, panels, scales, trajectories
 from sweep.plots.scales import Limits
 from sweep.results.kind import CRITICAL, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
@@ -25,8 +25,12 @@ _NO_DATE: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None},
 _DPI = 110
 
 
+Source = xr.Dataset | str | Path
+"""A dataset, or the path of its file."""
+
+
 def plot(
-    dataset: xr.Dataset | str | Path,
+    dataset: Source | Sequence[Source],
     variable: str | None = None,
     *,
     x: str | None = None,
@@ -40,7 +44,8 @@ def plot(
 
     Parameters
     ----------
-    dataset : a dataset, or the path of its file
+    dataset : a dataset, or the path of its file.  Of several, maps of one variable are drawn side by side, with one
+        scale
     variable : by default the reversals, simulated and predicted, and `difference`, which may also be named
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
         the values of the other axes gets a panel, up to eight
@@ -63,16 +68,16 @@ def plot(
     """
     if output is not None and suffix(Path(output)) not in FORMATS:
         raise ValueError(f"output: {output}: unknown format; allowed: {ALLOWED}")
-    if not isinstance(dataset, xr.Dataset):
-        dataset = open_dataset(Path(dataset))
-    figure = draw(dataset, variable, x=x, y=y, sel=sel, limits=limits, cmap=cmap)
+    several = [dataset] if isinstance(dataset, Source) else dataset
+    opened = [each if isinstance(each, xr.Dataset) else open_dataset(Path(each)) for each in several]
+    figure = draw(opened, variable, x=x, y=y, sel=sel, limits=limits, cmap=cmap)
     if output is not None:
         save(figure, Path(output))
     return figure
 
 
 def draw(
-    dataset: xr.Dataset,
+    dataset: xr.Dataset | Sequence[xr.Dataset],
     variable: str | None = None,
     *,
     x: str | None = None,
@@ -81,11 +86,15 @@ def draw(
     limits: Limits | None = None,
     cmap: str | None = None,
 ) -> Figure:
-    """The figure of a dataset; parameters and errors as of `plot`."""
+    """The figure of a dataset, or of several; parameters and errors as of `plot`."""
     if limits is not None and not limits[0] < limits[1]:
         raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; allowed: a lower and a higher number")
     if cmap is not None:
         scales.colour_map(cmap)  # raises if there is none
+    if not isinstance(dataset, xr.Dataset):
+        if len(dataset) != 1:
+            return _beside(dataset, variable, limits, cmap, x=x, y=y, sel=sel)
+        (dataset,) = dataset
     found = kind(dataset)
     if found == TRAJECTORY or (found == CRITICAL and variable is None):
         given = {"x": x, "y": y, "limits": limits, "cmap": cmap, "sel": sel or None}
@@ -94,6 +103,15 @@ def draw(
         return trajectories.draw(dataset, variable) if found == TRAJECTORY else critical.draw(dataset)
     chosen = panels.choose(dataset, variable, x=x, y=y, sel=sel)
     return maps.draw(chosen, limits, cmap) if len(chosen.across) == 2 else curves.draw(chosen, limits)
+
+
+def _beside(
+    datasets: Sequence[xr.Dataset], variable: str | None, limits: Limits | None, cmap: str | None, **axes: Any
+) -> Figure:
+    """The figure of several datasets."""
+    if not datasets or any(kind(each) in (CRITICAL, TRAJECTORY) for each in datasets):
+        raise ValueError("several datasets; allowed: side by side, those of runs")
+    return beside.draw([panels.choose(each, variable, **axes) for each in datasets], limits, cmap)
 
 
 def suffix(path: Path) -> str:

@@ -59,7 +59,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and variable is None]
     rows = -(-len(panels) // 2)
     figure = Figure(figsize=(11, 4.2 + 1.9 * rows), dpi=110, layout="constrained")
-    figure.suptitle(heading(_constants_apart(dataset)), fontsize=10)
+    figure.suptitle(heading(_constants_apart(dataset), figure.get_figwidth()), fontsize=10)
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}

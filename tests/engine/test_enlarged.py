@@ -151,6 +151,43 @@ def test_another_law_of_friction_is_another_run(write: Write) -> None:
     assert "tanh" in reason_against(other, identify(mine), identify(other), there, None)
 
 
+SCENE = """\
+name: small
+units: SI
+gravity: 9.81
+body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
+friction: {law: coulomb, mu: 0.3, regularisation: tanh, speed: 0.02, sigma: 1.0e-4}
+start: {roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5]}
+integrator: {t_end: 1}
+"""
+GROWTHS = {
+    "gravity": ("gravity: 9.81", "gravity: [1.62, 9.81]"),
+    "speed": ("speed: 0.02", "speed: [0.01, 0.02, 0.04]"),
+    "sigma": ("sigma: 1.0e-4", "sigma: {start: 0, stop: 1.0e-4, num: 3}"),
+    "mass": ("mass: 1.0", "mass: [0.5, 1.0]"),
+    "roll": ("roll: 0.5 deg", "roll: [0.5 deg, 1 deg]"),
+}
+"""Axes that the paper's models do not have, each from one value to several."""
+
+
+@pytest.mark.parametrize("axis", GROWTHS)
+def test_a_scene_grows_along_its_own_axes(write: Write, tmp_path: Path, axis: str) -> None:
+    wider = SCENE.replace(*GROWTHS[axis])
+    found, (note,) = grown(write, tmp_path / "out", SCENE, wider)
+    assert note.startswith(f"2 of {found['status'].size} cells are taken over")
+    same_numbers(found, sweep.run(write(wider)))
+
+
+def test_a_scene_does_not_grow_into_another(write: Write, tmp_path: Path) -> None:
+    """Neither another value of an axis nor another law, couple or kind of start may take over a cell."""
+    grown(write, tmp_path / "out", SCENE)
+    changes = (("9.81", "1.62"), ("0.02, sigma", "0.03, sigma"), ("tanh", "sqrt"), (", sigma: 1.0e-4", ""),
+               ("roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5]", "n0: [-5, 5], x0: 1.0e-3, y0: 0"))  # fmt: skip
+    for change in changes:
+        with pytest.raises(StoreError, match="not resumed"):
+            grown(write, tmp_path / "out", SCENE.replace(*change))
+
+
 def test_a_further_measurement_needs_all_cells(write: Write, tmp_path: Path) -> None:
     fewer, more = (ONE + f"measure: [reversals{more}]\n" for more in ("", ", first_reversal"))
     found, (note,) = grown(write, tmp_path / "out", fewer, more)

@@ -379,3 +379,41 @@ def test_two_processes_at_once(runs: Runs, undisturbed: dict[str, bytes]) -> Non
     first.join(60)
     assert first.exitcode == 0, first.log.read_text()
     assert contents(runs.out) == undisturbed
+
+
+VARIANT = """\
+name: small
+units: SI
+gravity: 9.81
+body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
+friction: {law: coulomb, mu: [0.2, 0.5], regularisation: tanh, speed: 0.02, sigma: [5.0e-5, 1.0e-4]}
+start: {roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 4, 5], slip1: 0.05}
+integrator: {t_end: 12}
+verify: 0.3
+"""
+
+
+@pytest.mark.parametrize(
+    "moments",
+    [("kernel", "dataset"), pytest.param(("kernel", "checkpoint", "tile") * 4, marks=pytest.mark.campaign)],
+    ids=["some", "many"],
+)
+def test_a_variant_killed_and_resumed(tmp_path: Path, moments: tuple[str, ...]) -> None:
+    """Any body and any law of friction, bit for bit as in a run that nothing happened to."""
+    config = tmp_path / "small.yaml"
+    config.write_text(VARIANT, encoding="utf-8")
+    calm, runs = Runs(config, tmp_path / "calm"), Runs(config, tmp_path / "out")
+    code, said = calm.finish()
+    assert code == 0, said
+    undisturbed = contents(calm.out)
+    killed = 0
+    for moment in moments:
+        process = strike(runs, undisturbed, moment, 0.0, signal.SIGKILL)
+        killed += process is not None and process.exitcode == -signal.SIGKILL
+    assert killed >= len(moments) / 2
+    code, said = runs.finish()
+    assert code == 0, said
+    assert contents(runs.out) == undisturbed
+    values = xr.load_dataset(runs.out / "small.nc")
+    assert "coulomb" in values.attrs["config"]
+    assert (values["reversals"].values > 0).any()

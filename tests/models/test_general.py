@@ -344,9 +344,21 @@ def ends(name: str, parameters: dict[str, Any], time: float) -> np.ndarray:
 def test_strong_friction_is_rolling() -> None:
     """The difference falls as 1/μ."""
     start = KANE_LEVINSON | ANGLES | {"slip1": 0.0, "slip2": 0.0}
-    rolling = ends("noslip+solid", start, 0.5)
-    off = [np.abs(ends("slip+viscous", start | {"mu": mu}, 0.5)[:5] - rolling).max() for mu in (1e3, 1e4)]
-    assert off[0] / off[1] == pytest.approx(10, rel=0.1)
+    rolling, mu = ends("noslip+solid", start, 0.5), np.array([1e3, 3e3, 1e4])
+    off = [np.abs(ends("slip+viscous", start | {"mu": each}, 0.5)[:5] - rolling).max() for each in mu]
+    order, _ = np.polyfit(np.log(mu), np.log(off), 1)
+    assert order == pytest.approx(-1, abs=0.02)
+
+
+def test_while_a_body_slides_tanh_becomes_dry_friction() -> None:
+    """tanh(v/s) is 1 but for 2 exp(-2 v/s), so the motion differs by no more as long as the slip v is large."""
+    start = KANE_LEVINSON | ANGLES | {"mu": 0.3, "slip1": 0.5, "slip2": 0.0, "omega3": -2.0}
+    dry = ends("slip+coulomb-tanh", start | {"speed": 1e-3}, 0.02)
+    v = np.hypot(*dry[5:])
+    assert v > 0.35
+    for speed in (0.2, 0.1, 0.05):
+        off = np.abs(ends("slip+coulomb-tanh", start | {"speed": speed}, 0.02) - dry).max()
+        assert 0.01 * np.exp(-2 * v / speed) < off < 20 * np.exp(-2 * v / speed)
 
 
 def test_narrower_regularisations_meet_dry_friction() -> None:

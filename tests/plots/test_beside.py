@@ -1,0 +1,75 @@
+"""Maps of several datasets side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from support.cli import invoke, refused
+
+import sweep
+from sweep.plots import picture
+
+
+@pytest.fixture
+def two(small: xr.Dataset) -> list[xr.Dataset]:
+    """Two runs over mu and b, of which the other one has more reversals, and friction of another size."""
+    one = small.isel(n0=0, drop=True)
+    other = one.assign_coords(mu=one["mu"] / 100).assign_attrs(title="other: reversals of a rattleback (slip model)")
+    other["reversals"] = other["reversals"] + 7
+    other["status"] = xr.full_like(other["status"], 2)
+    return [one, other.assign_coords(delta=0.5)]
+
+
+def test_one_scale_and_axes_of_their_own(two: list[xr.Dataset]) -> None:
+    figure = sweep.plot(two, x="b", y="mu")
+    one, other, bar = figure.axes
+    assert [axes.get_title() for axes in (one, other)] == ["small", "other"]
+    norms = [axes.collections[0].norm for axes in (one, other)]
+    counts = np.concatenate([dataset["reversals"].values.ravel() for dataset in two])
+    assert norms[0] is norms[1]
+    assert norms[0](counts.min()) < norms[0](counts.max())
+    assert bar.get_ylim() == (counts.min() - 0.5, counts.max() + 0.5)
+    assert one.get_ylim()[1] > 10 * other.get_ylim()[1]
+    assert "a = 10" in figure.get_suptitle()
+    assert "delta" not in figure.get_suptitle()
+    assert "δ" not in figure.get_suptitle()
+
+
+def test_the_legend_counts_the_cells_of_each(two: list[xr.Dataset]) -> None:
+    limits = [int((dataset["status"] == 2).sum()) for dataset in two]
+    (legend,) = picture.draw(two, x="b", y="mu").legends
+    assert f"({limits[0]} of 6 and {limits[1]} of 6)" in legend.get_texts()[0].get_text()
+
+
+def test_flags_and_real_numbers(two: list[xr.Dataset]) -> None:
+    two[0]["status"] = xr.full_like(two[0]["status"], 1)
+    figure = picture.draw(two, "status", x="b", y="mu")
+    assert len(figure.axes) == 2
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["settled", "ended at the time limit"]
+    colours = [axes.collections[0].to_rgba([1, 2]) for axes in figure.axes]
+    np.testing.assert_array_equal(*colours)
+    one, other, _ = picture.draw(two, "spin_final", x="b", y="mu").axes
+    assert one.collections[0].get_clim() == other.collections[0].get_clim()
+
+
+def test_what_cannot_stand_side_by_side(two: list[xr.Dataset], small: xr.Dataset) -> None:
+    with pytest.raises(ValueError, match="no two axes"):
+        picture.draw([two[0], two[1].isel(mu=0)], x="b")
+    with pytest.raises(ValueError, match="10 maps side by side; allowed: 8"):
+        picture.draw([small] * 5, x="b", y="mu")
+    critical = xr.Dataset({"critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]})
+    for several in ([], [critical, critical]):
+        with pytest.raises(ValueError, match="allowed: side by side, those of runs"):
+            picture.draw(several)
+
+
+def test_from_the_shell(two: list[xr.Dataset], tmp_path: Path) -> None:
+    files = [tmp_path / "one.nc", tmp_path / "other.nc"]
+    for file, dataset in zip(files, two, strict=True):
+        dataset.to_netcdf(file)
+    assert invoke("plot", *files, "--x", "b", "--y", "mu").exit_code == 0
+    assert (tmp_path / "one-other.png").read_bytes().startswith(b"\x89PNG")
+    refused(invoke("plot", *files, "--output", tmp_path / "x.html"), "a page shows one dataset; allowed:")
