@@ -38,7 +38,7 @@ from sweep.jit import inline
 from sweep.models import noslip, slip, solid, starts, steady
 from sweep.models.couples import COUPLES, Couple, nothing
 from sweep.models.laws import LAWS, Law
-from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, Ripple, named
+from sweep.models.model import COUNT, ENERGY, LINEAR, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.solid import contact, gyroscopic
 
 BASES = ("slip", "noslip")
@@ -163,7 +163,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], parameters: tuple[
         states=slip.MODEL.states,
         spin_state=slip.MODEL.spin_state,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=_offers(couples, dissipates=True),
+        offers=_offers(couples, dissipates=True) | ({REVERSAL_TIME} if law.name == "viscous" else set()),
         constants=_record(fields, more),
         start=starts.slipping,
         slower_period=solid.slower_period,
@@ -232,7 +232,7 @@ def _rolling(name: str, couples: Sequence[Couple], parameters: tuple[str, ...]) 
         states=noslip.MODEL.states,
         spin_state=noslip.MODEL.spin_state,
         parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=_offers(couples, dissipates=bool(couples)),
+        offers=_offers(couples, dissipates=bool(couples)) | {REVERSAL_TIME},
         constants=_record(names, values),
         start=starts.rolling,
         slower_period=solid.slower_period,

@@ -13,7 +13,7 @@ from sweep.results import dataset
 
 
 def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
-    """The predictions alone, of the paper and of the linear theory, on the grid of `config`.
+    """The predictions alone, of the paper, of the linear theory and, with the measurement `first_reversal`, of the time of that, on the grid of `config`.
 
     Parameters
     ----------
@@ -27,4 +27,4 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """
     config = load_config(config, overrides)
     grid = Grid.of(config)
-    return dataset.label(config, grid, dataset.predicted(prediction.predict(config.tier, grid)), {})
+    return dataset.label(config, grid, dataset.predicted(prediction.predict(config.tier, grid, config.measure)), {})
