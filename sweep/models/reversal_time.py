@@ -59,9 +59,7 @@ would grow has no energy; friction stops the reversal; or body or friction have 
 
 def growth(columns: Columns) -> tuple[Array, Array]:
     """σ of the slower and of the faster mode, half the rate per spin at which its energy grows, shape (cells,)."""
-    J11, J22, J33, J12, J13, J23 = solid.inertia(columns)
-    height = columns["c"] - solid.offset(columns)
-    M11, M22, M12 = J22 + height**2, J11 + height**2, -J12
+    height, M11, M22, M12 = _inertia(columns)
     k1, k2 = solid.stiffness(columns)  # R1 - height and R2 - height
     lower, higher = solid.frequencies(columns)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -73,11 +71,10 @@ def growth(columns: Columns) -> tuple[Array, Array]:
 
 def energies(columns: Columns) -> tuple[Array, Array]:
     """Energies of the slower and of the faster mode at the start, per unit mass, shape (cells,)."""
-    J11, J22, _, J12, _, _ = solid.inertia(columns)
-    height = columns["c"] - solid.offset(columns)
+    _, M11, M22, M12 = _inertia(columns)
     k1, k2 = (np.sqrt(solid.gravity(columns) * k) for k in solid.stiffness(columns))
     # In the coordinates (k1 u1, k2 u2) the stiffness is one, and the eigenvalues of the inertia are 1/ν².
-    rows = (((J22 + height**2) / k1**2, -J12 / (k1 * k2)), (-J12 / (k1 * k2), (J11 + height**2) / k2**2))
+    rows = ((M11 / k1**2, M12 / (k1 * k2)), (M12 / (k1 * k2), M22 / k2**2))
     values, modes = np.linalg.eigh(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2))
     u1, u2, w1, w2, w3 = starts.rolling(columns)
     u3 = -np.sqrt(1 - u1**2 - u2**2)
@@ -85,6 +82,13 @@ def energies(columns: Columns) -> tuple[Array, Array]:
     q, p = (np.einsum("...i,...ik->...k", np.stack([k1 * x, k2 * y], axis=-1), modes) for x, y in ((u1, u2), moves))
     found = 0.5 * (q**2 + values * p**2)
     return found[..., 1], found[..., 0]
+
+
+def _inertia(columns: Columns) -> tuple[Array, Array, Array, Array]:
+    """The height of G at rest, and M11, M22 and M12, as in `solid.frequencies` for J13 = J23 = 0."""
+    J11, J22, _, J12, _, _ = solid.inertia(columns)
+    height = columns["c"] - solid.offset(columns)
+    return height, J22 + height**2, J11 + height**2, -J12
 
 
 def first_reversal(columns: Columns, n_c: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -106,7 +110,7 @@ def first_reversal(columns: Columns, n_c: tuple[Array, Array]) -> tuple[Array, A
     with np.errstate(divide="ignore", invalid="ignore"):
         time = (np.arcsinh(beyond / np.sqrt(e)) + np.arctanh(critical / N)) / (sigma * N)
     reason = np.select(
-        [_unknown(columns) | np.isnan(critical), sigma == 0, n0 == 0, e == 0, N <= critical],
+        [_unknown(columns) | np.isnan(critical), sigma == 0, n0 == 0, e == 0, critical >= N],
         [NOT_KNOWN, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL], PREDICTED,
     )  # fmt: skip
     return np.where(reason == PREDICTED, time, np.nan), reason
@@ -115,4 +119,7 @@ def first_reversal(columns: Columns, n_c: tuple[Array, Array]) -> tuple[Array, A
 def _unknown(columns: Columns) -> Array:
     """Where a couple resists the motion, or upright spin is no steady motion, shape (cells,)."""
     names = ("sigma", "mu_rolling", "Ixz", "Iyz")
-    return np.any([columns[name] != 0 for name in names if name in columns] or [columns["a"] < 0], axis=0)
+    found = np.zeros(len(columns["a"]), bool)
+    for name in names:
+        found |= columns.get(name, 0) != 0
+    return found

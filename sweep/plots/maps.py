@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from sweep.grid import Array
 from sweep.plots import cells, labels, legends, scales, theory
 from sweep.plots.axes import set_scale
-from sweep.plots.marks import blank, legend, marks
+from sweep.plots.marks import COMPARISONS, blank, legend, marks
 from sweep.plots.panels import Panels, edges, heading, title
 from sweep.plots.scales import Limits, Scale
 
@@ -34,8 +34,15 @@ _SMALL = 4
 _OF_DIFFERENCES = ("failed", "not_run", "time_limit")
 """Kinds of cell marked on maps of differences too; the map of the simulated counts beside it has all."""
 
-_TITLES = {"reversals": "simulated", "reversals_predicted": "predicted (Takano 2011)"}
-_SMALL_TITLES = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
+_TITLES = {
+    "reversals": "simulated",
+    "reversals_predicted": "predicted (Takano 2011)",
+    "t_first_reversal": "simulated",
+    "t_first_reversal_predicted": "predicted (Garcia and Hubbard 1988)",
+}
+_SMALL_TITLES = dict.fromkeys(("reversals", "t_first_reversal"), "simulated")
+_SMALL_TITLES |= dict.fromkeys(("reversals_predicted", "t_first_reversal_predicted"), "predicted")
+_SMALL_TITLES |= {name: name for name in COMPARISONS}
 
 
 def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Figure:
@@ -72,8 +79,9 @@ def _columns(panels: Panels) -> list[str]:
     """The variables of a panel in their order, and "" for each bar: after the last map that shares its scale."""
     if "flag_values" in panels.dataset[panels.names[0]].attrs:  # told in the legend
         return panels.names
-    counted = [name for name in panels.names if name != "difference"]
-    return [*counted, *([""] if counted else []), *(["difference", ""] if "difference" in panels.names else [])]
+    counted = [name for name in panels.names if name not in COMPARISONS]
+    compared = [name for name in panels.names if name in COMPARISONS]
+    return [*counted, *([""] if counted else []), *(each for name in compared for each in (name, ""))]
 
 
 def arrangement(panels: int, maps: int) -> tuple[int, int]:
@@ -105,7 +113,7 @@ def _map(
     axes.set(xlim=around[1][[0, -1]], ylim=around[0][[0, -1]])
     dark = np.where(empty, False, scale.lightness(np.where(empty, values.ravel()[0], values)) < 0.5)
     arrays = {kind: where.transpose(down, right).values for kind, where in kinds.items()}
-    if name == "difference":
+    if name in COMPARISONS:
         arrays = {kind: where for kind, where in arrays.items() if kind in _OF_DIFFERENCES}
     cells.draw(axes, arrays, around, dark)
     if name not in theory.REVERSALS:
@@ -114,16 +122,16 @@ def _map(
 
 
 def _scale(chosen: xr.Dataset, panels: Panels, name: str, limits: Limits | None, cmap: str | None) -> Scale:
-    """The scale of a map: simulated and predicted counts of a panel share theirs."""
+    """The scale of a map: what is simulated and what is predicted of a panel share theirs."""
     if "flag_values" in chosen[name].attrs:
         return scales.flags(_flags_present(panels.dataset[name]), cmap)
+    own = (limits, cmap) if panels.names == [name] else (None, None)
     if name == "difference":
-        alone = panels.names == [name]
-        return scales.differences(_values(chosen, name), limits if alone else None, cmap if alone else None)
-    if chosen[name].dtype.kind == "i":
-        together = [other for other in panels.names if other != "difference"]
-        return scales.counts(np.concatenate([_values(chosen, other) for other in together]), limits, cmap)
-    return scales.continuous(_values(chosen, name), limits, cmap)
+        return scales.differences(_values(chosen, name), *own)
+    if name == "ratio":
+        return scales.ratios(_values(chosen, name), *own)
+    together = np.concatenate([_values(chosen, other) for other in panels.names if other not in COMPARISONS])
+    return (scales.counts if chosen[name].dtype.kind == "i" else scales.continuous)(together, limits, cmap)
 
 
 def _values(chosen: xr.Dataset, name: str) -> Array:
@@ -158,7 +166,7 @@ def _label_axes(axes: Axes, panels: Panels, *, left: bool, lowest: bool) -> None
 
 def _bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
     bar = Colorbar(axes, scale.mappable())
-    words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name)
+    words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name.removesuffix("_predicted"))
     bar.set_label(words, fontsize=8)
     axes.tick_params(labelsize=7)
     scale.label(bar)

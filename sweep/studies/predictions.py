@@ -13,7 +13,9 @@ from sweep.results import dataset
 
 
 def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
-    """The predictions alone, of the paper, of the linear theory and, with the measurement `first_reversal`, of the time of that, on the grid of `config`.
+    """The predictions alone, of the paper and of the linear theory, on the grid of `config`.
+
+    With the measurement `first_reversal` the time of the first reversal is predicted as well.
 
     Parameters
     ----------
