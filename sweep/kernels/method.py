@@ -72,6 +72,9 @@ class Method:
     stops_anywhere: bool = False
     """Whether a run may stop after any step and go on from there towards another goal."""
 
+    follows_neighbours: bool = False
+    """Whether it can follow a neighbour of each trajectory (`sweep.kernels.neighbour`)."""
+
     def runs(self, model: Model) -> bool:
         """Whether it can integrate a model."""
         return self.models is None or model.name in self.models
