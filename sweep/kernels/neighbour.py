@@ -59,7 +59,7 @@ def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Lay
     block, lanes, apart, wide = BLOCK, LANES, APART, full_width()
 
     @exactly_compiled
-    def follow(group: Any) -> None:
+    def catch_up(group: Any) -> None:
         wide()
         for _ in range(block):
             for lane in range(lanes):
@@ -69,6 +69,12 @@ def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Lay
                 new, _, _, _, _, _ = step(z, p, h)
                 store(group, lane, behind, new, z)
                 group[CAUGHT_UP + lane] += 1.0 if behind else 0.0
+
+    # Not in one function with the steps: beside the logarithms LLVM vectorised those less well (40 in place of 21 ns).
+    @exactly_compiled
+    def follow(group: Any) -> None:
+        wide()
+        catch_up(group)
         for lane in range(lanes):
             y, z = own(group, lane), load(group, lane)
             d = distance(y, z)
