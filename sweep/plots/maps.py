@@ -124,7 +124,7 @@ def _map(
 def _scale(chosen: xr.Dataset, panels: Panels, name: str, limits: Limits | None, cmap: str | None) -> Scale:
     """The scale of a map: what is simulated and what is predicted of a panel share theirs."""
     if "flag_values" in chosen[name].attrs:
-        return scales.flags(_flags_present(panels.dataset[name]), cmap)
+        return scales.flags(list(_flags_present(panels.dataset, name)), cmap)
     own = (limits, cmap) if panels.names == [name] else (None, None)
     if name == "difference":
         return scales.differences(_values(chosen, name), *own)
@@ -140,8 +140,11 @@ def _values(chosen: xr.Dataset, name: str) -> Array:
     return values if values.size else np.zeros(1, chosen[name].dtype)
 
 
-def _flags_present(flags: xr.DataArray) -> list[int]:
-    return [int(value) for value in np.unique(flags)]
+def _flags_present(dataset: xr.Dataset, name: str) -> dict[int, int]:
+    """In how many cells with a result each value of a variable with flags occurs; if there are none, in all."""
+    values, empty = dataset[name].values, blank(marks(dataset, name)).values
+    present, counts = np.unique(values if empty.all() else values[~empty], return_counts=True)
+    return dict(zip(present.tolist(), counts.tolist(), strict=True))
 
 
 def _title(panels: Panels, name: str, panel: dict[str, int], *, small: bool) -> str:
@@ -177,11 +180,11 @@ def _legend(figure: Figure, panels: Panels, lines: dict[str, Artist]) -> None:
     dataset, name = panels.dataset, panels.names[0]
     handles: list[Artist] = []
     if meanings := labels.flag_words(dataset, name):
-        present = _flags_present(dataset[name])
-        colours = scales.flags(present).rgba(np.array(present))
-        for value, colour in zip(present, colours, strict=True):
-            count = f"{int((dataset[name] == value).sum())} of {dataset[name].size}"
-            handles.append(Patch(facecolor=colour, edgecolor="0.3", label=f"{meanings.get(value, value)} ({count})"))
+        present = _flags_present(dataset, name)
+        colours = scales.flags(list(present)).rgba(np.array(list(present)))
+        for (value, count), colour in zip(present.items(), colours, strict=True):
+            words = f"{meanings.get(value, value)} ({count} of {dataset[name].size})"
+            handles.append(Patch(facecolor=colour, edgecolor="0.3", label=words))
     handles += [cells.handle(kind, words) for kind, words in legend(dataset, name).items()]
     handles += lines.values()
     legends.below(figure, handles)

@@ -10,6 +10,7 @@ import xarray as xr
 
 from sweep.grid import Array
 from sweep.kernels.status import FAILURES, TIME_LIMIT
+from sweep.plots import regimes
 from sweep.plots.labels import STATUS_WORDS, flag_words
 from sweep.results.dataset import VARIABLES
 
@@ -48,8 +49,8 @@ COMPARISONS = tuple(comparison for _, comparison in PREDICTIONS.values())
 
 
 def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """A variable, `difference`: how many more reversals are simulated than predicted, or `ratio`: how many times as
-    late the first reversal is simulated as predicted.
+    """A variable; `difference`: how many more reversals are simulated than predicted; `ratio`: how many times as late
+    the first reversal is simulated as predicted; or `regime` (`sweep.plots.regimes`).
 
     Raises
     ------
@@ -64,6 +65,8 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
         found = dataset["t_first_reversal"] / dataset["t_first_reversal_predicted"]
         long_name = "time of the first spin reversal, simulated, divided by that of Garcia and Hubbard (1988)"
         return found.rename(name).assign_attrs(long_name=long_name, units="1")
+    if name == "regime" and set(regimes.NEEDS) <= set(dataset.data_vars):
+        return regimes.regimes(dataset)
     if name not in dataset.data_vars:
         raise ValueError(f"no variable {name}; allowed: {', '.join(map(str, dataset.data_vars))}")
     return dataset[name]
@@ -74,7 +77,7 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
 
     Parameters
     ----------
-    name : a variable of the dataset, `difference` or `ratio`
+    name : as `field` takes it
 
     Returns
     -------
@@ -149,4 +152,4 @@ def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
 
 
 def _is_simulated(name: str) -> bool:
-    return name in (*COMPARISONS, "t_stop") or (name in VARIABLES and VARIABLES[name].of_sound_runs)
+    return name in (*COMPARISONS, "regime", "t_stop") or (name in VARIABLES and VARIABLES[name].of_sound_runs)
