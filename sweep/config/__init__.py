@@ -195,7 +195,7 @@ _CHECKS: tuple[tuple[tuple[str, ...], Callable[[Config], str]], ...] = (
 def _with_method(checked: Any, model: Tier) -> Any:
     """The default method, filled in: `auto` where there is a choice and the step is not given."""
     integrator = checked.integrator
-    alone = any(MEASURES[name].follows_neighbour for name in _names(checked.measure or ()))
+    alone = any(MEASURES[name].follows_tangent for name in _names(checked.measure or ()))
     if "method" in integrator.model_fields_set and not (alone and integrator.method == methods.AUTO):
         return checked
     choice = not alone and isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
@@ -245,8 +245,8 @@ def _misfits(
     yield from _unmeasurable(checked.measure or (), model, source)
     for i, name in enumerate(_names(checked.measure or ())):
         method = checked.integrator.method
-        if MEASURES[name].follows_neighbour and not methods.METHODS[method].follows_neighbours:
-            able = ", ".join(each for each, found in methods.METHODS.items() if found.follows_neighbours)
+        if MEASURES[name].follows_tangent and not methods.METHODS[method].follows_tangents:
+            able = ", ".join(each for each, found in methods.METHODS.items() if found.follows_tangents)
             yield source.fault(("measure", i), f"not measured with method: {method}; allowed: {able}")
 
 

@@ -72,8 +72,8 @@ class Method:
     stops_anywhere: bool = False
     """Whether a run may stop after any step and go on from there towards another goal."""
 
-    follows_neighbours: bool = False
-    """Whether it can follow a neighbour of each trajectory (`sweep.kernels.neighbour`)."""
+    follows_tangents: bool = False
+    """Whether it can carry a tangent along each trajectory (`sweep.kernels.tangent`)."""
 
     def runs(self, model: Model) -> bool:
         """Whether it can integrate a model."""

@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent: the mean rate at which a neighbouring trajectory parts (`sweep.kernels.neighbour`).
+"""The largest Lyapunov exponent: the mean rate at which a tangent grows (`sweep.kernels.tangent`).
 
 The growth is added up in bins of equal length.  When all `BINS` are full, pairs are merged and bins become twice as
 long, so that however long the trajectory is, between half and all of them are full.  The exponent is the mean over the
@@ -20,7 +20,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement
-from sweep.kernels.neighbour import GROWTH
+from sweep.kernels.tangent import GROWTH
 from sweep.models.model import SPIN, Array, Columns, Model
 from sweep.variables import Variable
 
@@ -36,7 +36,7 @@ class Lyapunov(Measurement):
     name = "lyapunov"
     summary = "largest Lyapunov exponent, with its statistical error, at about twice the cost; with dopri5 alone"
     asks = SPIN
-    follows_neighbour = True
+    follows_tangent = True
 
     variables = {
         "lyapunov": Variable(
