@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sweep.grid import Array, Grid
+from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.stability import stable_ranges
-from sweep.models import analytic, stability
+from sweep.models import analytic, general, reversal_time, stability
 from sweep.models.linear import fastest_spin
-from sweep.models.model import FORMULAS, LINEAR, Columns, Model, Tier
+from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
 from sweep.models.scene import PAPERS
 
 
@@ -37,6 +39,16 @@ class Stability:
 
 
 @dataclass(frozen=True)
+class ReversalTime:
+    """The time of the first reversal by Garcia and Hubbard (1988)."""
+
+    time: Array
+    """In the units of the model, over the cells; NaN where there is none."""
+    reason: Array
+    """Why there is none, as in `sweep.models.reversal_time.REASONS`, over the cells."""
+
+
+@dataclass(frozen=True)
 class Prediction:
     """Everything that is predicted for the cells and bodies of a grid."""
 
@@ -47,17 +59,40 @@ class Prediction:
     or friction are not the paper's."""
     stability: Stability | None
     """None for a tier that is not simulated, and where the eigenvalues were not asked for."""
+    reversal_time: ReversalTime | None = None
+    """None for a tier that does not offer it, and where it was not asked for."""
 
 
-def predict(tier: Tier, grid: Grid) -> Prediction:
-    """The whole prediction, with the eigenvalues where the tier is simulated."""
+def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction:
+    """The whole prediction, with the eigenvalues where the tier is simulated.
+
+    Parameters
+    ----------
+    measure : the measurements to be predicted; the time of the first reversal is if "first_reversal" is among them
+    """
     prediction = formulas(tier, grid)
     if not isinstance(tier, Model):
         return prediction
     if LINEAR not in tier.offers:
         nothing = np.full(grid.bodies()[0].size, np.nan)
-        return replace(prediction, stability=Stability((nothing, nothing), np.full((6, grid.size), np.nan)))
-    return replace(prediction, stability=_stability(tier, grid))
+        found = Stability((nothing, nothing), np.full((6, grid.size), np.nan))
+    else:
+        found = _stability(tier, grid)
+    timed = REVERSAL_TIME in tier.offers and FirstReversal.name in measure
+    return replace(prediction, stability=found, reversal_time=_reversal_time(tier, grid, found) if timed else None)
+
+
+def _reversal_time(model: Model, grid: Grid, found: Stability) -> ReversalTime:
+    """Only slip makes the spin of a body without couples critical."""
+    _, place = grid.bodies()
+    columns, slips = grid.columns(), "mu" in model.parameters
+    time, reason = np.full(grid.size, np.nan), np.full(grid.size, reversal_time.NOT_KNOWN)
+    possible = np.flatnonzero(~model.impossible(columns))
+    upper, lower = (n[place][possible] if slips else np.zeros(len(possible)) for n in found.n_c1)
+    *_, surface = general.parts(model.name)
+    theirs = {name: values[possible] for name, values in columns.items()}
+    time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
+    return ReversalTime(time, reason)
 
 
 def _stability(model: Model, grid: Grid) -> Stability:

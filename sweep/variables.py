@@ -37,6 +37,7 @@ _SI = {
     "in sqrt(g/c)": "radian s-1",
     "in sqrt(g c)": "m s-1",
     "in 1/sqrt(g c)": "s m-1",
+    "in 1/sqrt(c/g)": "s-1",
     "in m c sqrt(g c)": "kg m2 s-1",
 }
 """Units of SI for the paper's units, which the last words of a `long_name` tell.  Forces and energies of a moving body

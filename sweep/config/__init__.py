@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -204,9 +204,10 @@ _CHECKS: tuple[tuple[tuple[str, ...], Callable[[Config], str]], ...] = (
 def _with_method(checked: Any, model: Tier) -> Any:
     """The default method, filled in: `auto` where there is a choice and the step is not given."""
     integrator = checked.integrator
-    if "method" in integrator.model_fields_set:
+    alone = any(MEASURES[name].follows_tangent for name in _names(checked.measure or ()))
+    if "method" in integrator.model_fields_set and not (alone and integrator.method == methods.AUTO):
         return checked
-    choice = isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
+    choice = not alone and isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
     method = methods.AUTO if choice else methods.PLAIN
     return checked.model_copy(update={"integrator": integrator.model_copy(update={"method": method})})
 
@@ -251,11 +252,16 @@ def _misfits(
     if checked.refine:
         yield from _unrefinable(checked, model, source)
     yield from _unmeasurable(checked.measure or (), model, source)
+    for i, name in enumerate(_names(checked.measure or ())):
+        method = checked.integrator.method
+        if MEASURES[name].follows_tangent and not methods.METHODS[method].follows_tangents:
+            able = ", ".join(each for each, found in methods.METHODS.items() if found.follows_tangents)
+            yield source.fault(("measure", i), f"not measured with method: {method}; allowed: {able}")
 
 
 def _unmeasurable(specs: Sequence[str], model: Tier, source: document.Document) -> Iterator[Fault]:
     """Faults of the measurements asked for."""
-    names, possible = [spec.partition("=")[0] for spec in specs], measures.possible(model)
+    names, possible = _names(specs), measures.possible(model)
     for i, name in enumerate(names):
         if name not in possible:
             yield source.fault(
@@ -263,6 +269,11 @@ def _unmeasurable(specs: Sequence[str], model: Tier, source: document.Document) 
             )
         for needed in set(MEASURES[name].needs) - set(names):
             yield source.fault(("measure", i), f"measured with the {needed}; allowed: {needed} beside it")
+
+
+def _names(specs: Iterable[str]) -> list[str]:
+    """The names of measurements given by their specs."""
+    return [spec.partition("=")[0] for spec in specs]
 
 
 def _unrefinable(checked: Any, model: Tier, source: document.Document) -> Iterator[Fault]:

@@ -136,7 +136,7 @@ def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
 
 def fill(config: Config, grid: Grid, chosen: Sequence[Choice]) -> Plan:
     """Give each cell of `grid` its limits and start as well, in images of the kernels in `chosen`."""
-    prediction = predict(config.equations, grid)
+    prediction = predict(config.equations, grid, config.measure)
     assert prediction.stability is not None  # it is a model
     stable = prediction.stability.ranges
     parts = []

@@ -71,3 +71,5 @@ class Method:
     ended before does not depend on the limit."""
     stops_anywhere: bool = False
     """Whether a run may stop after any step and go on from there towards another goal."""
+    follows_tangents: bool = False
+    """Whether it can carry a tangent along each trajectory (`sweep.kernels.tangent`)."""

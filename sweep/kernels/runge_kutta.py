@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
+from sweep.kernels import tangent
 from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, steps_to
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.measures.measurement import Measurement
@@ -28,14 +30,33 @@ class RungeKuttaKernel(Kernel):
 
     def __init__(self, model: Model, tableau: Tableau, measurements: Sequence[Measurement]) -> None:
         self.method, self.tableau = tableau.name, tableau
-        self._lay_out(model, measurements)
-        self._compile_with(self._make_run_block())
+        self.follows_tangent = any(each.follows_tangent for each in measurements)
+        self._lay_out(model, measurements, tangent.rows(model) if self.follows_tangent else ())
+        run_block = self._make_run_block()
+        self._compile_with(self._with_tangent(run_block) if self.follows_tangent else run_block)
 
     def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
         """As `Kernel.images`; the steps taken are no longer than `step` and divide `t_end` evenly."""
         goal = steps_to(t_end, step)
         stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
-        return self._start(columns, t_end / goal, goal, stable_step, stable)
+        images = self._start(columns, t_end / goal, goal, stable_step, stable)
+        if self.follows_tangent:
+            table = self.table(images)
+            for name, values in tangent.start(self.model, self.states(images)).items():
+                table[name] = values
+        return images
+
+    def _with_tangent(self, run_block: Any) -> Any:
+        """Compiled (group) -> None: as `run_block`, and then the tangents take the same steps."""
+        step = make_step(self.tableau, make_extended(self.model), 2 * len(self.model.states))
+        follow = tangent.make_follow(step, self.model, self.constants, self.layout)
+
+        @exactly_compiled
+        def run_both(group: Any) -> None:
+            run_block(group)
+            follow(group)
+
+        return run_both
 
     def _make_run_block(self) -> Any:
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and calls the measurements after each."""
@@ -144,4 +165,5 @@ DOPRI5_METHOD = Method(
     # Of its first steps, in which the slip sets in, it integrates the work less exactly than the motion.
     balance=14.0,
     stops_anywhere=True,
+    follows_tangents=True,
 )

@@ -39,7 +39,7 @@ from sweep.jit import inline
 from sweep.models import bodies, noslip, slip, solid, starts, steady
 from sweep.models.couples import COUPLES, Couple, nothing
 from sweep.models.laws import LAWS, Law
-from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, Ripple, named
+from sweep.models.model import COUNT, ENERGY, LINEAR, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.solid import gyroscopic
 from sweep.models.surfaces import ELLIPSOID, SURFACES, Surface
 
@@ -226,7 +226,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
         states=slip.MODEL.states,
         spin_state=slip.MODEL.spin_state,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=_offers(couples, dissipates=True),
+        offers=_offers(couples, dissipates=True) | ({REVERSAL_TIME} if law.name == "viscous" else set()),
         constants=_record(surface, fields, more),
         start=lambda columns: starts.slipping(columns, surface),
         slower_period=lambda columns: solid.slower_period(columns, surface),
@@ -299,7 +299,7 @@ def _rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters:
         states=noslip.MODEL.states,
         spin_state=noslip.MODEL.spin_state,
         parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=_offers(couples, dissipates=bool(couples)),
+        offers=_offers(couples, dissipates=bool(couples)) | {REVERSAL_TIME},
         constants=_record(surface, names, values),
         start=lambda columns: starts.rolling(columns, surface),
         slower_period=lambda columns: solid.slower_period(columns, surface),

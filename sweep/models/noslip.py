@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.ellipsoid import contact
-from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, Model, Ripple
+from sweep.models.model import COUNT, ENERGY, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple
 from sweep.models.ripple import FORM, form, ripple
 from sweep.models.rocking import slower_period
 
@@ -108,7 +108,7 @@ MODEL = Model(
     states=("u1", "u2", "omega1", "omega2", "omega3"),
     spin_state=4,
     parameters=("a", "b", "c", "delta", "n0", "x0", "y0"),
-    offers=frozenset({COUNT, SPIN, ENERGY}),
+    offers=frozenset({COUNT, SPIN, ENERGY, REVERSAL_TIME}),
     constants=Constants,
     start=start,
     slower_period=slower_period,

@@ -21,7 +21,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models import ellipsoid, friction, model
 from sweep.models.ellipsoid import contact
-from sweep.models.model import COUNT, ENERGY, FORMULAS, MODES, SPIN, Array, Columns, Model, Ripple, named
+from sweep.models.model import COUNT, ENERGY, FORMULAS, MODES, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.ripple import FORM, form, ripple
 from sweep.models.rocking import Body, frequencies, slower_period
 
@@ -183,7 +183,7 @@ MODEL = Model(
     states=("u1", "u2", "omega1", "omega2", "omega3", "v1", "v2"),
     spin_state=4,
     parameters=("a", "b", "c", "delta", *friction.PARAMETERS, "n0", "x0", "y0"),
-    offers=frozenset({COUNT, SPIN, ENERGY, MODES, FORMULAS, model.LINEAR}),
+    offers=frozenset({COUNT, SPIN, ENERGY, MODES, FORMULAS, REVERSAL_TIME, model.LINEAR}),
     constants=Constants,
     start=start,
     slower_period=slower_period,

@@ -28,6 +28,12 @@ def rolling(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...]
     return u1, u2, columns["omega1"], columns["omega2"], columns["omega3"]
 
 
+def spin(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
+    """The spin n at t = 0, shape (cells,)."""
+    u1, u2, w1, w2, w3 = rolling(columns, surface)
+    return np.asarray(u1 * w1 + u2 * w2 - np.sqrt(1 - u1**2 - u2**2) * w3)
+
+
 def slipping(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...]:
     """As `rolling`, and the slip v1 and v2.
 

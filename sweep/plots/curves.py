@@ -16,12 +16,12 @@ from sweep.grid import Array
 from sweep.plots import labels, legends, theory
 from sweep.plots.axes import set_scale
 from sweep.plots.maps import arrangement
-from sweep.plots.marks import blank, legend, marks
+from sweep.plots.marks import COMPARISONS, PREDICTIONS, blank, legend, marks
 from sweep.plots.panels import Panels, heading, title
 from sweep.plots.scales import Limits
 
 _STYLES: dict[str, dict[str, Any]] = {
-    "reversals_predicted": {"marker": "s", "fillstyle": "none", "color": "C1"},
+    **{predicted: {"marker": "s", "fillstyle": "none", "color": "C1"} for predicted, _ in PREDICTIONS.values()},
     "failed": {"marker": "v", "color": "crimson"},
     "not_run": {"marker": "v", "color": "0.6", "fillstyle": "none"},
     "impossible": {"marker": "_", "color": "0.6"},
@@ -36,7 +36,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 def draw(panels: Panels, limits: Limits | None = None) -> Figure:
     """The variables over the one long axis, in a panel for each value of the others."""
-    dataset, names = panels.dataset, [name for name in panels.names if name != "difference" or len(panels.names) == 1]
+    dataset, names = panels.dataset, [name for name in panels.names if name not in COMPARISONS] or panels.names
     rows, columns = arrangement(len(panels.each), 2)
     width = min(7.0, 14 / columns)
     figure = Figure(figsize=(width * columns, 1.9 + 2.6 * rows), dpi=110, layout="constrained")
@@ -47,7 +47,8 @@ def draw(panels: Panels, limits: Limits | None = None) -> Figure:
     for k, (axes, panel) in enumerate(zip(grid.flat, panels.each, strict=False)):
         entries |= _panel(axes, dataset.isel(panel), names, x)
         axes.set_title(title(dataset, panel), fontsize=9)
-        axes.set_ylabel("spin reversals" if len(names) > 1 else labels.label(dataset, names[0]), fontsize=9)
+        counts = len(names) > 1 and names[0] == "reversals"
+        axes.set_ylabel("spin reversals" if counts else labels.label(dataset, names[0]), fontsize=9)
         if k + columns >= len(panels.each):
             axes.set_xlabel(labels.label(dataset, x) if x else "", fontsize=9)
             axes.tick_params(labelbottom=True)

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from sweep.grid import Array
 from sweep.plots import cells, labels, legends, scales, theory
 from sweep.plots.axes import set_scale
-from sweep.plots.marks import blank, legend, marks
+from sweep.plots.marks import COMPARISONS, blank, legend, marks
 from sweep.plots.panels import Panels, edges, heading, title
 from sweep.plots.scales import Limits, Scale
 
@@ -34,8 +34,15 @@ _SMALL = 4
 _OF_DIFFERENCES = ("failed", "not_run", "impossible", "time_limit")
 """Kinds of cell marked on maps of differences too; the map of the simulated counts beside it has all."""
 
-_TITLES = {"reversals": "simulated", "reversals_predicted": "predicted (Takano 2011)"}
-_SMALL_TITLES = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
+_TITLES = {
+    "reversals": "simulated",
+    "reversals_predicted": "predicted (Takano 2011)",
+    "t_first_reversal": "simulated",
+    "t_first_reversal_predicted": "predicted (Garcia and Hubbard 1988)",
+}
+_SMALL_TITLES = dict.fromkeys(("reversals", "t_first_reversal"), "simulated")
+_SMALL_TITLES |= dict.fromkeys(("reversals_predicted", "t_first_reversal_predicted"), "predicted")
+_SMALL_TITLES |= {name: name for name in COMPARISONS}
 
 
 def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Figure:
@@ -71,8 +78,9 @@ def _columns(panels: Panels) -> list[str]:
     """The variables of a panel in their order, and "" for each bar: after the last map that shares its scale."""
     if "flag_values" in panels.dataset[panels.names[0]].attrs:  # told in the legend
         return panels.names
-    counted = [name for name in panels.names if name != "difference"]
-    return [*counted, *([""] if counted else []), *(["difference", ""] if "difference" in panels.names else [])]
+    counted = [name for name in panels.names if name not in COMPARISONS]
+    compared = [name for name in panels.names if name in COMPARISONS]
+    return [*counted, *([""] if counted else []), *(each for name in compared for each in (name, ""))]
 
 
 def arrangement(panels: int, maps: int) -> tuple[int, int]:
@@ -111,7 +119,7 @@ def draw_map(
     axes.set(xlim=around[1][[0, -1]], ylim=around[0][[0, -1]])
     dark = np.where(empty, False, scale.lightness(np.where(empty, values.ravel()[0], values)) < 0.5)
     arrays = {kind: where.transpose(down, right).values for kind, where in kinds.items()}
-    if name == "difference":
+    if name in COMPARISONS:
         arrays = {kind: where for kind, where in arrays.items() if kind in _OF_DIFFERENCES}
     cells.draw(axes, arrays, around, dark)
     if name not in theory.REVERSALS:
@@ -120,24 +128,24 @@ def draw_map(
 
 
 def _scale(chosen: xr.Dataset, panels: Panels, name: str, limits: Limits | None, cmap: str | None) -> Scale:
-    """The scale of a map: simulated and predicted counts of a panel share theirs."""
+    """The scale of a map: what is simulated and what is predicted of a panel share theirs."""
     if "flag_values" in chosen[name].attrs:
-        return scales.flags(_flags_present(panels.dataset[name]), cmap)
+        return scales.flags(list(_flags_present(panels.dataset, name)), cmap)
+    own = (limits, cmap) if panels.names == [name] else (None, None)
     if name == "difference":
-        alone = panels.names == [name]
-        return scales.differences(_values(chosen, name), limits if alone else None, cmap if alone else None)
-    if chosen[name].dtype.kind == "i":
-        together = [other for other in panels.names if other != "difference"]
-        return scales.counts(np.concatenate([_values(chosen, other) for other in together]), limits, cmap)
-    return scales.continuous(_values(chosen, name), limits, cmap)
+        return scales.differences(_values(chosen, name), *own)
+    if name == "ratio":
+        return scales.ratios(_values(chosen, name), *own)
+    together = np.concatenate([_values(chosen, other) for other in panels.names if other not in COMPARISONS])
+    return (scales.counts if chosen[name].dtype.kind == "i" else scales.continuous)(together, limits, cmap)
 
 
 def shared_scale(each: list[Panels], limits: Limits | None, cmap: str | None) -> Scale:
     """The scale of the first variable of several datasets."""
     name = each[0].names[0]
-    flagged = [panels.dataset[name] for panels in each if "flag_values" in panels.dataset[name].attrs]
+    flagged = [panels.dataset for panels in each if "flag_values" in panels.dataset[name].attrs]
     if flagged:
-        return scales.flags(sorted({value for flags in flagged for value in _flags_present(flags)}), cmap)
+        return scales.flags(sorted({value for dataset in flagged for value in _flags_present(dataset, name)}), cmap)
     values = np.concatenate([_values(panels.dataset, name) for panels in each])
     if name == "difference":
         return scales.differences(values, limits, cmap)
@@ -150,8 +158,11 @@ def _values(chosen: xr.Dataset, name: str) -> Array:
     return values if values.size else np.zeros(1, chosen[name].dtype)
 
 
-def _flags_present(flags: xr.DataArray) -> list[int]:
-    return [int(value) for value in np.unique(flags)]
+def _flags_present(dataset: xr.Dataset, name: str) -> dict[int, int]:
+    """In how many cells with a result each value of a variable with flags occurs; if there are none, in all."""
+    values, empty = dataset[name].values, blank(marks(dataset, name)).values
+    present, counts = np.unique(values if empty.all() else values[~empty], return_counts=True)
+    return dict(zip(present.tolist(), counts.tolist(), strict=True))
 
 
 def _title(panels: Panels, name: str, panel: dict[str, int], *, small: bool) -> str:
@@ -178,7 +189,7 @@ def label_axes(axes: Axes, panels: Panels, *, left: bool = True, lowest: bool = 
 def draw_bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
     """Draw the bar of a scale, with what it shows."""
     bar = Colorbar(axes, scale.mappable())
-    words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name)
+    words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name.removesuffix("_predicted"))
     bar.set_label(words, fontsize=8)
     axes.tick_params(labelsize=7)
     scale.label(bar)
@@ -189,11 +200,11 @@ def _legend(figure: Figure, panels: Panels, lines: dict[str, Artist]) -> None:
     dataset, name = panels.dataset, panels.names[0]
     handles: list[Artist] = []
     if meanings := labels.flag_words(dataset, name):
-        present = _flags_present(dataset[name])
-        colours = scales.flags(present).rgba(np.array(present))
-        for value, colour in zip(present, colours, strict=True):
-            count = f"{int((dataset[name] == value).sum())} of {dataset[name].size}"
-            handles.append(Patch(facecolor=colour, edgecolor="0.3", label=f"{meanings.get(value, value)} ({count})"))
+        present = _flags_present(dataset, name)
+        colours = scales.flags(list(present)).rgba(np.array(list(present)))
+        for (value, count), colour in zip(present.items(), colours, strict=True):
+            words = f"{meanings.get(value, value)} ({count} of {dataset[name].size})"
+            handles.append(Patch(facecolor=colour, edgecolor="0.3", label=words))
     handles += [cells.handle(kind, words) for kind, words in legend(dataset, name).items()]
     handles += lines.values()
     legends.below(figure, handles)

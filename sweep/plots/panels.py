@@ -17,7 +17,7 @@ import xarray as xr
 from sweep.grid import Array
 from sweep.models.analytic import best_b
 from sweep.plots import labels
-from sweep.plots.marks import field
+from sweep.plots.marks import PREDICTIONS, field
 
 MAX_PANELS = 8
 """Panels that a figure may have."""
@@ -146,13 +146,18 @@ def _midpoints(values: Array) -> Array:
 
 
 def _variables(dataset: xr.Dataset, variable: str | None) -> list[str]:
-    """The variables to draw: by default the reversals, simulated and predicted, and their difference."""
-    both = [name for name in ("reversals", "reversals_predicted") if name in dataset]
-    names = [*both, *(["difference"] if len(both) == 2 else [])]
-    if variable is not None or not names:
-        names = [variable or "spin_final"]
-    field(dataset, names[0])  # raises if there is none
-    return names
+    """The variables to draw: by default the reversals; those with a prediction beside it, and how the two compare."""
+    if variable is None:
+        variable = next((name for name in ("reversals", "reversals_predicted") if name in dataset), "spin_final")
+        if variable in PREDICTIONS:
+            return _beside_prediction(dataset, variable)
+    field(dataset, variable)  # raises if there is none
+    return _beside_prediction(dataset, variable) if variable == "t_first_reversal" else [variable]
+
+
+def _beside_prediction(dataset: xr.Dataset, variable: str) -> list[str]:
+    predicted, comparison = PREDICTIONS[variable]
+    return [variable, predicted, comparison] if predicted in dataset else [variable]
 
 
 def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:

@@ -46,7 +46,9 @@ def plot(
     ----------
     dataset : a dataset, or the path of its file.  Of several, maps of one variable are drawn side by side, with one
         scale
-    variable : by default the reversals, simulated and predicted, and `difference`, which may also be named
+    variable : by default the reversals, simulated and predicted, and `difference`, which may also be named; of
+        `t_first_reversal` the prediction and the `ratio` are drawn beside it; `regime` is told from the measurements
+        `reversals`, `cycles` and `lyapunov`
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
         the values of the other axes gets a panel, up to eight
     sel : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import exp, log
 from typing import Literal
 
 import matplotlib as mpl
@@ -26,6 +27,9 @@ _MAX_COUNTS = 24
 
 _MAX_DIFFERENCES = 10
 """Colours on each side of zero of a scale of differences."""
+
+_MAX_RATIO = 2.0
+"""Ratios beyond this, or below its inverse, share the last colours."""
 
 _MAX_TICKS = 12
 
@@ -50,7 +54,12 @@ class Scale:
         return ScalarMappable(self.norm, self.colours)
 
     def label(self, bar: Colorbar) -> None:
-        """Write the labels beside the bar of a scale of steps."""
+        """Write the labels beside the bar of a scale of steps, and of a logarithmic one without a power of ten."""
+        low, high = self.norm.vmin or 0.0, self.norm.vmax or 0.0
+        if isinstance(self.norm, LogNorm) and 0.1 < low < high < 10:
+            ticks = np.geomspace(low, high, 5)
+            bar.set_ticks(ticks.tolist(), labels=[f"{tick:.2g}" for tick in ticks])
+            bar.ax.minorticks_off()
         if not isinstance(self.norm, BoundaryNorm) or self.labels is None:
             return
         boundaries = np.asarray(self.norm.boundaries)
@@ -103,6 +112,13 @@ def continuous(values: Array, limits: Limits | None = None, name: str | None = N
         return Scale(colour_map(name or DIVERGING), Normalize(-high, high))
     norm = LogNorm(low, high) if low > 0 and high > 100 * low else Normalize(low, high)
     return Scale(colour_map(name or SEQUENTIAL), norm)
+
+
+def ratios(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
+    """A diverging scale of positive numbers, logarithmic and the same on both sides of one."""
+    finite = np.abs(np.log(values[np.isfinite(values) & (values > 0)]))
+    top = max(np.abs(np.log(limits))) if limits else min(float(finite.max(initial=0.01)), log(_MAX_RATIO))
+    return Scale(colour_map(name or DIVERGING), LogNorm(exp(-top), exp(top)))
 
 
 def flags(present: list[int], name: str | None = None) -> Scale:

@@ -15,6 +15,7 @@ from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
+from sweep.models import reversal_time
 from sweep.models.scene import PAPER, SI
 from sweep.models.surfaces import ELLIPSOID
 from sweep.prediction import Prediction
@@ -64,6 +65,12 @@ VARIABLES: dict[str, Variable] = {
     "step": Variable("float64", "1", "integration step, in sqrt(c/g)"),
     "step_rule": Variable("int8", "1", "what set the integration step", STEP_RULES),
     "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),
+    "t_first_reversal_predicted": Variable(
+        "float64", "1", "time of the first spin reversal predicted by Garcia and Hubbard (1988), in sqrt(c/g)"
+    ),
+    "reversal_time_reason": Variable(
+        "int8", "1", "whether there is a predicted time of the first reversal, and why not", reversal_time.REASONS
+    ),
     "n_c1_plus": _critical("+", "a tiny rattle grows", _FORMULA),
     "n_c1_minus": _critical("-", "a tiny rattle grows", _FORMULA),
     "n_c2_plus": _critical("+", "the spin reverses", _FORMULA),
@@ -122,6 +129,8 @@ def predicted(prediction: Prediction) -> dict[str, Array]:
     if stability := prediction.stability:
         finite = [np.where(np.isfinite(n), n, np.nan) for n in stability.n_c1]
         result["n_c1_plus_linear"], result["n_c1_minus_linear"] = finite
+    if found := prediction.reversal_time:
+        result |= {"t_first_reversal_predicted": found.time, "reversal_time_reason": found.reason}
     return result
 
 

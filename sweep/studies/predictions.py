@@ -15,6 +15,8 @@ from sweep.results import dataset
 def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """The predictions alone, of the paper and of the linear theory, on the grid of `config`.
 
+    With the measurement `first_reversal` the time of the first reversal is predicted as well.
+
     Parameters
     ----------
     config : a configuration, a mapping that says what its file would, or the path of a file
@@ -27,4 +29,4 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """
     config = load_config(config, overrides)
     grid = Grid.of(config)
-    return dataset.label(config, grid, dataset.predicted(prediction.predict(config.tier, grid)), {})
+    return dataset.label(config, grid, dataset.predicted(prediction.predict(config.tier, grid, config.measure)), {})

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from sweep.kernels.measures.cycles import Cycles
 from sweep.kernels.measures.energy import EnergyError
 from sweep.kernels.measures.first_reversal import FirstReversal
+from sweep.kernels.measures.lyapunov import Lyapunov
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.measures.noise import NoiseLimited
 from sweep.kernels.measures.raw_reversals import RawReversals
@@ -17,6 +19,7 @@ from sweep.models.model import Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
     Reversals, EnergyError, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Sensitivity,
+    Cycles, Lyapunov,
 )  # fmt: skip
 
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}

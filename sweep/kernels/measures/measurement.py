@@ -74,6 +74,9 @@ class Measurement:
     """Whether it uses the work of friction in each step, which some methods compute only on request."""
     follows_ripple: ClassVar[bool] = False
     """Whether it uses the ripple-free spin in each step."""
+    follows_tangent: ClassVar[bool] = False
+    """Whether it uses how fast a tangent grows (`sweep.kernels.tangent`), which needs a method that
+    `Method.follows_tangents`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
@@ -95,7 +98,7 @@ class Measurement:
         """Whether a kernel with it differs from one without: whether it has a quantity, or a hook in the loop."""
         hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_look")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
-        return bool(self.rows) or own or self.follows_work or self.follows_ripple
+        return bool(self.rows) or own or self.follows_work or self.follows_ripple or self.follows_tangent
 
     def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.

@@ -1,0 +1,101 @@
+"""The largest Lyapunov exponent: the mean rate at which a tangent grows (`sweep.kernels.tangent`).
+
+The growth is added up in bins of equal length.  When all `BINS` are full, pairs are merged and bins become twice as
+long, so that however long the trajectory is, between half and all of them are full.  The exponent is the mean over the
+later half of the full bins, which leaves out the start; its error is their scatter divided by the root of their number.
+
+That is the statistical error for chaotic motion, whose bins are long against its memory.  In regular motion the
+distance grows like the time at most, so that the exponent of a trajectory of the length T comes out as ln 2 / (T/2) or
+less, beside what the distance oscillates by.  See `docs/explanation/regimes.md`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.kernels.layout import BLOCK, LANES, Layout, Table
+from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.tangent import GROWTH
+from sweep.models.model import SPIN, Array, Columns, Model
+from sweep.variables import Variable
+
+BINS = 32
+"""Even; the exponent is the mean over 8 to 16 of them."""
+
+_FEWEST = 8
+"""Full bins below which there is no exponent: the trajectory has ended after fewer looks."""
+
+
+@dataclass(frozen=True)
+class Lyapunov(Measurement):
+    name = "lyapunov"
+    summary = "largest Lyapunov exponent, with its statistical error, at about twice the cost; with dopri5 alone"
+    asks = SPIN
+    follows_tangent = True
+
+    variables = {
+        "lyapunov": Variable(
+            "float64", "1", "largest Lyapunov exponent over the later half of the trajectory, in 1/sqrt(c/g)",
+            of_sound_runs=True,
+        ),
+        "lyapunov_error": Variable(
+            "float64", "1", "standard error of the largest Lyapunov exponent, in 1/sqrt(c/g)", of_sound_runs=True
+        ),
+    }  # fmt: skip
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        return ("bin_width", "bin_looks", "bin_growth", "full_bins", *self._bins)
+
+    @property
+    def _bins(self) -> tuple[str, ...]:
+        return tuple(f"bin{k}" for k in range(BINS))
+
+    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+        return {"bin_width": 1.0}
+
+    def make_look(self, layout: Layout) -> Any:
+        WIDTH, LOOKS, SUM, FULL, FIRST, GREW, DONE = map(
+            layout.at, ("bin_width", "bin_looks", "bin_growth", "full_bins", "bin0", GROWTH, "done")
+        )
+        lanes, bins, block = LANES, BINS, BLOCK
+
+        @inline
+        def look(
+            group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, inertia: Any, total: Any
+        ) -> None:
+            # A block that the end has cut short does not count.
+            if running & (group[DONE + lane] % block == 0.0):
+                group[SUM + lane] += group[GREW + lane]
+                group[LOOKS + lane] += 1.0
+                if group[LOOKS + lane] == group[WIDTH + lane]:
+                    full = int(group[FULL + lane])
+                    group[FIRST + full * lanes + lane] = group[SUM + lane]
+                    group[SUM + lane] = group[LOOKS + lane] = 0.0
+                    if full + 1 == bins:
+                        for k in range(bins // 2):
+                            pair = FIRST + 2 * k * lanes + lane
+                            group[FIRST + k * lanes + lane] = group[pair] + group[pair + lanes]
+                        group[WIDTH + lane] *= 2.0
+                        full = bins // 2 - 1
+                    group[FULL + lane] = full + 1.0
+
+        return look
+
+    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
+        full = table["full_bins"][:, None]
+        rates = table.columns(self._bins) / (table["bin_width"] * BLOCK * table["step"])[:, None]
+        place = np.arange(BINS)
+        used = (place >= full - full // 2) & (place < full)
+        number = used.sum(axis=1)
+        enough = full[:, 0] >= _FEWEST
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = np.where(used, rates, 0).sum(axis=1) / number
+            scatter = np.where(used, (rates - mean[:, None]) ** 2, 0).sum(axis=1)
+            error = np.sqrt(scatter / (number - 1) / number)
+        return {"lyapunov": np.where(enough, mean, np.nan), "lyapunov_error": np.where(enough, error, np.nan)}

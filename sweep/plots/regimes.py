@@ -1,0 +1,50 @@
+"""Regimes of motion: what becomes of a body, told from what a run has measured of it.
+
+From the dataset alone, and without any library that draws.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from sweep.kernels.status import SETTLED
+
+SETTLES, FEW, REGULAR, WANDERS, UNDECIDED = range(5)
+REGIMES = {
+    SETTLES: "settles",
+    FEW: "few_reversals",
+    REGULAR: "reverses_regularly",
+    WANDERS: "wanders",
+    UNDECIDED: "undecided",
+}
+
+FEWEST = 4
+"""Reversals below which nothing is said about their regularity: two cycles."""
+
+SAME = 0.01
+"""Variation of the cycles, relative to their mean, below which a body reverses regularly."""
+
+SURE = 3.0
+"""Standard errors above zero beyond which a Lyapunov exponent is taken for positive."""
+
+NEEDS = ("status", "reversals", "cycle_variation", "lyapunov", "lyapunov_error")
+"""The variables from which the regime is told."""
+
+
+def regimes(dataset: xr.Dataset) -> xr.DataArray:
+    """The regime of each cell, one of `REGIMES`.
+
+    A body that has settled reverses no more.  Of the others, those that have reversed less than `FEWEST` times until
+    the time limit are set apart.  If the lengths of the cycles vary by less than `SAME`, the body reverses regularly;
+    if they vary more and the largest Lyapunov exponent is positive by `SURE` standard errors, it wanders.  If neither,
+    the run was too short to tell quasi-periodic motion from chaos.
+    """
+    status, reversals, variation, exponent, error = (dataset[name] for name in NEEDS)
+    conditions = [status == SETTLED, reversals < FEWEST, variation < SAME, exponent > SURE * error]
+    kinds = [SETTLES, FEW, REGULAR, WANDERS]
+    found = np.select([condition.values for condition in conditions], kinds, UNDECIDED).astype("int8")
+    words = {"flag_values": np.array(list(REGIMES), "int8"), "flag_meanings": " ".join(REGIMES.values())}
+    return xr.DataArray(
+        found, status.coords, status.dims, "regime", {"long_name": "regime of motion", "units": "1", **words}
+    )
