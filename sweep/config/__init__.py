@@ -21,6 +21,7 @@ from sweep.config.plain import plain
 from sweep.config.schema import Config, Integrator, Values
 from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.kernels import measures, methods
+from sweep.kernels.differentiate import undifferentiable
 from sweep.kernels.measures import MEASURES
 from sweep.models.model import Model, Tier
 from sweep.models.scene import SI
@@ -257,6 +258,8 @@ def _misfits(
         if MEASURES[name].follows_tangent and not methods.METHODS[method].follows_tangents:
             able = ", ".join(each for each, found in methods.METHODS.items() if found.follows_tangents)
             yield source.fault(("measure", i), f"not measured with method: {method}; allowed: {able}")
+        elif MEASURES[name].follows_tangent and isinstance(model, Model) and (reason := undifferentiable(model)):
+            yield source.fault(("measure", i), f"not measured on the {model.name} model: {reason}; allowed: others")
 
 
 def _unmeasurable(specs: Sequence[str], model: Tier, source: document.Document) -> Iterator[Fault]:

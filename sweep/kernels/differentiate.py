@@ -53,7 +53,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
                 product = product * inputs[0]
             return product
         if ufunc not in {**_ONE, **_TWO} or method != "__call__" or options:
-            return NotImplemented
+            raise TypeError(f"{ufunc.__name__} cannot be differentiated")
         number = len(self.lines)
         words = {"r": f"t{number}"}
         for key, each in zip("ab", inputs, strict=False):
@@ -71,13 +71,18 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         return Traced(self.lines, f"t{number}", f"d{number}" if changes else _ZERO)
 
     def __bool__(self) -> bool:
-        raise TypeError("a right-hand side that branches cannot be differentiated")
+        raise TypeError("a branch cannot be differentiated")
 
 
 def make_extended(model: Model) -> Any:
     """Inline (z, constants) -> (slopes, (0.0, 0.0, 1.0, 1.0)) for z = (states, direction), as a right-hand side.
 
     The slopes are those of the states, and their derivative in the direction.
+
+    Raises
+    ------
+    TypeError
+        if the right-hand side of the model is not plain arithmetic.
     """
     lines: list[str] = []
     n = len(model.states)
@@ -89,3 +94,12 @@ def make_extended(model: Model) -> Any:
     body = [f"    {line}" for line in lines]
     source = "\n".join(["def extended(z, p):", *body, f"    return {result}, (0.0, 0.0, 1.0, 1.0)"])
     return compile_inline("extended", source, {"np": np})
+
+
+def undifferentiable(model: Model) -> str:
+    """Why the right-hand side of a model cannot be differentiated; "" if it can."""
+    try:
+        make_extended(model)
+    except (TypeError, AttributeError) as error:
+        return str(error)
+    return ""

@@ -34,7 +34,7 @@ _FEWEST = 8
 @dataclass(frozen=True)
 class Lyapunov(Measurement):
     name = "lyapunov"
-    summary = "largest Lyapunov exponent, with its statistical error, at about twice the cost; with dopri5 alone"
+    summary = "largest Lyapunov exponent, with its statistical error, at three times the cost; with dopri5 alone"
     asks = SPIN
     follows_tangent = True
 

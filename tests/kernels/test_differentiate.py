@@ -1,0 +1,53 @@
+"""Traced derivatives of right-hand sides, against complex steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sweep.kernels.differentiate import Traced, make_extended
+from sweep.models import MODELS, find
+from sweep.models.laws import LAWS
+
+COUPLES = ("slip+viscous+sigma+rolling", "noslip+solid+sigma+rolling")
+
+
+@pytest.mark.parametrize("name", [*MODELS, *(f"slip+{law}" for law in LAWS), "noslip+solid", *COUPLES])
+def test_it_is_the_derivative_by_a_complex_step(name: str) -> None:
+    model, random = find(name), np.random.default_rng(1)
+    n, extended = len(model.states), make_extended(find(name))
+    constants = model.constants(*random.uniform(0.5, 1.5, len(model.constants._fields)))
+    for _ in range(20):
+        y, v = random.uniform(-0.2, 0.2, n), random.normal(size=n)
+        slopes, _ = extended((*y, *v), constants)
+        stepped, _ = model.rhs(tuple(y + 1e-30j * v), constants)
+        scale = np.abs(slopes).max()
+        np.testing.assert_allclose(slopes[:n], np.real(stepped), rtol=1e-12, atol=1e-13 * scale)
+        np.testing.assert_allclose(slopes[n:], np.imag(stepped) / 1e-30, rtol=1e-9, atol=1e-12 * scale)
+
+
+def test_every_operation_has_its_derivative() -> None:
+    """As difference quotients have it, on both sides of a bend."""
+
+    def function(x: object, y: object) -> list[object]:
+        return [
+            x + y, 2 - x, x * y * 3, y / x, 1 / y, x / 2, -x, x**3, np.sqrt(y), abs(x), np.exp(x), np.log(y), np.sin(x),
+            np.cos(x), np.tanh(x), np.square(y), np.minimum(x, y), np.maximum(x, 0.1), np.minimum(0.1, y) * x,
+        ]  # fmt: skip
+
+    for at in ((0.7, 0.4), (-0.3, 0.8), (0.05, 0.06)):
+        lines: list[str] = []
+        found = function(Traced(lines, "x", "dx"), Traced(lines, "y", "dy"))
+        names = {"np": np, "x": at[0], "y": at[1], "dx": 0.6, "dy": -0.8}
+        exec("\n".join(lines), names)
+        ahead, behind = (function(at[0] + h * 0.6, at[1] - h * 0.8) for h in (1e-6, -1e-6))
+        for each, here, after, before in zip(found, function(*at), ahead, behind, strict=True):
+            assert eval(each.value, names) == pytest.approx(here)
+            assert eval(each.slope, names) == pytest.approx((after - before) / 2e-6, rel=1e-8, abs=1e-8)
+
+
+def test_a_branch_is_refused() -> None:
+    with pytest.raises(TypeError, match="greater cannot be differentiated"):
+        np.greater(Traced([], "x", "dx"), 0)
+    with pytest.raises(TypeError, match="a branch cannot"):
+        bool(Traced([], "x", "dx"))
