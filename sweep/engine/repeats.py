@@ -30,7 +30,8 @@ ROUNDS, FALSE_ROUNDS = 3, 8
 falsely, because then its numbers are worth nothing."""
 
 MOST_STEPS = 1e8
-"""Steps beyond which a repeat is not tried: a minute for one cell, or for all that fill the lanes beside it."""
+"""Steps beyond which a repeat is not tried: a minute for one cell, or for all that fill the lanes beside it.  If only
+the way to a failure is shorter, that is repeated, once."""
 
 SAME = 1e-6
 """Largest difference of the times at which two runs meet the same failure, in sqrt(c/g)."""
@@ -169,25 +170,41 @@ def cells_of(plans: Sequence[Plan], method: str, kernel: Kernel, images: Array) 
 def _repeat(cells: Cells, rows: Array, first: Cells, after_chunk: Callable[[], None]) -> None:
     """Decide the cells with the indices `rows`; `first` are these cells after their first run."""
     now, met, halvings = first, Met.nothing(len(rows)), 0
+    brief = np.zeros(len(rows), bool)
+    """Whether a repeat goes to where the run before failed, and no further."""
     while len(rows):
+        before = now
         if halvings:
+            most = np.where(brief, 2 * (now.kernel.table(now.images)["done"] + _BEYOND), np.inf)
             now = replace(now, images=now.start(halvings))
-            executor.execute(now.kernel, now.images, stop_when_settled=now.stop_when_settled, after_chunk=after_chunk)
+            _run(now, most, after_chunk)
         met, met_before = _meet(now, halvings, after_chunk), met
         table = now.kernel.table(now.images)
         if cells.fixed:
             last, within = np.full(len(rows), halvings == 1), now.step
         else:
             rounds = np.where(now.failed & ~met.agrees(met_before, np.inf), FALSE_ROUNDS, ROUNDS)
-            last = (halvings >= rounds) | (2 * table["goal"] > MOST_STEPS)
+            long, failed_late = 2 * table["goal"] > MOST_STEPS, 2 * table["done"] > MOST_STEPS
+            last = (halvings >= rounds) | (long & (brief | ~now.failed | failed_late))
             within = np.where(last & ~now.unsound, np.inf, SAME)
         true = met.agrees(met_before, within)
         table["missed"] = missed = ~true & ~(now.excess <= 1)
         over = ~missed | last
-        images = (first if cells.fixed else now).images[over]
+        # A brief run that did not fail is no result.
+        images = np.where((brief & ~true)[:, None], before.images, (first if cells.fixed else now).images)[over]
         cells.images[rows[over]] = _concluded(cells.kernel, images, met.take(over), true[over])
-        rows, first, now, met = rows[~over], first.take(~over), now.take(~over), met.take(~over)
+        brief = np.zeros(len(rows), bool) if cells.fixed else long
+        rows, first, now, met, brief = rows[~over], first.take(~over), now.take(~over), met.take(~over), brief[~over]
         halvings += 1
+
+
+def _run(cells: Cells, most: Array, after_chunk: Callable[[], None]) -> None:
+    """Run the cells to their ends, or until they have taken `most` steps, shape (cells,)."""
+    goal = cells.kernel.table(cells.images)["goal"]
+    wanted = goal.copy()
+    goal[:] = np.minimum(wanted, most)
+    executor.execute(cells.kernel, cells.images, stop_when_settled=cells.stop_when_settled, after_chunk=after_chunk)
+    goal[:] = wanted
 
 
 @dataclass(frozen=True)

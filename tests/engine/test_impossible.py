@@ -133,3 +133,21 @@ def test_what_is_refused(write: Write) -> None:
     assert "cells:  18" in estimate(config)
     predicted = sweep.predict(config)["n_c1_plus_linear"].transpose("b", "offset").values
     np.testing.assert_array_equal(np.isnan(predicted), GONE)
+
+
+@pytest.mark.parametrize("change", [{"Izz": [21.0, 30.0]}, {"Ixy": [-0.3, -10.0]}])
+def test_no_number_is_made_up_for_a_body_that_cannot_be(write: Write, change: dict[str, list[float]]) -> None:
+    """Its moments break the triangle inequality, or its matrix is not positive definite."""
+    text = "body: {Ixx: 2, Iyy: 20, Izz: 21, Ixy: -0.3}\nfriction: {mu: 60}\nstart: {n0: 0.05}\n"
+    config = load_config(write(text + "integrator: {t_end: 100, step: 0.02}\n"), change)
+    predicted = sweep.predict(config)["n_c1_plus_linear"].values
+    np.testing.assert_array_equal(np.isnan(predicted), [False, True])
+    assert sweep.run(config)["status"].values.tolist() == [2, IMPOSSIBLE]
+
+
+def test_a_fixed_step_is_judged_by_the_bodies_that_there_are(write: Write) -> None:
+    """With so small a moment the rattle would be faster."""
+    text = "body: {Ixx: [2, 1.0e-3], Iyy: 20, Izz: 21, Ixy: 0}\nfriction: {mu: 60}\nintegrator: {step: 0.8}\n"
+    assert load_config(write(text)).integrator.step == 0.8
+    with pytest.raises(ConfigError, match="a quarter of the rattle's period"):
+        load_config(write(text), {"Izz": 20.0})

@@ -79,6 +79,34 @@ def test_a_false_paradox_at_strong_friction(cells: Callable[..., xr.Dataset]) ->
     assert float(found.spin_final[0]) == pytest.approx(adaptive.spin(columns(**STIFF), 14.5, "Radau"), abs=1e-7)
 
 
+VIOLENT = {"b": 3.0, "mu": 200.0, "n0": 3.0, "x0": 5.0, "y0": 0.01}
+"""A body that leaves the plane at once, while its friction needs 1e8 steps of dopri5 to t = 400."""
+
+
+@pytest.mark.parametrize("method", ["adams", "dopri5"])
+def test_a_failure_is_confirmed_however_long_the_whole_run_would_be(
+    cells: Callable[..., xr.Dataset], method: str
+) -> None:
+    found = cells([VIOLENT], method=method, t_end=400.0)
+    assert (int(found.status[0]), float(found.t_stop[0])) == (LIFT_OFF, 0.0)
+
+
+def test_failures_on_the_way_of_a_run_that_is_too_long(
+    cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each is repeated to where it failed; a false one is not called a failure of the body."""
+    expected = cells(ENDS.values(), method="dopri5", t_end=50.0)
+    monkeypatch.setattr(repeats, "MOST_STEPS", 2 * 50.0 / float(expected.step.max()))
+    found = cells(ENDS.values(), method="dopri5", t_end=5000.0)
+    assert found.status.values.tolist() == list(ENDS)
+    np.testing.assert_allclose(found.t_stop, expected.t_stop, rtol=0, atol=1e-6)
+    lengthen(monkeypatch, 50)
+    monkeypatch.setattr(repeats, "MOST_STEPS", 1e4)
+    false = cells([THIN], method="dopri5", t_end=100.0)
+    assert int(false.status[0]) == DIVERGED
+    assert float(false.t_stop[0]) < 100.0
+
+
 def test_without_a_second_look_both_would_be_paradoxes(
     cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch
 ) -> None:
