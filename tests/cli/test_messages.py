@@ -29,7 +29,7 @@ MEANT = {
     "rnu": "Did you mean 'run'?",
     "run c.yaml --outptu x": "Did you mean '--output'?",
     "run c.yaml --set fricton.mu=3": "--set fricton.mu: fricton: unknown key (did you mean friction?); allowed: name",
-    "run c.yaml --set body.detla=3": "--set body.detla: unknown key (did you mean delta?); allowed: a, b, c, delta",
+    "run c.yaml --set body.detla=3": "--set body.detla: unknown key (did you mean delta?); allowed: surface, a, b, c",
     "run c.yaml --set mux=3": "--set mux: unknown key (did you mean friction.mu?)",
     "run c.yaml --set model=sllip": "--set model: 'sllip' (did you mean slip?); allowed: slip",
     "run c.yaml --set method=ADAM": "--set method: 'ADAM' (did you mean adams?); allowed: dopri5",
