@@ -93,6 +93,7 @@ PARAMETERS: dict[str, Parameter] = {
             "speed_stick", "friction", "1", "slip velocity over which static friction sets in, in sqrt(g c)", None,
             above=0, below=1e6,
         ),
+        Parameter("radius_contact", "friction", "1", "radius of the contact, in c", None, above=0, below=1e6),
         Parameter(
             "mu_viscous", "friction", "1", "viscous part of the coefficient of friction, in 1/sqrt(g c)", 0.0,
             at_least=0, below=1e12,

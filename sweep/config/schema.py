@@ -256,7 +256,7 @@ class _Words(_Strict):
 
 
 class Law(_Words):
-    law: Literal["viscous", "coulomb", "stribeck", "none"] = Field(
+    law: Literal["viscous", "coulomb", "stribeck", "contensou", "none"] = Field(
         default="viscous", description="law of slip friction"
     )
     regularisation: Literal["sqrt", "tanh", "cubic"] = Field(

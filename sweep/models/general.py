@@ -101,9 +101,10 @@ def _record(surface: Surface, constants: Sequence[str], more: Any) -> type[Any]:
     return Constants
 
 
-def _couple_constants(couples: Sequence[Couple]) -> tuple[tuple[str, ...], Any]:
+def _couple_constants(couples: Sequence[Couple], law: Law | None = None) -> tuple[tuple[str, ...], Any]:
     names = tuple(name for couple in couples for name in couple.constants)
     stopping = [couple.stops_below for couple in couples if couple.stops_below]
+    stopping = [law.stops_below] if law and law.stops_below else stopping
 
     def values(columns: Columns) -> tuple[Array, ...]:
         still = (_still(stops_below(columns), columns) for stops_below in stopping)
@@ -126,21 +127,46 @@ def resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
     return found[0], found[1]
 
 
-def _drag(couples: Sequence[Couple]) -> tuple[Any, Any]:
-    """Inline, (k, ω, u, constants) -> (k', d): the couple per unit of the normal force is -k' d.
+def _resistance(law: Law) -> Any:
+    """Inline, (v², ω, u, constants) -> the law's resistance k."""
+    alone, coupled = law.resistance, law.coupled
+    if coupled is None:
 
-    It is -k ω, and where a couple about the normal is among `couples` also that one.  The other function is
+        @inline
+        def isotropic(
+            square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any  # noqa: ARG001
+        ) -> Any:  # fmt: skip
+            return alone(square, p)
+
+        return isotropic
+
+    @inline
+    def resistance(square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+        n = u1 * w1 + u2 * w2 + u3 * w3
+        k, _ = coupled(square, n * n, p)
+        return k
+
+    return resistance
+
+
+def _drag(couples: Sequence[Couple], law: Law | None = None) -> tuple[Any, Any]:
+    """Inline, (k, ω, u, v², constants) -> (k', d): the couple per unit of the normal force is -k' d.
+
+    It is -k ω, and where `couples` have one about the normal, or the law, also that one.  The other function is
     (R k', k0, ω², d · ω) -> power of all couples, where k0 is the resistance by itself.
     """
     about_normal = [couple.resistance for couple in couples if couple.about_normal]
-    if not about_normal:
+    coupled = law.coupled if law else None
+    if not about_normal and coupled is None:
         return _isotropic, _isotropic_power
-    (resistance,) = about_normal
+    spinning = about_normal[0] if about_normal else nothing
+    of_slip = coupled or _no_couple
 
     @inline
-    def drag(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+    def drag(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, square: Any, p: Any) -> Any:
         n = u1 * w1 + u2 * w2 + u3 * w3
-        m = resistance(n * n, p) * n
+        _, of_law = of_slip(square, n * n, p)
+        m = (spinning(n * n, p) + of_law) * n
         return 1.0, k * w1 + m * u1, k * w2 + m * u2, k * w3 + m * u3
 
     @inline
@@ -156,14 +182,21 @@ def _isotropic_power(load: Any, k0: Any, turn_square: Any, turned: Any) -> Any: 
 
 
 @inline
-def _isotropic(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:  # noqa: ARG001
+def _no_couple(square: Any, spin_square: Any, p: Any) -> Any:  # noqa: ARG001
+    return 0.0, 0.0
+
+
+@inline
+def _isotropic(
+    k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, square: Any, p: Any  # noqa: ARG001
+) -> Any:  # fmt: skip
     return k, w1, w2, w3
 
 
 def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     contact, general_energy = surface.contact, solid.energy_on(surface)
-    resistance, (plain, loaded), (drag, _) = law.resistance, resistances(couples), _drag(couples)
-    names, values = _couple_constants(couples)
+    resistance, (plain, loaded), (drag, _) = _resistance(law), resistances(couples), _drag(couples, law)
+    names, values = _couple_constants(couples, law)
 
     @inline
     def rhs(y: Any, p: Any) -> Any:
@@ -172,7 +205,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
 
         v3 = -(v1 * u1 + v2 * u2) * inv_u3
         slip_square = v1 * v1 + v2 * v2 + v3 * v3
-        k = resistance(slip_square, p)
+        k = resistance(slip_square, w1, w2, w3, u1, u2, u3, p)
         # f = u - k v, the contact force per unit of R
         f1, f2, f3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
         # s = v_0 - x_p'
@@ -180,7 +213,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
         q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
         turn_square = w1 * w1 + w2 * w2 + w3 * w3
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
-        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, p)
+        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, slip_square, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
         al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
@@ -213,7 +246,10 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
 
     def fastest_decay(columns: Columns) -> Array:
         grip = strongest_grip(columns, surface)
-        return np.asarray(law.strongest(columns) * grip + couples_decay(couples, columns, surface))
+        decay = law.strongest(columns) * grip + couples_decay(couples, columns, surface)
+        if law.strongest_couple:
+            decay = decay + law.strongest_couple(columns) * _hardest_turn(columns, surface)
+        return np.asarray(decay)
 
     def more(columns: Columns) -> tuple[Array, ...]:
         faint = () if law.linear_to is None else (_faint(law.linear_to(columns), columns, surface),)
@@ -226,7 +262,7 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
         states=slip.MODEL.states,
         spin_state=slip.MODEL.spin_state,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=_offers(couples, dissipates=True) | ({REVERSAL_TIME} if law.name == "viscous" else set()),
+        offers=_offers(couples, dissipates=law.coupled is None) | ({REVERSAL_TIME} if law.name == "viscous" else set()),
         constants=_record(surface, fields, more),
         start=lambda columns: starts.slipping(columns, surface),
         slower_period=lambda columns: solid.slower_period(columns, surface),
@@ -260,7 +296,7 @@ def _rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters:
         h1, h2, h3 = p.g * u1 + c1, p.g * u2 + c2, p.g * u3 + c3
         turn_square = w1 * w1 + w2 * w2 + w3 * w3
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
-        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, p)
+        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, 0.0, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         t1 = m1 + y_ * h3 - z * h2 - k0 * w1
         t2 = m2 + z * h1 - x * h3 - k0 * w2

@@ -3,7 +3,7 @@
 All laws are isotropic.  The friction force on the body is F = -N k(v²) v, with the slip velocity v of the contact point
 and the normal force N; a law is its resistance k.  It is a smooth function of v², also at v = 0, and is written without
 branches, so that it can be vectorised and differentiated by complex steps.  To the linear theory every law is viscous,
-with the coefficient k(0).
+with the coefficient k(0).  One law depends on the spin too, and resists it (`Law.coupled`).
 
 To add a law, write its resistance and enter a `Law` in `LAWS`.
 """
@@ -32,6 +32,13 @@ class Law:
     """Inline, (v², constants) -> k, the friction force per unit of normal force and of slip velocity."""
     strongest: Callable[[Columns], Array]
     """(columns) -> bound on the derivative of k v with respect to v, shape (cells,).  It bounds k too."""
+    coupled: Callable[..., Any] | None = None
+    """Inline, (v², n², constants) -> (k, m), for a law that depends on the spin n too, with the couple -m n u per unit
+    of normal force; `resistance` is its k without spin then."""
+    strongest_couple: Callable[[Columns], Array] | None = None
+    """(columns) -> bound on the derivative of m n with respect to n, shape (cells,)."""
+    stops_below: Callable[[Columns], Array] | None = None
+    """As of a `sweep.models.couples.Couple`."""
     linear_to: Callable[[Columns], Array] | None = None
     """(columns) -> slip velocity up to which k is constant to a few per cent, shape (cells,); None if k is constant."""
     pure: frozenset[str] = frozenset()
@@ -103,6 +110,27 @@ def _stribeck(square: Any, p: Any) -> Any:
     return coefficient / np.sqrt(square + p.speed_stick * p.speed_stick) + p.mu_viscous
 
 
+FORCE_SHARE, COUPLE_SHARE, COUPLE = 8 / (3 * np.pi), 15 * np.pi / 16, 3 * np.pi / 16
+"""Numbers of `_contensou`, for the pressure of Hertz over a circle."""
+
+
+@inline
+def _contensou(square: Any, spin_square: Any, p: Any) -> Any:
+    """Force and couple of dry friction over a circle of radius ε, by Zhuravlev's Padé approximation.
+
+    Where the circle slips by v and turns by n, each of its points slips by itself.  With w = sqrt(v² + s²) in place of
+    v, and turning at its rim ε |n|,
+
+        k = μ / (w + 8/(3π) ε |n|),   m n = (3π/16) μ ε (ε n) / (ε |n| + 15π/16 w).
+
+    Both are right in leading order where v is small or n is (Zhuravlev 1998).  Between, where v is near ε |n|, this
+    lowest order of the approximation is too low: by up to 0.35 of μ and by up to 0.39 of the largest couple.
+    """
+    slip, turn = np.sqrt(square + p.speed * p.speed), p.radius_contact * np.sqrt(spin_square)
+    m = COUPLE * p.mu * p.radius_contact * p.radius_contact / (turn + COUPLE_SHARE * slip)
+    return p.mu / (slip + FORCE_SHARE * turn), m
+
+
 _LINEAR = 0.1
 """Share of its own speed up to which a law counts as linear: the cubic is off by 0.03 there, the others by 0.01."""
 
@@ -136,6 +164,13 @@ LAWS: dict[str, Law] = {
             "stribeck", ("mu", "mu_static", "speed", "speed_stick", "mu_viscous"), _stribeck,
             lambda columns: columns["mu_static"] / columns["speed_stick"] + columns["mu_viscous"],
             linear_to=_below_both_speeds, pure=frozenset({"mu"}),
+        ),
+        Law(
+            "contensou", ("mu", "radius_contact", "speed"), _sqrt, lambda columns: columns["mu"] / columns["speed"],
+            coupled=_contensou,
+            strongest_couple=lambda columns: 0.2 * columns["mu"] * columns["radius_contact"] ** 2 / columns["speed"],
+            stops_below=lambda columns: _LINEAR * columns["speed"] / columns["radius_contact"],
+            pure=frozenset({"mu"}),
         ),
     )
 }  # fmt: skip

@@ -75,6 +75,13 @@ BROKEN: dict[str, tuple[str, int, str, str]] = {
     ),
     "a speed left out": (stone((" speed: 1.0e-3,", "")), 5, "friction.speed", "missing"),
     "no speed": (stone(("speed: 1.0e-3", "speed: 0")), 5, "friction.speed", "0 is out of bounds"),
+    "half of spinning friction": (
+        stone(("sigma: 1.0e-4", "mu_spinning: 0.1, radius_spinning: 1.0e-3")), 5, "friction.speed_spinning", "missing"
+    ),
+    "a contact without a radius": (
+        stone(("law: coulomb", "law: contensou"), ("regularisation: tanh, ", "")), 5, "friction.radius_contact",
+        "missing",
+    ),
     "half of rolling friction": (stone(("sigma: 1.0e-4", "mu_rolling: 0.1")), 5, "friction.radius", "missing"),
     "two starts": (stone(("slip1: 0,", "n0: 1,")), 6, "start.n0", "beside omega1, omega2, omega3, pitch, roll, slip2"),
     "an angle in minutes": (stone(("roll: 0.5 deg", "roll: 30 min")), 6, "start.roll", "'30 min' is not a number"),
@@ -163,6 +170,15 @@ def test_a_scene_survives_its_own_document(changes: tuple[tuple[str, str], ...],
         ("friction: {law: none}", "slip+none"),
         ("friction: {law: coulomb, mu: 0.2, speed: 0.01}", "slip+coulomb-sqrt"),
         ("model: noslip\nbody: {offset: 0.1}", "noslip+solid"),
+        (
+            "friction: {mu: 6, sigma: 0.1, mu_spinning: 0.1, radius_spinning: 0.1, speed_spinning: 0.1}",
+            "slip+viscous+sigma+spinning",
+        ),
+        ("friction: {law: contensou, mu: 0.3, radius_contact: 0.01, speed: 0.01}", "slip+contensou"),
+        (
+            "model: noslip\nbody: {surface: paraboloid, a: 0.1, b: 0.2, Ixx: 1, Iyy: 1, Izz: 1}\nfriction: {mu: 3}",
+            "noslip+solid+paraboloid",
+        ),
         ("model: noslip\nfriction: {mu: 3, mu_rolling: 0.1, radius: 0.1, speed_rolling: 0.1}", "noslip+solid+rolling"),
     ],
 )

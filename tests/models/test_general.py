@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from sweep.models.surfaces import ELLIPSOID, PARABOLOID, Surface
 BODY = {"a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 0.7, "gravity": 9.81}
 KANE_LEVINSON = BODY | {"mass": 1.0, "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5}
 SKEW = KANE_LEVINSON | {"mass": 0.7, "Ixz": 3e-5, "Iyz": -1e-5}
-FRICTION = {"mu": 0.4, "mu_static": 0.7, "mu_viscous": 0.3, "speed": 0.05, "speed_stick": 0.02}
+FRICTION = {"radius_contact": 0.004, "mu": 0.4, "mu_static": 0.7, "mu_viscous": 0.3, "speed": 0.05, "speed_stick": 0.02}
 COUPLES = {"sigma": 1e-4, "mu_rolling": 0.1, "radius": 0.004, "speed_rolling": 0.5}
 COUPLES |= {"mu_spinning": 0.2, "radius_spinning": 0.003, "speed_spinning": 2.0}
 BOWL = SKEW | {"a": 0.012, "b": 0.35, "surface": "paraboloid"}
@@ -165,7 +166,7 @@ def test_the_ripple_free_spin_of_a_real_body_hardly_ripples() -> None:
     assert np.std(trend[1]) < 0.05 * np.std(trend[0])
 
 
-@pytest.mark.parametrize("law", [law for law in LAWS if law != "none"])
+@pytest.mark.parametrize("law", [law for law in LAWS if law not in ("none", "contensou")])
 def test_the_bound_on_a_laws_resistance_holds_and_is_near(law: str) -> None:
     p, x = FRICTION | KANE_LEVINSON, np.linspace(0, 0.3, 30001)
     force = np.array([newton.LAWS[law](each, p) for each in x])
@@ -173,6 +174,38 @@ def test_the_bound_on_a_laws_resistance_holds_and_is_near(law: str) -> None:
     (bound,) = LAWS[law].strongest(cells(**p))
     assert steepest <= bound * (1 + 1e-9)
     assert steepest >= 0.7 * bound
+
+
+def test_contensou_over_a_circle() -> None:
+    """Dry friction of every point of the contact, integrated over the pressure of Hertz.
+
+    The approximation is right where slip or spin is small, and between as far off as its description says.
+    """
+    radius, p = 0.004, {"mu": 0.4, "radius_contact": 0.004, "speed": 1e-9}
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    r, angle = radius * np.sin(np.pi / 4 * (nodes + 1)), np.linspace(0, 2 * np.pi, 401)[:-1] + 1e-3
+    share = 3 / (2 * np.pi * radius**2) * np.sqrt(1 - (r / radius) ** 2) * r * weights
+    share = share * radius * np.cos(np.pi / 4 * (nodes + 1)) * np.pi / 4
+    x, y, share = r[:, None] * np.cos(angle), r[:, None] * np.sin(angle), share[:, None] * 2 * np.pi / 400
+    assert share.sum() * 400 == pytest.approx(1, rel=1e-9)
+
+    def exact(v: float, n: float) -> tuple[float, float]:
+        along, across = v - n * y, n * x
+        speed = np.hypot(along, across)
+        return 0.4 * (share * along / speed).sum(), 0.4 * (share * (x * across - y * along) / speed).sum()
+
+    largest = np.array([0.4, 0.4 * 3 * np.pi / 16 * radius])
+    farthest = np.zeros(2)
+    for ratio in (1e-5, 1e-3, 0.3, 0.4, 1.0, 1.1, 30.0, 1e3):
+        n, v = 2.0, ratio * 2.0 * radius
+        off = (np.array(exact(v, n)) - newton.contensou(v, n, p)) / largest
+        if ratio in (1e-5, 1e3):
+            np.testing.assert_allclose(newton.contensou(v, n, p), exact(v, n), rtol=2e-3)
+        farthest = np.maximum(farthest, off)
+        assert (off > -1e-6).all()
+        k, m = LAWS["contensou"].coupled(v**2, n**2, SimpleNamespace(**p))
+        np.testing.assert_allclose((k * v, m * n), newton.contensou(v, n, p), rtol=1e-12)
+    np.testing.assert_allclose(farthest, [0.343, 0.390], atol=0.003)
 
 
 def test_tanh_to_round_off() -> None:
@@ -378,7 +411,7 @@ def test_narrower_regularisations_meet_dry_friction() -> None:
 def test_to_which_variants_the_linear_theory_applies() -> None:
     for name in ("slip+viscous+sigma", "slip+coulomb-tanh", "noslip+solid+sigma"):
         assert LINEAR in find(name).offers
-    for name in ("slip+viscous+rolling", "slip+viscous+spinning", "noslip+solid"):
+    for name in ("slip+viscous+rolling", "slip+viscous+spinning", "slip+contensou", "noslip+solid"):
         assert LINEAR not in find(name).offers
     assert LINEAR not in noslip.MODEL.offers
 

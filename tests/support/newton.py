@@ -34,6 +34,14 @@ LAWS: dict[str, Callable[[float, Mapping[str, float]], float]] = {
 """Friction force per unit of normal force, at the slip velocity x >= 0."""
 
 
+def contensou(v: float, n: float, p: Mapping[str, float]) -> tuple[float, float]:
+    """Force and couple against slip and spin, per unit of normal force, by Zhuravlev's approximation."""
+    w, rim = np.hypot(v, p["speed"]), p["radius_contact"] * n
+    force = v / (w + 8 / (3 * np.pi) * abs(rim))
+    couple = 3 * np.pi / 16 * p["radius_contact"] * rim / (abs(rim) + 15 * np.pi / 16 * w)
+    return p["mu"] * force, p["mu"] * couple
+
+
 def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vector, float, float]:
     """y', the normal force and the dissipated power; without a law there is no slip.
 
@@ -73,7 +81,13 @@ def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vect
     if law:
         matrix[6, :6], right[6] = acceleration[2], drift[2]
         size = np.linalg.norm(v)
-        friction = LAWS[law](size, p) * v / size if size else v
+        if law == "contensou":
+            force, couple = contensou(size, n, p)
+            matrix[5, 8] += couple
+            spinning += couple / n
+        else:
+            force = LAWS[law](size, p)
+        friction = force * v / size if size else v
         matrix[7:, 6:8], matrix[7:, 8] = np.eye(2), friction[:2]
     else:
         matrix[6:, :6], right[6:] = acceleration, drift
