@@ -5,6 +5,7 @@ The schema of the configuration, the attributes of the dataset and the documenta
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, pi
 
@@ -127,7 +128,13 @@ PARAMETERS: dict[str, Parameter] = {
 PAPER: dict[str, Parameter] = {name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")}
 """The parameters of the paper's model.  Their defaults are in the paper's units, and they have none in SI."""
 
-SECTIONS: tuple[str, ...] = tuple(dict.fromkeys(p.section for p in PARAMETERS.values() if p.section))
+
+def sections(table: Mapping[str, Parameter]) -> tuple[str, ...]:
+    """Names of the sections in which the parameters of a table stand."""
+    return tuple(dict.fromkeys(p.section for p in table.values() if p.section))
+
+
+SECTIONS: tuple[str, ...] = sections(PARAMETERS)
 
 START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")
 """Names of the parameters of the start, on which the critical spins and the form factor do not depend."""

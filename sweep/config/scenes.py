@@ -13,16 +13,29 @@ import numpy as np
 from sweep.config.document import Document
 from sweep.config.faults import Fault
 from sweep.config.schema import Config
-from sweep.grid import BODY, Array, Grid, distinct
+from sweep.grid import BODY, Array, Grid, distinct, off_the_body
 from sweep.models import solid
 from sweep.models.general import BASES
+from sweep.models.laws import Law
 from sweep.models.scene import INERTIA, PAPER, PAPERS, PAPERS_LAW, is_papers, strangers
 from sweep.parameters import PARAMETERS
+
+
+def misfits_of_own(checked: Any, law: Law | None, names: Collection[str], source: Document) -> Iterator[Fault]:
+    """Faults of parameters that do not belong together, where a user brings the model, or its `law` of friction."""
+    if law is None:
+        if "units" in checked.model_fields_set:
+            yield source.fault(("units",), "the model's file says its units; allowed: no units", at_key=True)
+        return
+    for name, reason in strangers(law.name, checked.units, names, law).items():
+        yield source.fault(PARAMETERS[name].place, reason, at_key=True)
 
 
 def misfits(checked: Any, names: Collection[str], source: Document) -> Iterator[Fault]:
     """Faults of parameters that do not belong together."""
     law, units = checked.friction.name, checked.units
+    if checked.model_sha256 is not None:
+        yield source.fault(("model_sha256",), f"the {checked.model} model is no file; allowed: none", at_key=True)
     if "regularisation" in checked.friction.model_fields_set and checked.friction.law != "coulomb":
         yield source.fault(
             ("friction", "regularisation"), f"not of the law {law}; allowed: with law: coulomb", at_key=True
@@ -41,7 +54,7 @@ def misfits(checked: Any, names: Collection[str], source: Document) -> Iterator[
 
 def impossible(config: Config) -> str:
     """What is wrong with the first body that cannot be or cannot stand; "" if all can."""
-    if not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
+    if not config.of_rattlebacks or not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
         return ""
     return next(filter(None, map(_impossible, distinct(Grid.of(config), BODY))), "")
 
@@ -54,6 +67,11 @@ def _impossible(columns: Mapping[str, Array]) -> str:
             at = ", ".join(f"{name}={columns[name][cells[0]]:g}" for name in given)
             return f"{reason} at {at}"
     return ""
+
+
+def misplaced(config: Config) -> str:
+    """What is wrong with the first cell whose start point lies off the ellipsoid; "" if no cell's does."""
+    return off_the_body(config) if config.of_rattlebacks else ""
 
 
 _ROUNDING = 1e-12

@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigLike, load_config
+from sweep.config.brought import explained
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.earlier import RERUN, Earlier, reason_against, taken_over
@@ -115,10 +116,11 @@ def _compute(
         # A single cell has no neighbours from which it could be inferred.
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
     count = Count(reporter)
-    while result.grow(tile_size):
-        if not count.cells and (store.done or running):
-            reporter.note(_kept(result, store, running))
-        _run_tiles(result.simulated(), result.tiles, store, count, cluster)
+    with explained(config.origin):
+        while result.grow(tile_size):
+            if not count.cells and (store.done or running):
+                reporter.note(_kept(result, store, running))
+            _run_tiles(result.simulated(), result.tiles, store, count, cluster)
     return result
 
 

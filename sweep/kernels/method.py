@@ -73,5 +73,5 @@ class Method:
     """Whether a run may stop after any step and go on from there towards another goal."""
 
     def runs(self, model: Model) -> bool:
-        """Whether it can integrate a model."""
-        return self.models is None or model.name in self.models
+        """Whether it can integrate a model.  One that a user brings may have any name."""
+        return self.models is None or (model.name in self.models and model.origin is None)

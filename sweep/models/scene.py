@@ -6,8 +6,8 @@ from collections.abc import Collection
 
 from sweep.models import general, solid, starts
 from sweep.models.couples import COUPLES
-from sweep.models.laws import LAWS
-from sweep.models.model import Tier
+from sweep.models.laws import LAWS, Law
+from sweep.models.model import Model
 
 PAPER, SI = "paper", "SI"
 """Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
@@ -25,19 +25,23 @@ def is_papers(law: str, units: str, names: Collection[str]) -> bool:
     return law == PAPERS_LAW and units == PAPER and set(names) <= PAPERS
 
 
-def variant(base: str, law: str, units: str, names: Collection[str]) -> Tier:
-    """The variant of `slip` or `noslip` for a scene; its parameters are those that follow from `names`."""
+def variant(base: str, law: str, units: str, names: Collection[str], own: Law | None = None) -> Model:
+    """The variant of `slip` or `noslip` for a scene; its parameters are those that follow from `names`.
+
+    `own` is the law of the name `law`, if it is not one of `LAWS`.
+    """
     moments = INERTIA if set(INERTIA) & set(names) else ("delta",)
     system = ("mass", "gravity") if units == SI else ()
     by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
     start = by_angles if {*starts.ANGLES, *starts.SLIP} & set(names) else starts.POINT
     couples = [name for name, couple in COUPLES.items() if set(couple.parameters) & set(names)]
     parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-    return general.variant(general.name_of(base, law, couples), parameters)
+    return general.variant(general.name_of(base, law, couples), parameters, own)
 
 
-def strangers(law: str, units: str, names: Collection[str]) -> dict[str, str]:
-    """The parameters that do not belong to a scene, with the reason."""
+def strangers(law: str, units: str, names: Collection[str], own: Law | None = None) -> dict[str, str]:
+    """The parameters that do not belong to a scene, with the reason; `own` as of `variant`."""
+    theirs = (own or LAWS[law]).parameters
     names = set(names)
     found: dict[str, str] = {}
     inertia, angles, point = names & set(INERTIA), names & {*starts.ANGLES, *starts.SLIP}, names & set(starts.POINT)
@@ -49,8 +53,8 @@ def strangers(law: str, units: str, names: Collection[str]) -> dict[str, str]:
     if units == PAPER:
         found |= dict.fromkeys(("mass", "gravity"), "with units: paper, in which it is 1; allowed: with units: SI")
     for other in LAWS.values():
-        foreign = set(other.parameters) - set(LAWS[law].parameters) - {"mu"}
-        words = ", ".join((*LAWS[law].parameters, *(name for couple in COUPLES.values() for name in couple.parameters)))
+        foreign = set(other.parameters) - set(theirs) - {"mu"}
+        words = ", ".join((*theirs, *(name for couple in COUPLES.values() for name in couple.parameters)))
         found |= dict.fromkeys(foreign, f"not of the law {law}; allowed: {words}")
     return {name: words for name, words in found.items() if name in names and (name not in point or angles)}
 

@@ -9,6 +9,7 @@ import xarray as xr
 from sweep.kernels import status
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
+from sweep.results.kind import is_of_own_body
 
 SYMBOLS = {"mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀"}
 
@@ -82,7 +83,7 @@ def unit(dataset: xr.Dataset, name: str) -> str:
 
 def words(dataset: xr.Dataset, name: str) -> str:
     """What a variable or coordinate is, without its unit."""
-    short = {**_PARAMETER_WORDS, **_VARIABLE_WORDS}.get(name)
+    short = {**({} if is_of_own_body(dataset) else _PARAMETER_WORDS), **_VARIABLE_WORDS}.get(name)
     return short or _SCALE.sub("", _long_name(dataset, name)) or name.replace("_", " ")
 
 

@@ -17,7 +17,7 @@ from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
 from sweep.models.scene import PAPER, SI
 from sweep.prediction import Prediction
-from sweep.variables import Variable, in_si
+from sweep.variables import Variable, in_si, without_unit
 
 STATUSES = {
     0: "not_run",
@@ -116,7 +116,7 @@ def predicted(prediction: Prediction) -> dict[str, Array]:
         plus, minus = formulas.n_c1
         result["reversals_predicted"] = formulas.reversals
         result |= {"n_c1_plus": plus, "n_c1_minus": minus, "n_c2_plus": 2 * plus, "n_c2_minus": 2 * minus}
-    if stability := prediction.stability:
+    if (stability := prediction.stability) and stability.n_c1:
         finite = [np.where(np.isfinite(n), n, np.nan) for n in stability.n_c1]
         result["n_c1_plus_linear"], result["n_c1_minus_linear"] = finite
     return result
@@ -140,7 +140,8 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
         coordinates["case"] = xr.Variable(("case",), index, {"long_name": "row of the table of cases", "units": "1"})
     for name, value in grid.constants.items():
         coordinates[name] = xr.Variable((), value, config.described(name))
-    head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals of a rattleback ({config.model} model)"}
+    of = " of a rattleback" if config.of_rattlebacks else ""
+    head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals{of} ({config.model} model)"}
     return xr.Dataset(variables, coordinates, {**head, **attributes})
 
 
@@ -208,7 +209,9 @@ def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr
 
 def described(spec: Variable, system: str = PAPER) -> dict[str, Any]:
     """The CF attributes of a variable in a system of units."""
-    units, long_name = in_si(spec.units, spec.long_name) if system == SI else (spec.units, spec.long_name)
+    units, long_name = spec.units, spec.long_name
+    if system != PAPER:
+        units, long_name = in_si(units, long_name) if system == SI else (units, without_unit(long_name))
     words: dict[str, Any] = {"long_name": long_name, "units": units}
     if spec.flags:
         words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
