@@ -1,8 +1,8 @@
 """The tippe top: a sphere whose centre of mass lies off its centre turns over when it is spun fast on a plane.
 
 Lengths are in the radius R, times in sqrt(R/g), and the mass is one.  The axis e points from the centre of mass G to
-the centre of the sphere, up at rest, and a = α e - ẑ leads from G to the contact point.  L is the angular momentum about
-G, V the horizontal velocity of G, and ω3 = L·e/C the spin about the axis:
+the centre of the sphere, up at rest, and a = α e - ẑ leads from G to the contact point.  L is the angular momentum
+about G, V the horizontal velocity of G, and ω3 = L·e/C the spin about the axis:
 
     L' = a × F,   V' = F - (F·ẑ) ẑ,   e' = ω × e,   ω = L/A + ω3 (1 - C/A) e,
     F = N (ẑ - μ v),   v = V + (ω × a) - the vertical part of it.
@@ -14,8 +14,8 @@ As G is at the height 1 - α e·ẑ, the normal force is
 All of this is in axes fixed in space, where nothing is singular when the top stands on its head.  There ω3 has changed
 sign, while the top turns about the vertical in the same sense as before: a reversal is an inversion.
 
-Friction takes energy but leaves Jellett's integral -L·a as it is.  From nearly upright, and fast enough, a top turns over
-if 1 - α < A/C < 1 + α (S. Rauch-Wojciechowski and N. Rutstam, SIGMA 10 (2014), 017, arXiv 1306.2470).
+Friction takes energy but leaves Jellett's integral -L·a as it is.  Spun fast enough, a top turns over completely if
+1 - α < A/C < 1 + α (S. Rauch-Wojciechowski and N. Rutstam, SIGMA 10 (2014), 017, arXiv 1306.2470).
 """
 
 from typing import Any, NamedTuple
@@ -27,11 +27,13 @@ from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, Model
 from sweep.parameters import Parameter
 
 PARAMETERS = (
-    Parameter("eccentricity", "body", "1", "distance α of the centre of mass from the centre, in R", 0.3, above=0, below=1),
-    Parameter("ratio", "body", "1", "ratio A/C of the moments of inertia, across and along the axis", 0.936, at_least=0.5, below=10),
+    Parameter("eccentricity", "body", "1", "distance α of the centre of mass from the centre, in R", 0.3,
+              above=0, below=1),
+    Parameter("ratio", "body", "1", "ratio A/C of the moments of inertia, across and along the axis", 0.936,
+              at_least=0.5, below=10),
     Parameter("C", "body", "1", "moment of inertia about the axis, in m R^2", 0.4, above=0, below=1),
     Parameter("mu", "friction", "1", "coefficient of viscous friction μ, in 1/sqrt(g R)", 0.15, at_least=0, below=100),
-    Parameter("spin", "start", "1", "start spin about the axis, in sqrt(g/R)", 7.0, above=0, below=1000),
+    Parameter("n0", "start", "1", "start spin about the axis, in sqrt(g/R)", 7.0, above=0, below=1000),
     Parameter("tilt", "start", "radian", "start angle of the axis with the vertical", 0.1, at_least=0, below=3.1),
 )  # fmt: skip
 
@@ -49,7 +51,7 @@ class Constants(NamedTuple):
 
 def start(columns: Columns) -> tuple[Array, ...]:
     e1, e3 = np.sin(columns["tilt"]), np.cos(columns["tilt"])
-    L, nothing = columns["C"] * columns["spin"], 0 * columns["spin"]
+    L, nothing = columns["C"] * columns["n0"], 0 * columns["n0"]
     return L * e1, nothing, L * e3, e1, nothing, e3, nothing, nothing
 
 
@@ -68,7 +70,7 @@ def motion(y: Any, p: Any) -> Any:
 
 @inline
 def rhs(y: Any, p: Any) -> Any:
-    L1, L2, L3, e1, e2, e3, V1, V2 = y
+    L1, L2, _, e1, e2, e3, _, _ = y
     d1, d2, d3, spin, v1, v2 = motion(y, p)
     f1, f2 = -p.mu * v1, -p.mu * v2
     a1, a2, a3 = p.alpha * e1, p.alpha * e2, p.alpha * e3 - 1.0
@@ -83,8 +85,8 @@ def rhs(y: Any, p: Any) -> Any:
 @inline
 def energy(y: Any, p: Any) -> Any:
     """ω3, the energy above rest without that of ω3, and C."""
-    L1, L2, L3, e1, e2, e3, V1, V2 = y
-    d1, d2, d3, spin, v1, v2 = motion(y, p)
+    _, _, _, _, _, e3, V1, V2 = y
+    d1, d2, d3, spin, _, _ = motion(y, p)
     drift = V1 * V1 + V2 * V2 + (p.alpha * d3) * (p.alpha * d3)
     return spin, 0.5 * (drift + p.A * (d1 * d1 + d2 * d2 + d3 * d3)) + p.alpha * (1.0 - e3), p.C
 
@@ -97,20 +99,20 @@ def observe(y: Array, p: Any) -> dict[str, Array]:
 
 def nutation(columns: Columns) -> Array:
     """Period of the nutation at the start, over which the spin is averaged."""
-    return 2 * np.pi * columns["ratio"] / columns["spin"]
+    return 2 * np.pi * columns["ratio"] / columns["n0"]
 
 
 def fastest(columns: Columns) -> Array:
     """Nutation at its fastest: the energy at the start bounds the angular velocity."""
     least = columns["C"] * np.minimum(columns["ratio"], 1)
-    square = (columns["C"] * columns["spin"] ** 2 + 2 * columns["eccentricity"] * (1 - np.cos(columns["tilt"]))) / least
+    square = (columns["C"] * columns["n0"] ** 2 + 2 * columns["eccentricity"] * (1 - np.cos(columns["tilt"]))) / least
     return np.sqrt(square) * np.maximum(1, 1 / columns["ratio"]) + np.sqrt(columns["eccentricity"] / least)
 
 
 def decay(columns: Columns) -> Array:
     """Friction changes the slip at the rate μ N (1 + |a|²/J), with N up to what the fastest turning asks for."""
     alpha, least = columns["eccentricity"], columns["C"] * np.minimum(columns["ratio"], 1)
-    return columns["mu"] * (1 + alpha * columns["spin"] ** 2) * (1 + (1 + alpha) ** 2 / least)
+    return columns["mu"] * (1 + alpha * columns["n0"] ** 2) * (1 + (1 + alpha) ** 2 / least)
 
 
 MODEL = Model(

@@ -28,13 +28,14 @@ class Formulas:
 class Stability:
     """The spins at which a model's rattle decays."""
 
-    n_c1: tuple[Array, Array] | None
+    n_c1: tuple[Array, Array]
     """n_c1+ and n_c1- of the linear theory, over the bodies: infinite where the rattle decays at every spin, NaN where
-    it does not decay at rest.  NaN too for a model to which the linear theory does not apply; None if
-    that is a user's."""
+    it does not decay at rest.  NaN too for a model to which the linear theory does not apply."""
     ranges: Array
     """Ranges of spin in which the rattle decays, shape (6, cells), as `stability.stable_ranges` gives them: all those
     that the trajectory of the cell can reach."""
+    applies: bool = True
+    """Whether n_c1 is worth telling: not of a user's model to which the linear theory does not apply."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,8 @@ def predict(tier: Tier, grid: Grid) -> Prediction:
         return prediction
     if LINEAR not in tier.offers:
         nothing = np.full(grid.bodies()[0].size, np.nan)
-        n_c1 = None if tier.origin else (nothing, nothing)
-        return replace(prediction, stability=Stability(n_c1, np.full((6, grid.size), np.nan)))
+        nowhere = np.full((6, grid.size), np.nan)
+        return replace(prediction, stability=Stability((nothing, nothing), nowhere, applies=not tier.origin))
     return replace(prediction, stability=_stability(tier, grid))
 
 

@@ -22,6 +22,7 @@ _TAKEN = frozenset({
     "name", "model", "model_sha256", "units", "cases", "integrator", "measure", "verify", "refine",
     "max_failed_fraction", "method", "step", "tolerance", "t_end", "stop_when_settled", "case", "trajectory", "time",
     "every", "reporter", "progress", "config", "output", "fresh", "rerun", "cluster",
+    "status", "spin", "energy", "dissipated", "inferred",
 })  # fmt: skip
 """Names that mean something else in a configuration, as an argument or in a dataset."""
 
@@ -63,7 +64,7 @@ def _faults(made: Any) -> Faults:
 
 
 def _law_faults(made: SlipWith) -> Faults:
-    law = made.law
+    law: Any = made.law
     if not isinstance(law, Law):
         yield None, f"with_law of the type {type(law).__name__}; allowed: with_law(Law(…), Parameter(…), …)"
         return
@@ -166,12 +167,13 @@ def try_out(model: Model, columns: Columns) -> None:
 def _wrong_values(model: Model, columns: Columns, cells: int) -> Faults:
     constants, start = model.constants.of(columns), model.start(columns)
     fields = model.constants._fields
+    allowed = f"; allowed: ({cells},), as the columns"
     for name, value in zip(fields, constants, strict=True):
         if np.shape(value) != (cells,):
-            yield model.constants.of, f"constant {name} has the shape {np.shape(value)}; allowed: ({cells},), as columns"
+            yield model.constants.of, f"constant {name} has the shape {np.shape(value)}{allowed}"
     yield from _tuple(model.start, "start", start, len(model.states), "a number for each state")
     if np.shape(sum(start)) != (cells,):
-        yield model.start, f"start has the shape {np.shape(sum(start))}; allowed: ({cells},), as columns"
+        yield model.start, f"start has the shape {np.shape(sum(start))}{allowed}"
     y = tuple(np.broadcast_to(value, (cells,)) for value in start)
     given = model.rhs(y, constants)
     yield from _tuple(model.rhs, "rhs", given, 2, "(derivatives, (spin, power, normal force, denominator))")
@@ -187,7 +189,7 @@ def _wrong_values(model: Model, columns: Columns, cells: int) -> Faults:
     bounds += [("fastest_motion", model.fastest_motion)] if model.fastest_motion else []
     for name, function in bounds:
         if np.shape(value := function(columns)) != (cells,):
-            yield function, f"{name} has the shape {np.shape(value)}; allowed: ({cells},), as columns"
+            yield function, f"{name} has the shape {np.shape(value)}{allowed}"
     fastest = np.asarray(fastest_motion(model, columns))
     if not ((fastest > 0) & np.isfinite(fastest) | np.isfinite(model.slower_period(columns))).all():
         where = model.fastest_motion or model.slower_period

@@ -63,7 +63,7 @@ def never_tilts(y: Any) -> float:  # noqa: ARG001
     return 0.0
 
 
-def never_upright(spin: Any) -> tuple[Any, ...]:  # noqa: ARG001
+def never_upright(spin: Any) -> tuple[Any, ...]:
     """The default `upright`: there is no such motion."""
     raise NotImplementedError
 
@@ -136,8 +136,8 @@ class Model(Tier):
     """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none.  The
     spin is averaged over it before its changes of sign are counted."""
     upright: Callable[..., tuple[Any, ...]] = never_upright
-    """Inline, (spin) -> the states of steady upright spin without rattle.  Not needed beside `fastest_motion`, by a model
-    that does not offer `LINEAR`."""
+    """Inline, (spin) -> the states of steady upright spin without rattle.  A model that does not offer `LINEAR` may
+    have `fastest_motion` instead."""
     rhs: Callable[..., tuple[Any, ...]]
     """Inline, (states, constants) -> (derivatives, (spin, dissipated power, normal force, Painlevé denominator)).
     Of the last three, a model that lacks them returns the literals 0.0, 1.0 and 1.0."""

@@ -70,6 +70,7 @@ def load(origin: Origin) -> Model | SlipWith:
     ModelError
         if that cannot be done, or if what it defines is no model.
     """
+    made: Model | SlipWith
     with blamed(origin):
         made = _file(origin) if origin.is_file else _imported(origin)
         inspection.inspect(made, origin)
@@ -87,7 +88,14 @@ def _file(origin: Origin) -> Any:
     sys.modules[module.__name__] = module
     # Messages quote what runs, not what the file may say by then.
     linecache.cache[origin.place] = (len(origin.text), None, origin.text.splitlines(keepends=True), origin.place)
-    exec(compile(origin.text, origin.place, "exec"), module.__dict__)
+    try:
+        code = compile(origin.text, origin.place, "exec")
+    except (SyntaxError, ValueError) as error:
+        raise ModelError(origin.place, getattr(error, "lineno", None), f"not Python: {error.args[0]}") from None
+    try:
+        exec(code, module.__dict__)
+    except SystemExit as error:
+        raise RuntimeError("it ends the program") from error
     return getattr(module, "MODEL", None)
 
 
@@ -146,9 +154,9 @@ def blamed(origin: Origin | None) -> Iterator[None]:
 def _place(error: Exception, origin: Origin) -> tuple[str, int] | None:
     """File and line of the user's code from which an error comes."""
     ours = {origin.place} if origin.is_file else set(map(str, _sources(_package(origin.place))))
-    if isinstance(error, SyntaxError) and error.filename in ours:
-        return str(error.filename), error.lineno or 1
-    lines = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    chain = [error, *filter(None, [error.__cause__])]
+    frames = (frame for each in chain for frame in traceback.walk_tb(each.__traceback__))
+    lines = [(frame.f_code.co_filename, line) for frame, line in frames]
     if where := getattr(error, "loc", None):  # of Numba's errors
         lines.append((where.filename, where.line))
     lines += [(file, int(line)) for file, line in re.findall(r'File "(.+?)", line (\d+)', str(error))]
@@ -162,8 +170,8 @@ _ARITHMETIC = "plain arithmetic and NumPy's functions of numbers, such as np.sqr
 def _words(error: Exception) -> str:
     """What an error of the user's code says, and what is allowed where that is known."""
     text = str(error)
-    if isinstance(error, SyntaxError):
-        return f"not Python: {error.msg}"
+    if isinstance(error, KeyError):
+        return f"KeyError: {text}; allowed: names of the model's parameters"
     if "truth value of an array" in text:
         return f"a branch on arrays; allowed: {_ARITHMETIC}"
     if type(error).__module__.startswith("numba"):

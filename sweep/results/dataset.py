@@ -116,7 +116,7 @@ def predicted(prediction: Prediction) -> dict[str, Array]:
         plus, minus = formulas.n_c1
         result["reversals_predicted"] = formulas.reversals
         result |= {"n_c1_plus": plus, "n_c1_minus": minus, "n_c2_plus": 2 * plus, "n_c2_minus": 2 * minus}
-    if (stability := prediction.stability) and stability.n_c1:
+    if (stability := prediction.stability) and stability.applies:
         finite = [np.where(np.isfinite(n), n, np.nan) for n in stability.n_c1]
         result["n_c1_plus_linear"], result["n_c1_minus_linear"] = finite
     return result
