@@ -134,4 +134,5 @@ MODEL = Model(
     slower_period=nutation,
     fastest_motion=fastest,
     fastest_decay=decay,
+    radians_a_step=0.05,
 )

@@ -56,6 +56,9 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     if variable is not None and variable not in series:
         raise ValueError(f"no series {variable}; allowed: {', '.join(series)}")
     panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and variable is None]
+    if is_of_own_body(dataset) and variable is None:
+        known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
+        panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
     figure = Figure(figsize=(11, 4.2 + 1.9 * rows), dpi=110, layout="constrained")
     figure.suptitle(heading(_constants_apart(dataset)), fontsize=10)
