@@ -94,8 +94,8 @@ def _opened(
 ) -> tuple[document.Document, Origin | None]:
     """The document of a configuration, and where its model comes from, if a user brings it."""
     source = _source(config)
-    if "model" in overrides:
-        source.set(("model",), plain(overrides["model"]), argument("model"))
+    for key in {"model", "model_sha256"} & set(overrides):  # what the code to run depends on
+        source.set((key,), plain(overrides[key]), argument(key))
     return source, brought.named(source, announce)
 
 

@@ -26,6 +26,7 @@ from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
+from sweep.results import dataset
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity, not_resumed
@@ -57,6 +58,7 @@ def run(
     config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun {rerun!r}; allowed: {', '.join(RERUN)}")
+    dataset.check_names(config)
     reporter = reporter or Reporter()
     if output is None:
         return _compute(config, Memory(), reporter, cluster).dataset()

@@ -22,9 +22,8 @@ _TAKEN = frozenset({
     "name", "model", "model_sha256", "units", "cases", "integrator", "measure", "verify", "refine",
     "max_failed_fraction", "method", "step", "tolerance", "t_end", "stop_when_settled", "case", "trajectory", "time",
     "every", "reporter", "progress", "config", "output", "fresh", "rerun", "cluster",
-    "status", "spin", "energy", "dissipated", "inferred",
 })  # fmt: skip
-"""Names that mean something else in a configuration, as an argument or in a dataset."""
+"""Names that mean something else in a configuration, as an argument or as a dimension."""
 
 
 def inspect(made: Any, origin: Origin) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config
+from sweep.config import Config, ConfigError
 from sweep.grid import Array, Grid
 from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
@@ -143,6 +143,14 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     of = " of a rattleback" if config.of_rattlebacks else ""
     head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals{of} ({config.model} model)"}
     return xr.Dataset(variables, coordinates, {**head, **attributes})
+
+
+def check_names(config: Config, series: Iterable[str] = ()) -> None:
+    """Raise a `ConfigError` if a parameter has the name of a variable, or of one of these `series`."""
+    names = {*VARIABLES, *(f"verified_{name}" for name in ("cell", *VERIFIED)), *series} & set(config.tier.parameters)
+    if names:
+        words = f"parameter {min(names)}: also a name in datasets; allowed: another"
+        raise ConfigError([config.fault(("model",), words)])
 
 
 def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]:

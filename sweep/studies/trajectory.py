@@ -178,6 +178,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
 def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
     config = stepwise(load_config(config))
+    dataset.check_names(config, SERIES)
     wanted = _numbers(config, at)
     if (count := prod(map(len, wanted.values()))) > MAX_TRAJECTORIES:
         raise ConfigError([Fault("", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
