@@ -73,7 +73,8 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     if rerun is None and not (same_program and found.of_one_run):
         return found.difference(wanted)
     old, new = (_settings(parse_value(each.config, "dataset"), config.table) for each in (found, wanted))
-    free = _FREE_AGAIN if rerun else _FREE
+    # Of a user's model, `model_sha256` tells what `model` only names.
+    free = (_FREE_AGAIN if rerun else _FREE) | ({"model"} if config.origin else set())
     changed = [key for key in {**old, **new} if key not in free and _differ(key, old, new)]
     grown = _match(Grid.of(config), _grid(there))
     same_cells = len(grown) == there["status"].size
