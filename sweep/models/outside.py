@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from importlib import metadata
+from os.path import abspath
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -148,34 +149,40 @@ def blamed(origin: Origin | None) -> Iterator[None]:
     except Exception as error:
         if origin is None or not (found := _place(error, origin)):
             raise
-        raise ModelError(*found, _words(error)) from None
+        raise ModelError(*found, _words(error, found[0])) from None
 
 
 def _place(error: Exception, origin: Origin) -> tuple[str, int] | None:
     """File and line of the user's code from which an error comes."""
-    ours = {origin.place} if origin.is_file else set(map(str, _sources(_package(origin.place))))
+    ours = [origin.place] if origin.is_file else list(map(str, _sources(_package(origin.place))))
+    known = {abspath(file): file for file in ours}
     chain = [error, *filter(None, [error.__cause__])]
     frames = (frame for each in chain for frame in traceback.walk_tb(each.__traceback__))
     lines = [(frame.f_code.co_filename, line) for frame, line in frames]
     if where := getattr(error, "loc", None):  # of Numba's errors
         lines.append((where.filename, where.line))
-    lines += [(file, int(line)) for file, line in re.findall(r'File "(.+?)", line (\d+)', str(error))]
-    found = [(file, line) for file, line in lines if file in ours]
+    lines += [(file, int(line)) for file, line in _FILE.findall(str(error))]
+    found = [(known[abspath(file)], line) for file, line in lines if abspath(file) in known]
     return found[-1] if found else None
+
+
+_FILE = re.compile(r'File "(.+?)", line (\d+)')
 
 
 _ARITHMETIC = "plain arithmetic and NumPy's functions of numbers, such as np.sqrt and np.minimum"
 
 
-def _words(error: Exception) -> str:
-    """What an error of the user's code says, and what is allowed where that is known."""
+def _words(error: Exception, place: str) -> str:
+    """What an error of the user's code in the file `place` says, and what is allowed where that is known."""
     text = str(error)
     if isinstance(error, KeyError):
         return f"KeyError: {text}; allowed: names of the model's parameters"
     if "truth value of an array" in text:
         return f"a branch on arrays; allowed: {_ARITHMETIC}"
     if type(error).__module__.startswith("numba"):
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        told = [line for line in lines if not line.startswith(("Failed in", "During:", "File "))]
-        return f"does not compile: {(told or lines)[0]}; allowed: {_ARITHMETIC}, functions marked with sweep.jit.inline"
+        # Numba tells, from the outermost function inwards: that it failed, why, and where.
+        ends = [match.start() for match in _FILE.finditer(text) if abspath(match[1]) == abspath(place)]
+        lines = [line.strip() for line in text[: ends[-1] if ends else None].splitlines() if line.strip()]
+        begin = max((i + 1 for i, line in enumerate(lines[:-1]) if "Failed in" in line), default=0)
+        return f"does not compile: {lines[begin]}; allowed: {_ARITHMETIC}, functions marked with sweep.jit.inline"
     return f"{type(error).__name__}: {text}".splitlines()[0]

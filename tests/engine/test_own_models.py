@@ -188,7 +188,7 @@ def test_an_error_in_a_worker_names_its_line(folder: Path, workers: distributed.
     [
         ("pendulum", "    angle, rate, phase = y\n", "    angle, rate, phase = half(y)\n",
          "does not compile: Untyped global name 'half'"),
-        ("pendulum", "    return y[1], 0.0, 1.0", "    return y[1], 0.0, {'J': 1.0}.get('J', 'none')", "does not compile: "),
+        ("pendulum", "    return y[1], 0.0, 1.0", "    return y[1], 0.0, {'J': 1.0}.get(1)", "does not compile: "),
         ("fading", "    return p.mu /", "    return half(p.mu) /", "does not compile: Untyped global name 'half'"),
     ],
     ids=["helper", "dictionary", "law"],
