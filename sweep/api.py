@@ -81,8 +81,8 @@ def run(
     from sweep.engine.run import run
     from sweep.progress import shown
 
-    checked = load_config(config, overrides)
     with shown(progress, reporter) as told:
+        checked = load_config(config, overrides, announce=told.note)
         return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, cluster=cluster)
 
 
@@ -121,8 +121,8 @@ def critical(
     from sweep.progress import shown
     from sweep.studies.critical import critical
 
-    checked = load_config(config, overrides)
     with shown(progress, reporter, "bodies") as told:
+        checked = load_config(config, overrides, announce=told.note)
         return critical(checked, width, output, fresh=fresh, reporter=told)
 
 
@@ -158,14 +158,14 @@ def trajectory(
     ConfigError
         if the configuration cannot be used, the model is a formula, or a cell cannot be run.
     """
-    from sweep.config import load_config
-    from sweep.parameters import PARAMETERS
+    from sweep.config import load_config, parameters_of
     from sweep.progress import shown
     from sweep.studies.trajectory import trajectory
 
-    cells = {name: value for name, value in values.items() if name in PARAMETERS}
-    checked = load_config(config, {name: value for name, value in values.items() if name not in PARAMETERS})
+    known = parameters_of(config, values)
+    cells = {name: value for name, value in values.items() if name in known}
     with shown(progress, reporter, "sqrt(c/g)") as told:
+        checked = load_config(config, {n: v for n, v in values.items() if n not in known}, announce=told.note)
         return trajectory(checked, every=every, reporter=told, **cells)
 
 

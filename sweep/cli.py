@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -17,7 +17,7 @@ import click
 
 from sweep import interrupt
 from sweep.interrupt import INTERRUPTED
-from sweep.parameters import PARAMETERS
+from sweep.parameters import PARAMETERS, Parameter
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
 CLOSED_PIPE = 141
 """As the shell reports of any command that SIGPIPE ends: what read its output, such as `head`, has enough."""
+
+_TIMES = {"paper": "sqrt(c/g)", "SI": "s", "own": "of time"}
+"""The unit in which a progress bar counts time, by the `units` of a configuration."""
 
 _PATH = click.Path(path_type=Path)
 
@@ -158,11 +161,11 @@ def trajectory(
     """
     with _explained():
         checked = _load(config, settings)
-        at = _cells(cells)
+        at = _cells(cells, checked.table)
         if dry_run:
             from sweep.studies.trajectory import estimate
 
-            with _of_option("--at"):
+            with _of_option("--at", checked.table):
                 click.echo(estimate(checked, at))
             return
         from sweep.plots import trajectories as plots
@@ -171,7 +174,7 @@ def trajectory(
         from sweep.studies.trajectory import trajectory as follow
 
         interrupt.raise_again()
-        with Terminal(quiet, "s" if checked.units == "SI" else "sqrt(c/g)") as terminal, _of_option("--at"):
+        with Terminal(quiet, _TIMES[checked.units]) as terminal, _of_option("--at", checked.table):
             result = follow(checked, reporter=terminal, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
         files.save_result(result, plots.draw(result))
@@ -397,19 +400,24 @@ def _load(config: Path, settings: tuple[str, ...]) -> Config:
         if not (equals and path):
             _refuse(f"--set {brief(setting)}", "not a setting; allowed: PATH=VALUE")
         parsed[path] = parse_value(value, f"--set {brief(path)}")
-    return load_config(config, parsed, argument=lambda path: f"--set {path}")
+    return load_config(config, parsed, argument=lambda path: f"--set {path}", announce=_announce)
 
 
-def _cells(texts: tuple[str, ...]) -> dict[str, Any]:
+def _announce(words: str) -> None:
+    """Said even with --quiet: code of a user never runs unseen."""
+    _say(words, err=True)
+
+
+def _cells(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:
     """The values of `--at` by parameter."""
     from sweep.config.faults import brief, suggestion
 
     given: dict[str, list[float]] = {}
     for text in texts:
         name = text.partition("=")[0]
-        if name not in PARAMETERS:
-            meant = suggestion(name, PARAMETERS)
-            _refuse(f"--at {brief(text)}", f"unknown parameter{meant}; allowed: {', '.join(PARAMETERS)}")
+        if name not in known:
+            meant = suggestion(name, known)
+            _refuse(f"--at {brief(text)}", f"unknown parameter{meant}; allowed: {', '.join(known)}")
         given.setdefault(name, []).append(_parse_pair(text, "--at")[1])
     return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
 
@@ -425,7 +433,7 @@ def _parse_pair(text: str, option: str) -> tuple[str, float]:
 
 
 @contextmanager
-def _of_option(option: str) -> Iterator[None]:
+def _of_option(option: str, known: Mapping[str, Parameter]) -> Iterator[None]:
     """Name `option` in faults of the parameters that it gave."""
     from dataclasses import replace
 
@@ -433,7 +441,7 @@ def _of_option(option: str) -> Iterator[None]:
 
     def named(fault: Fault) -> Fault:
         first, *rest = fault.path or ("",)
-        ours = not fault.file and (not first or first in PARAMETERS)
+        ours = not fault.file and (not first or first in known)
         return replace(fault, path=(f"{option} {first}".rstrip(), *rest)) if ours else fault
 
     try:

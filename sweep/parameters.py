@@ -5,6 +5,7 @@ The schema of the configuration, the attributes of the dataset and the documenta
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, pi
 
@@ -144,7 +145,13 @@ ON_PARABOLOID: dict[str, str] = {
 }
 """What parameters of the body mean if its surface is a paraboloid; `a` and `b` have no default then."""
 
-SECTIONS: tuple[str, ...] = tuple(dict.fromkeys(p.section for p in PARAMETERS.values() if p.section))
+
+def sections(table: Mapping[str, Parameter]) -> tuple[str, ...]:
+    """Names of the sections in which the parameters of a table stand."""
+    return tuple(dict.fromkeys(p.section for p in table.values() if p.section))
+
+
+SECTIONS: tuple[str, ...] = sections(PARAMETERS)
 
 START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")
 """Names of the parameters of the start, on which the critical spins and the form factor do not depend."""

@@ -36,6 +36,8 @@ class Stability:
     ranges: Array
     """Ranges of spin in which the rattle decays, shape (6, cells), as `stability.stable_ranges` gives them: all those
     that the trajectory of the cell can reach."""
+    applies: bool = True
+    """Whether n_c1 is worth telling: not of a user's model to which the linear theory does not apply."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
         return prediction
     if LINEAR not in tier.offers:
         nothing = np.full(grid.bodies()[0].size, np.nan)
-        found = Stability((nothing, nothing), np.full((6, grid.size), np.nan))
+        found = Stability((nothing, nothing), np.full((6, grid.size), np.nan), applies=not tier.origin)
     else:
         found = _stability(tier, grid)
     timed = REVERSAL_TIME in tier.offers and FirstReversal.name in measure
@@ -128,5 +130,5 @@ def formulas(tier: Tier, grid: Grid) -> Prediction:
     found = None
     if FORMULAS in tier.offers:
         found = Formulas(analytic.reversal_count(grid.columns()), analytic.critical_spins(bodies))
-    papers = set(bodies) <= PAPERS
+    papers = set(bodies) <= PAPERS and not (isinstance(tier, Model) and tier.origin)
     return Prediction(analytic.form_factor(bodies) if papers else None, found, None)

@@ -44,6 +44,13 @@ _SI = {
 are per unit mass."""
 
 
+def without_unit(long_name: str) -> str:
+    """`long_name` without the paper's unit, which another model does not know."""
+    head, _, rest = long_name.rpartition(", ")
+    words, mark, after = rest.partition(";")
+    return f"{head}{mark}{after}" if words in _SI else long_name
+
+
 def in_si(units: str, long_name: str) -> tuple[str, str]:
     """CF unit and `long_name`, in SI, of what has these in the paper's units."""
     head, _, rest = long_name.rpartition(", ")

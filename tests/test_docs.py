@@ -2,14 +2,16 @@
 
 Fenced blocks are run as they stand, page by page from top to bottom, in a folder with the configurations of
 `configs/` on coarser grids: ```console (lines that begin with `$ `), ```python and ```{code-cell}; every ```yaml
-must be a configuration.  A block that must not be run has a comment above it that says why:
-<!-- not run: takes minutes -->.  With <!-- campaign: takes a minute --> it is run among the campaigns alone.
+must be a configuration; a ```{code-block} with a caption is a file.  A block that must not be run has a comment above
+it that says why: <!-- not run: takes minutes -->.  With <!-- campaign: takes a minute --> it is run among the
+campaigns alone.
 """
 
 from __future__ import annotations
 
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,7 +70,7 @@ def commands(block: Block) -> list[str]:
 
 
 def _runs(page: Path, *when: str) -> list[Block]:
-    kinds = ("console", "python", "{code-cell}", "yaml")
+    kinds = ("console", "python", "{code-cell}", "yaml", "{code-block}")
     return [block for block in blocks(page) if block.kind in kinds and block.when in when]
 
 
@@ -90,6 +92,8 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         small["integrator"] = {**small.get("integrator", {}), "t_end": 300}
         small.pop("measure", None)
         yaml.dump(small, tmp_path / "configs" / path.name)
+    for path in (ROOT / "configs").glob("*.py"):
+        shutil.copy(path, tmp_path / "configs")
     (tmp_path / "docs" / "tutorial").mkdir(parents=True)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(mpl, "rcParams", mpl.RcParams(mpl.rcParams | {"figure.max_open_warning": 0}))
@@ -119,6 +123,9 @@ def _run_page(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch, *when
                 _run_command(block, command)
         elif block.kind == "yaml":
             _check_configuration(block, checkout)
+        elif block.kind == "{code-block}":
+            head, _, text = block.text.partition("\n\n")
+            (checkout / head.removeprefix(":caption: ")).write_text(text, encoding="utf-8")
         else:
             # Sphinx runs a notebook in its own folder.
             monkeypatch.chdir(checkout / "docs" / "tutorial" if block.kind == "{code-cell}" else checkout)

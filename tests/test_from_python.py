@@ -21,7 +21,7 @@ from support.runs import same_numbers
 import sweep
 from sweep.config import ConfigError, load_config, schema
 from sweep.config.plain import plain
-from sweep.parameters import PARAMETERS
+from sweep.parameters import PARAMETERS, SECTIONS
 
 Write = Callable[..., Path]
 
@@ -278,7 +278,7 @@ VALUE = st.recursive(
 )
 SECTIONS = {
     "integrator": FIELDS[schema.Integrator],
-    **{section: [p.name for p in PARAMETERS.values() if p.section == section] for section in schema.SECTIONS},
+    **{section: [p.name for p in PARAMETERS.values() if p.section == section] for section in SECTIONS},
 }
 DOCUMENT = st.one_of(
     st.dictionaries(KEY, VALUE, max_size=3),

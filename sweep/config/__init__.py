@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -14,18 +14,21 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from sweep.config import cases, document, scenes, schema
+from sweep.config import brought, cases, document, scenes, schema
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.messages import describe
 from sweep.config.plain import plain
 from sweep.config.schema import Config, Integrator, Values
-from sweep.grid import BODY, Grid, distinct, off_the_body
+from sweep.grid import BODY, Grid, distinct
 from sweep.kernels import measures, methods
 from sweep.kernels.differentiate import undifferentiable
 from sweep.kernels.measures import MEASURES
+from sweep.models import outside
 from sweep.models.model import Model, Tier
-from sweep.models.scene import SI
-from sweep.parameters import PARAMETERS, SECTIONS
+from sweep.models.origin import Origin
+from sweep.models.scene import PAPERS_LAW, SI
+from sweep.models.surfaces import ELLIPSOID
+from sweep.parameters import Parameter, sections
 
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 
@@ -34,9 +37,15 @@ ConfigLike = Config | Mapping[str, Any] | str | os.PathLike[str]
 
 
 def load_config(
-    config: ConfigLike, overrides: Mapping[str, Any] | None = None, *, argument: Callable[[str], str] = str
+    config: ConfigLike,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    argument: Callable[[str], str] = str,
+    announce: Callable[[str], None] | None = lambda words: None,  # noqa: ARG005
 ) -> Config:
     """Read and check a configuration.
+
+    If its model is a file or an entry point, the code of that runs.
 
     Parameters
     ----------
@@ -45,6 +54,7 @@ def load_config(
     overrides : values that replace those of `config`, by path ("friction.mu") or, for a parameter or a setting of the
         integrator, by bare name ("mu")
     argument : what faults call the override of this key
+    announce : told in words that code of a user is about to run; None if such a model is to be refused
 
     Raises
     ------
@@ -53,20 +63,42 @@ def load_config(
     """
     if isinstance(config, Config) and not overrides:
         return config
-    source = _source(config)
+    source, origin = _opened(config, overrides or {}, argument, announce)
+    known = outside.table(origin)
     for key, value in (overrides or {}).items():
-        source.set(_full_path(key), plain(value), argument(key))
+        source.set(_full_path(key, known), plain(value), argument(key))
     # A name made from the file's must not be refused, since the user did not choose it.
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")
     try:
-        checked = schema.Schema.model_validate(source.values)
+        checked = schema.schema_of(origin).model_validate(source.values)
     except ValidationError as error:
-        found = describe(error.errors(), schema.Schema)
+        found = describe(error.errors(), schema.schema_of(origin))
         raise ConfigError([source.fault(path, text, at_key=key) for path, text, key in found]) from None
-    resolved = _resolve(checked, source)
+    resolved = _resolve(checked, source, origin)
     object.__setattr__(resolved, "source", source)
     return resolved
+
+
+def parameters_of(config: ConfigLike, overrides: Mapping[str, Any]) -> Mapping[str, Parameter]:
+    """The parameters that a configuration with these overrides may name; errors as of `load_config`."""
+    if isinstance(config, Config) and "model" not in overrides:
+        return config.table
+    _, origin = _opened(config, overrides, str, lambda words: None)  # noqa: ARG005
+    return outside.table(origin)
+
+
+def _opened(
+    config: ConfigLike,
+    overrides: Mapping[str, Any],
+    argument: Callable[[str], str],
+    announce: Callable[[str], None] | None,
+) -> tuple[document.Document, Origin | None]:
+    """The document of a configuration, and where its model comes from, if a user brings it."""
+    source = _source(config)
+    for key in {"model", "model_sha256"} & set(overrides):  # what the code to run depends on
+        source.set((key,), plain(overrides[key]), argument(key))
+    return source, brought.named(source, announce)
 
 
 def _source(config: ConfigLike) -> document.Document:
@@ -78,43 +110,41 @@ def _source(config: ConfigLike) -> document.Document:
         if config.cases is not None:
             table = config.cases_file or "cases", config.cases
             values["cases"] = table[0]
-        return document.Document("", values, table=table)
+        return document.Document("", values, table=table, model=config.origin)
     if isinstance(config, Mapping):
         return document.Document("", plain(config))
     return document.read(Path(config))
 
 
-def _full_path(key: str) -> tuple[str, ...]:
+def _full_path(key: str, known: Mapping[str, Parameter]) -> tuple[str, ...]:
     """Where the value of an override belongs."""
-    if key in PARAMETERS:
-        return PARAMETERS[key].place
+    if key in known:
+        return known[key].place
     return ("integrator", key) if key in Integrator.model_fields else tuple(key.split("."))
 
 
-def _resolve(checked: Any, source: document.Document) -> Config:
+def _resolve(checked: Any, source: document.Document, origin: Origin | None) -> Config:
     """Fill in defaults, order the axes, and check that the values fit together."""
-    given = _given(checked, source)
-    if "offset" in given and not given["offset"].is_axis and given["offset"].numbers == (0.0,):
+    known = outside.table(origin)
+    given = _given(checked, source, known)
+    if not origin and "offset" in given and given["offset"].spec == 0.0:
         del given["offset"]  # the default: it does not make a body other than the paper's
-    columns = _table(checked.cases, source) if checked.cases is not None else None
-    names, law, units = (*given, *(columns or ())), checked.friction.name, checked.units
-    surface, needed = checked.body.surface, scenes.without_default(checked)
-    if faults := list(scenes.misfits(checked, names, source)):
-        raise ConfigError(faults)
-    model = schema.tier_of(checked.model, law, units, names, surface)
+    columns = _table(checked.cases, source, known) if checked.cases is not None else None
+    model, law, units = _model(checked, origin, (*given, *(columns or ())), source)
+    surface = ELLIPSOID.name if origin else checked.body.surface
+    needed = scenes.without_default(units, surface)
     checked = _with_method(checked, model)
-    faults = list(_misfits(checked, model, given, columns, source))
+    faults = list(_misfits(checked, model, given, columns, source, known))
     order = sorted(model.parameters, key=lambda n: (_rank(n, schema.FIRST_AXES), _rank(n, tuple(given))))
     parameters = {}
     for name in order:
-        default = None if name in needed else PARAMETERS[name].default
+        default = None if known[name] in needed else known[name].default
         if name in given:
             parameters[name] = given[name]
         elif name in (columns or {}):
             continue
         elif default is None:
-            parameter = PARAMETERS[name]
-            faults.append(source.fault(parameter.place, f"missing; allowed: {parameter.allowed}"))
+            faults.append(source.fault(known[name].place, f"missing; allowed: {known[name].allowed}"))
         else:
             parameters[name] = Values((default,), False, default)
     if faults:
@@ -133,8 +163,10 @@ def _resolve(checked: Any, source: document.Document) -> Config:
         units=units,
         law=law,
         surface=surface,
+        origin=origin,
     )
-    if units == SI and "t_end" not in checked.integrator.model_fields_set:
+    brought.try_out(config)
+    if units == SI and config.of_rattlebacks and "t_end" not in checked.integrator.model_fields_set:
         config = config.with_time()
     for path, check in _CHECKS:
         if reason := check(config):
@@ -144,21 +176,36 @@ def _resolve(checked: Any, source: document.Document) -> Config:
     return config
 
 
-def _given(checked: Any, source: document.Document) -> dict[str, Values]:
+def _model(
+    checked: Any, origin: Origin | None, names: Collection[str], source: document.Document
+) -> tuple[Tier, str, str]:
+    """The model of a configuration that names these parameters, with its law of friction and its units."""
+    law, units = outside.law(origin) if origin else None, checked.units
+    found = scenes.misfits_of_own(checked, law, names, source) if origin else scenes.misfits(checked, names, source)
+    if faults := list(found):
+        raise ConfigError(faults)
+    if not origin:
+        law_name, surface = checked.friction.name, checked.body.surface
+        return schema.tier_of(checked.model, law_name, units, names, surface), law_name, units
+    model = outside.find(origin, units, names)
+    return (model, law.name, units) if law else (model, PAPERS_LAW, model.units)
+
+
+def _given(checked: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:
     """The physical parameters that the document names, in its order."""
     found: dict[str, Values] = {}
     for key, value in source.values.items():
-        if key in SECTIONS:
-            found |= {name: getattr(getattr(checked, key), name) for name in value if name in PARAMETERS}
-        elif key in PARAMETERS:
+        if key in sections(known):
+            found |= {name: getattr(getattr(checked, key), name) for name in value if name in known}
+        elif key in known:
             found[key] = getattr(checked, key)
     return found
 
 
-def _table(name: str, source: document.Document) -> dict[str, tuple[float, ...]]:
+def _table(name: str, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, tuple[float, ...]]:
     """The columns of the table of cases, which is read once for all that is made from `source`."""
     if not source.table or source.table[0] != name:
-        source.table = name, cases.read(source, name)
+        source.table = name, cases.read(source, name, known)
     return source.table[1]
 
 
@@ -182,9 +229,10 @@ def _unusable_step(config: Config) -> str:
     if config.integrator.t_end / step > schema.MAX_STEPS:
         return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
     with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
+        names = BODY if config.of_rattlebacks else model.parameters
         longest = min(
             float(methods.longest_step(model, columns)[~model.impossible(columns)].min(initial=np.inf))
-            for columns in distinct(Grid.of(config), BODY)
+            for columns in distinct(Grid.of(config), names)
         )
     if step <= longest:
         return ""
@@ -197,7 +245,7 @@ _CHECKS: tuple[tuple[tuple[str, ...], Callable[[Config], str]], ...] = (
     ((), _too_large),
     (("refine",), _too_large_to_refine),
     (("body",), scenes.impossible),
-    (("start", "x0"), off_the_body),
+    (("start", "x0"), scenes.misplaced),
     (("integrator", "step"), _unusable_step),
 )
 
@@ -227,10 +275,11 @@ def _misfits(
     given: dict[str, Any],
     columns: dict[str, tuple[float, ...]] | None,
     source: document.Document,
+    known: Mapping[str, Parameter],
 ) -> Iterator[Fault]:
     """Faults of values that are valid by themselves but do not fit together."""
     for name in given:
-        path = PARAMETERS[name].place
+        path = known[name].place
         # A number that the model does not use may stay, so that one file serves every model.
         if name not in model.parameters and given[name].is_axis:
             yield source.fault(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from math import isfinite, nan
 from pathlib import Path
@@ -17,14 +17,16 @@ from sweep.config import files
 from sweep.config.document import Document, number
 from sweep.config.faults import ConfigError, Fault, brief, quote
 from sweep.config.schema import MAX_AXIS
-from sweep.parameters import PARAMETERS
+from sweep.parameters import Parameter
 
 LIMIT = 32 * files.MIB
 _MAX_FAULTS = 20
 
 
-def read(source: Document, name: str) -> dict[str, tuple[float, ...]]:
+def read(source: Document, name: str, known: Mapping[str, Parameter]) -> dict[str, tuple[float, ...]]:
     """Columns of the table `name`, a path relative to the configuration's folder, checked cell by cell.
+
+    `known` are the parameters that it may have, by name.
 
     Raises
     ------
@@ -33,7 +35,7 @@ def read(source: Document, name: str) -> dict[str, tuple[float, ...]]:
     """
     path = Path(source.file).parent / name
     try:
-        return _columns(str(path), files.read(path, LIMIT))
+        return _columns(str(path), files.read(path, LIMIT), known)
     except FileNotFoundError:
         reason = f"no such file in {path.parent}"
     except OSError as error:
@@ -45,10 +47,10 @@ def read(source: Document, name: str) -> dict[str, tuple[float, ...]]:
     raise ConfigError([source.fault(("cases",), f"{brief(name)}: {reason}")])
 
 
-def _columns(file: str, text: str) -> dict[str, tuple[float, ...]]:
+def _columns(file: str, text: str, known: Mapping[str, Parameter]) -> dict[str, tuple[float, ...]]:
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     header = [cell.strip() for cell in next(reader, [])]
-    faults = _header_faults(file, header)
+    faults = _header_faults(file, header, known)
     table: list[list[float]] = []
     for row in reader:
         if faults[_MAX_FAULTS:]:
@@ -62,7 +64,8 @@ def _columns(file: str, text: str) -> dict[str, tuple[float, ...]]:
             faults.append(Fault(file, line, None, (), f"too many rows; allowed: at most {MAX_AXIS}"))
             break
         elif not faults:
-            table.append([_number(file, line, column, header, row, faults) for column in range(len(row))])
+            named = zip(header, row, strict=True)
+            table.append([_number(file, line, i, known[key], text, faults) for i, (key, text) in enumerate(named, 1)])
     if not faults and not table:
         faults.append(Fault(file, None, None, (), "no cases; allowed: a row or more under the header"))
     if faults:
@@ -70,29 +73,29 @@ def _columns(file: str, text: str) -> dict[str, tuple[float, ...]]:
     return {key: tuple(row[i] for row in table) for i, key in enumerate(header)}
 
 
-def _header_faults(file: str, header: list[str]) -> list[Fault]:
-    allowed = ", ".join(PARAMETERS)
+def _header_faults(file: str, header: list[str], known: Mapping[str, Parameter]) -> list[Fault]:
+    allowed = ", ".join(known)
     if not header:
         return [Fault(file, None, None, (), f"empty; line 1 names the columns: {allowed}")]
-    if not set(header) & set(PARAMETERS):
+    if not set(header) & set(known):
         return [Fault(file, 1, 1, (), f"{quote(header[0])}: unknown parameter; allowed: {allowed}")]
-    return list(islice(_misnamed(file, header), _MAX_FAULTS))
+    return list(islice(_misnamed(file, header, known), _MAX_FAULTS))
 
 
-def _misnamed(file: str, header: list[str]) -> Iterator[Fault]:
+def _misnamed(file: str, header: list[str], known: Mapping[str, Parameter]) -> Iterator[Fault]:
     seen = set()
     for column, name in enumerate(header, start=1):
-        if name not in PARAMETERS:
-            yield Fault(file, 1, column, (name,), f"unknown parameter; allowed: {', '.join(PARAMETERS)}")
+        if name not in known:
+            yield Fault(file, 1, column, (name,), f"unknown parameter; allowed: {', '.join(known)}")
         elif name in seen:
             yield Fault(file, 1, column, (name,), "a column twice; allowed: each once")
         seen.add(name)
 
 
-def _number(file: str, line: int, column: int, header: list[str], row: list[str], faults: list[Fault]) -> float:
-    parameter, text = PARAMETERS[header[column]], row[column].strip()
+def _number(file: str, line: int, column: int, parameter: Parameter, text: str, faults: list[Fault]) -> float:
+    text = text.strip()
     value = number(text)
     if value is None or not isfinite(value) or not parameter.allows(value):
-        faults.append(Fault(file, line, column + 1, (parameter.name,), f"{quote(text)}; allowed: {parameter.allowed}"))
+        faults.append(Fault(file, line, column, (parameter.name,), f"{quote(text)}; allowed: {parameter.allowed}"))
         return nan
     return value

@@ -18,6 +18,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from sweep.config import files
 from sweep.config.faults import ConfigError, Fault, Path
+from sweep.models.origin import Origin
 
 LIMIT = 1 * files.MIB
 """Largest document, in bytes: reading takes some 20 s per megabyte."""
@@ -46,6 +47,8 @@ class Document:
     """For each value that an argument gave, and each section that it added: the argument, and the path that it set."""
     table: tuple[str, Any] | None = None
     """Name and columns of the table of cases, once it is read."""
+    model: Origin | None = None
+    """Where the model comes from that a user brings, once it is read."""
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
         """A fault at `path`; it is placed at the nearest section above if the document lacks that path."""

@@ -15,17 +15,30 @@ import numpy as np
 from sweep.config.document import Document
 from sweep.config.faults import Fault
 from sweep.config.schema import Config
-from sweep.grid import BODY, Grid, distinct
+from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.models import bodies
 from sweep.models.general import BASES
+from sweep.models.laws import Law
 from sweep.models.scene import INERTIA, PAPER, PAPERS, PAPERS_LAW, SI, is_papers, strangers
 from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES
-from sweep.parameters import PARAMETERS
+from sweep.parameters import PARAMETERS, Parameter
+
+
+def misfits_of_own(checked: Any, law: Law | None, names: Collection[str], source: Document) -> Iterator[Fault]:
+    """Faults of parameters that do not belong together, where a user brings the model, or its `law` of friction."""
+    if law is None:
+        if "units" in checked.model_fields_set:
+            yield source.fault(("units",), "the model's file says its units; allowed: no units", at_key=True)
+        return
+    for name, reason in strangers(law.name, checked.units, names, own=law).items():
+        yield source.fault(PARAMETERS[name].place, reason, at_key=True)
 
 
 def misfits(checked: Any, names: Collection[str], source: Document) -> Iterator[Fault]:
     """Faults of parameters that do not belong together."""
     law, units, surface = checked.friction.name, checked.units, checked.body.surface
+    if checked.model_sha256 is not None:
+        yield source.fault(("model_sha256",), f"the {checked.model} model is no file; allowed: none", at_key=True)
     if "regularisation" in checked.friction.model_fields_set and checked.friction.law != "coulomb":
         yield source.fault(
             ("friction", "regularisation"), f"not of the law {law}; allowed: with law: coulomb", at_key=True
@@ -43,11 +56,10 @@ def misfits(checked: Any, names: Collection[str], source: Document) -> Iterator[
         yield source.fault(PARAMETERS[name].place, reason, at_key=True)
 
 
-def without_default(checked: Any) -> frozenset[str]:
+def without_default(units: str, surface: str) -> list[Parameter]:
     """The parameters of the paper that a configuration has to give, because their defaults are of other bodies."""
-    if checked.units == SI:
-        return frozenset(PAPERS)
-    return frozenset({"a", "b"} if checked.body.surface == PARABOLOID.name else ())
+    names = PAPERS if units == SI else {"a", "b"} if surface == PARABOLOID.name else ()
+    return [PARAMETERS[name] for name in names]
 
 
 @dataclass(frozen=True)
@@ -91,7 +103,7 @@ def _at(values: Mapping[str, float]) -> str:
 
 def _reasons(config: Config) -> list[_Reason]:
     """Each reason why bodies cannot be or cannot stand; a cell counts for the first that is true of it."""
-    if not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
+    if not config.of_rattlebacks or not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
         return []
     grid, surface = Grid.of(config), SURFACES[config.surface]
     counts, first, seen = Counter[str](), dict[str, dict[str, float]](), 0
@@ -106,3 +118,8 @@ def _reasons(config: Config) -> list[_Reason]:
                 counts[words] += len(cells)
                 left[cells] = False
     return [_Reason(words, counts[words] * grid.size // seen, first[words]) for words in first]
+
+
+def misplaced(config: Config) -> str:
+    """What is wrong with the first cell whose start point lies off the ellipsoid; "" if no cell's does."""
+    return off_the_body(config) if config.of_rattlebacks else ""

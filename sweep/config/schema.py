@@ -7,9 +7,9 @@ import json
 import math
 import re
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -27,13 +27,13 @@ from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
-from sweep.models import TIERS
+from sweep.models import TIERS, laws, outside
 from sweep.models.general import BASES
-from sweep.models.laws import LAWS
 from sweep.models.model import Model, Tier
+from sweep.models.origin import Origin
 from sweep.models.scene import PAPER, PAPERS_LAW, SI, is_papers, variant
 from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES
-from sweep.parameters import ON_PARABOLOID, PARAMETERS, SECTIONS, Parameter
+from sweep.parameters import ON_PARABOLOID, PARAMETERS, Parameter, sections
 from sweep.variables import in_si
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
@@ -239,14 +239,14 @@ class Integrator(_Strict):
     )
 
 
-def _physical(section: str) -> dict[str, Any]:
-    """The fields of the physical parameters in a section, made from the table of parameters."""
+def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:
+    """The fields of the physical parameters in a section, made from a table of parameters."""
     return {
         p.name: (
             Annotated[Any, BeforeValidator(lambda raw, p=p: _parse_values(p, raw)), Field(description=p.long_name)],
             None,
         )
-        for p in PARAMETERS.values()
+        for p in table.values()
         if p.section == section
     }
 
@@ -283,9 +283,14 @@ class _Top(_Strict):
         default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
         description="name of the run and of its files; by default that of the configuration file",
     )  # fmt: skip
-    model: Literal[tuple(TIERS)] = Field(  # type: ignore[valid-type]
-        default="slip", description="which model to integrate"
-    )
+    model: Annotated[
+        Literal[tuple(TIERS)],  # type: ignore[valid-type]
+        Allowed(f"{', '.join(TIERS)}, a Python file such as my_model.py, or an entry point of a package"),
+    ] = Field(default="slip", description="which model to integrate; the code of a file or a package is run")
+    model_sha256: Annotated[str | None, Allowed("64 hexadecimal digits")] = Field(
+        default=None, pattern="^[0-9a-f]{64}$",
+        description="SHA-256 that the file or the package of `model` has to have; a dataset tells its own",
+    )  # fmt: skip
     units: Literal[PAPER, SI] = Field(  # type: ignore[valid-type]
         default=PAPER, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
     )
@@ -312,13 +317,23 @@ class _Top(_Strict):
     )
 
 
-def _section(name: str) -> tuple[Any, Any]:
-    made: Any = create_model(name.capitalize(), __base__=_WORDS.get(name, _Words), **_physical(name))
+def _section(name: str, table: Mapping[str, Parameter], words: type[_Words]) -> tuple[Any, Any]:
+    made: Any = create_model(name.capitalize(), __base__=words, **_physical(name, table))
     return made, Field(default_factory=made)
 
 
-_sections: dict[str, Any] = {name: _section(name) for name in SECTIONS}
-Schema: Any = create_model("Configuration", __base__=_Top, **_physical(""), **_sections)
+@cache
+def schema_of(origin: Origin | None) -> Any:
+    """The schema of the configurations of a user's model, or, without one, of the models of this package."""
+    table = outside.table(origin)
+    words = {} if origin else _WORDS
+    found: dict[str, Any] = {name: _section(name, table, words.get(name, _Words)) for name in sections(table)}
+    if origin:
+        found["model"] = str, ...
+    return create_model("Configuration", __base__=_Top, **_physical("", table), **found)
+
+
+Schema: Any = schema_of(None)
 
 SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fields.items() if name != "integrator"}
 for _name, _words in _WORDS.items():
@@ -360,6 +375,8 @@ class Config:
     """Name of the law of friction, as in `sweep.models.laws.LAWS`."""
     surface: str = ELLIPSOID.name
     """Name of the surface, as in `sweep.models.surfaces.SURFACES`."""
+    origin: Origin | None = None
+    """Where the model comes from, if a user brings it."""
     source: Document | None = field(default=None, init=False, compare=False, repr=False)
     """What it was made from, so that single values can be replaced; a copy with other values has none."""
 
@@ -374,7 +391,30 @@ class Config:
     @property
     def tier(self) -> Tier:
         """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
-        return tier_of(self.model, self.law, self.units, (*self.parameters, *(self.cases or ())), self.surface)
+        names = (*self.parameters, *(self.cases or ()))
+        if self.origin:
+            return outside.find(self.origin, self.units, names)
+        return tier_of(self.model, self.law, self.units, names, self.surface)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the model is simulated rather than a formula."""
+        return isinstance(self.tier, Model)
+
+    @property
+    def own_law(self) -> laws.Law | None:
+        """The law of friction that a user brings for a rattleback."""
+        return outside.law(self.origin) if self.origin else None
+
+    @property
+    def of_rattlebacks(self) -> bool:
+        """Whether its bodies are ellipsoids on a plane; a user's model may be of anything else."""
+        return not self.origin or self.own_law is not None
+
+    @property
+    def table(self) -> Mapping[str, Parameter]:
+        """The parameters that it may name."""
+        return outside.table(self.origin)
 
     @property
     def equations(self) -> Model:
@@ -392,8 +432,8 @@ class Config:
 
     def described(self, name: str) -> dict[str, str]:
         """The CF attributes of a physical parameter."""
-        parameter = PARAMETERS[name]
-        if name in LAWS[self.law].pure:
+        parameter = self.table[name]
+        if name in (self.own_law or laws.LAWS[self.law]).pure:
             return {"long_name": "coefficient of friction", "units": "1"}
         units, long_name = parameter.units, parameter.long_name
         if self.surface == PARABOLOID.name:
@@ -404,23 +444,26 @@ class Config:
 
     def document(self) -> dict[str, Any]:
         """The whole configuration, defaults included, as plain data."""
-        written = [PARAMETERS[name].section for name in self.axes if name not in FIRST_AXES]
+        table = self.table
+        written = [table[name].section for name in self.axes if name not in FIRST_AXES]
         # In the order of the axes, so that they keep it when the document is read again.
-        sections: dict[str, dict[str, Any]] = {section: {} for section in (*written, *SECTIONS) if section}
-        top: dict[str, Any] = {"units": self.units} if self.units != PAPER else {}
-        if self.law != PAPERS_LAW:
+        found: dict[str, dict[str, Any]] = {section: {} for section in (*written, *sections(table)) if section}
+        top: dict[str, Any] = {"model_sha256": self.origin.digest} if self.origin else {}
+        if self.units != PAPER and self.of_rattlebacks:
+            top["units"] = self.units
+        if self.law != PAPERS_LAW and not self.origin:
             law, _, regularisation = self.law.partition("-")
-            sections["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
+            found["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
         if self.surface != ELLIPSOID.name:
-            sections["body"] |= {"surface": self.surface}
+            found["body"] |= {"surface": self.surface}
         for name, value in self.parameters.items():
-            sections.get(PARAMETERS[name].section, top)[name] = value.spec
+            found.get(table[name].section, top)[name] = value.spec
         return {
             "name": self.name,
             "model": self.model,
             **top,
             **({"cases": self.cases_file} if self.cases_file else {}),
-            **{section: values for section, values in sections.items() if values},
+            **{section: values for section, values in found.items() if values},
             "integrator": self.integrator.model_dump(),
             "measure": [_written(spec) for spec in self.measure],
             "verify": self.verify,
@@ -442,7 +485,8 @@ class Config:
     def fingerprint(self) -> str:
         """Hash of everything that determines the numbers: not the name, nor how many failures are accepted."""
         decisive = self.document()
-        for key in ("name", "max_failed_fraction", "cases"):
+        # What the file of a model says, which its SHA-256 tells, not where it lies.
+        for key in ("name", "max_failed_fraction", "cases", *(["model"] if self.origin else [])):
             decisive.pop(key, None)
         text = json.dumps([decisive, list(self.axes), self.cases], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]

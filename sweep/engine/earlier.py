@@ -18,7 +18,7 @@ from sweep.kernels.measures.sensitivity import Sensitivity
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import FAILURES, TIME_LIMIT
 from sweep.models.model import Model
-from sweep.parameters import PARAMETERS, SECTIONS
+from sweep.parameters import Parameter, sections
 from sweep.results import dataset
 from sweep.results.identity import Identity
 
@@ -72,8 +72,9 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     same_program = (found.source_hash, found.versions) == (wanted.source_hash, wanted.versions)
     if rerun is None and not (same_program and found.of_one_run):
         return found.difference(wanted)
-    old, new = (_settings(parse_value(each.config, "dataset")) for each in (found, wanted))
-    free = _FREE_AGAIN if rerun else _FREE
+    old, new = (_settings(parse_value(each.config, "dataset"), config.table) for each in (found, wanted))
+    # Of a user's model, `model_sha256` tells what `model` only names.
+    free = (_FREE_AGAIN if rerun else _FREE) | ({"model"} if config.origin else set())
     changed = [key for key in {**old, **new} if key not in free and _differ(key, old, new)]
     grown = _match(Grid.of(config), _grid(there))
     same_cells = len(grown) == there["status"].size
@@ -100,11 +101,11 @@ def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
     return Earlier(there, cells)
 
 
-def _settings(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything that a configuration says, but for the values of parameters, by which cells are matched."""
-    found = {key: value for key, value in document.items() if key not in (*SECTIONS, *PARAMETERS, "cases")}
-    for section in SECTIONS:
-        found |= {f"{section}.{key}": v for key, v in document.get(section, {}).items() if key not in PARAMETERS}
+def _settings(document: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
+    """Everything that a configuration says, but for the values of `known` parameters, by which cells are matched."""
+    found = {key: value for key, value in document.items() if key not in (*sections(known), *known, "cases")}
+    for section in sections(known):
+        found |= {f"{section}.{key}": v for key, v in document.get(section, {}).items() if key not in known}
     return found
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.config import Config
+from sweep.config.brought import explained
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import GROUP
 from sweep.engine.plan import choose
 from sweep.grid import Grid
 from sweep.kernels.stability import uncompiled
-from sweep.models import MODELS
 
 _SAMPLE = 4096
 """Cells whose steps are chosen to judge all the others by."""
@@ -24,10 +24,10 @@ def estimate(config: Config) -> str:
     grid = Grid.of(config)
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one cell"
     cells = f"cells:  {grid.size} ({axes})" + (", not all of them simulated" if config.refine else "")
-    if config.model not in MODELS:
+    if not config.simulated:
         return cells
     sample = grid.sample(_SAMPLE)
-    with uncompiled():
+    with uncompiled(), explained(config.origin):
         chosen, share = choose(config, sample), grid.size / sample.size
     steps = [np.ceil(config.integrator.t_end / each.step) for each in chosen if len(each.cells)]
     total, seconds = sum(each.sum() for each in steps) * share, sum(map(nominal_seconds, steps)) * share

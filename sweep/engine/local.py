@@ -15,7 +15,6 @@ from sweep.engine.repeats import repeat_all
 from sweep.engine.sensitivity import runs_asked_for, sensitivity
 from sweep.grid import Array, Grid, Tile
 from sweep.kernels.status import FAILURES, RUNNING, SETTLED
-from sweep.models import MODELS
 from sweep.prediction import predict
 from sweep.results import dataset
 from sweep.results.provenance import this_cpu
@@ -74,7 +73,7 @@ def run_group(
     after_chunk : called with the statuses of the group's cells
     """
     grid, cpu = Grid.of(config), this_cpu()
-    if config.model not in MODELS:
+    if not config.simulated:
         for i in group:
             yield Done(i, _evaluate(config, grid.part(tiles[i])), 0.0, cpu)
         return

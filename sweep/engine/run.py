@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigLike, load_config
+from sweep.config.brought import explained
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.earlier import RERUN, Earlier, reason_against, taken_over
@@ -25,6 +26,7 @@ from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
+from sweep.results import dataset
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity, not_resumed
@@ -56,6 +58,7 @@ def run(
     config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun {rerun!r}; allowed: {', '.join(RERUN)}")
+    dataset.check_names(config)
     reporter = reporter or Reporter()
     if output is None:
         return _compute(config, Memory(), reporter, cluster).dataset()
@@ -115,10 +118,11 @@ def _compute(
         # A single cell has no neighbours from which it could be inferred.
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
     count = Count(reporter)
-    while result.grow(tile_size):
-        if not count.cells and (store.done or running):
-            reporter.note(_kept(result, store, running))
-        _run_tiles(result.simulated(), result.tiles, store, count, cluster)
+    with explained(config.origin):
+        while result.grow(tile_size):
+            if not count.cells and (store.done or running):
+                reporter.note(_kept(result, store, running))
+            _run_tiles(result.simulated(), result.tiles, store, count, cluster)
     return result
 
 

@@ -22,7 +22,6 @@ from sweep.explore.state import Cell
 from sweep.grid import Array
 from sweep.jit import showing
 from sweep.kernels import measures
-from sweep.models import MODELS
 from sweep.plots.trajectories import reversal_times
 from sweep.studies.trajectory import trajectory
 
@@ -88,7 +87,10 @@ def usable(source: Source) -> Setup | None:
 
 
 def _configuration(source: Source) -> Config:
-    """The configuration in the dataset; a table of cases, which is another file, gives way to the first case."""
+    """The configuration in the dataset; a table of cases, which is another file, gives way to the first case.
+
+    It may come from anybody, so that a model in it that is a file or an entry point is refused, not run.
+    """
     text = str(source.dataset.attrs.get("config", ""))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "explore.yaml")
@@ -98,8 +100,8 @@ def _configuration(source: Source) -> Config:
             path.write_text("\n".join(line for line in text.split("\n") if not line.startswith("cases:")), "utf-8")
             coordinates = [str(n) for n, c in source.dataset.coords.items() if n != "case"]
             overrides = source.parameters_at(tuple(coordinates), {"case": 0})
-        config = load_config(path, overrides)
-    if config.model not in MODELS:
+        config = load_config(path, overrides, announce=None)
+    if not config.simulated:
         raise ConfigError([])
     names = config.tier.parameters
     return replace(config, parameters={name: config.parameters[name] for name in names if name in config.parameters})

@@ -20,7 +20,6 @@ HINT = _SOFT.format(
     "Point at a cell to read it. <b>Click</b> it to run its trajectory, with <b>Shift</b> to add it to those drawn. "
     "With the keyboard: arrows choose a cell, Enter runs it."
 )
-HINT_STILL = _SOFT.format("Point at a cell to read it. This file tells no configuration to run trajectories from.")
 EMPTY = _SOFT.format("The trajectories of the cells that you click are drawn and played here.")
 
 _BUTTONS = 6
@@ -29,6 +28,14 @@ _BUTTONS = 6
 _COUNTS = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
 
 BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }"
+
+
+def still(source: Source) -> str:
+    """The hint for a file from which no trajectory is run."""
+    why = "This file tells no configuration to run trajectories from."
+    if place := source.dataset.attrs.get("model_place"):
+        why = f"Its model is code of a user, {escaped(str(place))}, which the explorer does not run."
+    return _SOFT.format(f"Point at a cell to read it. {why}")
 
 
 def escaped(text: str) -> str:

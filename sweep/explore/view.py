@@ -130,7 +130,7 @@ class View:
         if index is None and self._shown:
             index = self._place(self._shown.cursor)
         if index is None:
-            self._cell.text = controls.HINT if self._setup else controls.HINT_STILL
+            self._cell.text = controls.HINT if self._setup else controls.still(self._source)
             return
         here = {labels.symbol(d): f"{self._source.axes[d].values[index[d]]:.6g}" for d in self._source.dims}
         self._cell.text = controls.table(here, self._source.describe(index))

@@ -9,7 +9,6 @@ tried again at half its length.  If this never ends, the failure is one of the b
 from __future__ import annotations
 
 from functools import cache
-from inspect import getfile
 from typing import Any
 
 import numpy as np
@@ -83,7 +82,7 @@ def compiled_approach(model: Model) -> Cached:
         for i in prange(len(rows)):
             status[i], time[i] = follow(load(rows, i), load_constants(rows, i), stretch[i])
 
-    return parallel(run, f"approach-{model.name}", getfile(model.rhs))
+    return parallel(run, f"approach-{model.key}", *model.files)
 
 
 def _make_follow(model: Model) -> Any:

@@ -10,7 +10,6 @@ handled a cell.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from inspect import getfile
 from typing import Any
 
 import numpy as np
@@ -122,8 +121,8 @@ class Kernel:
         )
         advance = make_advance(run_block, make_look(self.model, self.constants, self.layout, look), self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
-        name = f"{self.model.name}-{self.method}-{measured}"
-        self._advance = parallel(advance, name, getfile(self.model.rhs))
+        name = f"{self.model.key}-{self.method}-{measured}"
+        self._advance = parallel(advance, name, *self.model.files)
 
     def row(self, name: str) -> int:
         """Index of the column of the images that holds a quantity."""

@@ -29,6 +29,7 @@ Without slip.  v_g = v_0, and the contact force is g u + v_g' + ω × v_g whatev
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any
@@ -40,8 +41,10 @@ from sweep.models import bodies, noslip, slip, solid, starts, steady
 from sweep.models.couples import COUPLES, Couple, nothing
 from sweep.models.laws import LAWS, Law
 from sweep.models.model import COUNT, ENERGY, LINEAR, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple, named
+from sweep.models.origin import Origin
 from sweep.models.solid import gyroscopic
 from sweep.models.surfaces import ELLIPSOID, SURFACES, Surface
+from sweep.parameters import Parameter
 
 BASES = ("slip", "noslip")
 
@@ -52,13 +55,35 @@ _STILL = "still"
 """The constant `Model.still` of variants with a couple that stops the body."""
 
 
+@dataclass(frozen=True)
+class SlipWith:
+    """The variants of `slip` with a law of friction that a user brings: what `with_law` makes."""
+
+    law: Law
+    own_parameters: tuple[Parameter, ...]
+    """Those of the law's parameters that are not in `sweep.parameters`, or mean something else there."""
+    origin: Origin | None = None
+
+
+def with_law(law: Law, *parameters: Parameter) -> SlipWith:
+    """The MODEL of a file that brings a law of friction for any body.
+
+    Parameters
+    ----------
+    law : its resistance takes the constants that `law.parameters` names
+    parameters : records of those that are not in `sweep.parameters`, all of the section "friction"
+    """
+    return SlipWith(law, parameters)
+
+
 @cache
-def variant(name: str, parameters: tuple[str, ...] = ()) -> Model:
+def variant(name: str, parameters: tuple[str, ...] = (), own: Law | None = None) -> Model:
     """The model of a name, such as `slip+coulomb-tanh+sigma`.
 
     Parameters
     ----------
     parameters : those of the body and the start that it is asked to depend on; they make no difference to its kernel
+    own : the law that the name tells, if it is not one of `LAWS`
 
     Raises
     ------
@@ -67,7 +92,7 @@ def variant(name: str, parameters: tuple[str, ...] = ()) -> Model:
     """
     base, law, couples, surface = parts(name)
     if base == "slip":
-        return _slipping(name, LAWS[law], couples, surface, parameters)
+        return _slipping(name, own or LAWS[law], couples, surface, parameters)
     if (base, law) == ("noslip", SOLID):
         return _rolling(name, couples, surface, parameters)
     raise KeyError(name)

@@ -37,8 +37,11 @@ def growth_rate(model: Model, constants: Any, spin: Array) -> Array:
 def fastest_motion(model: Model, columns: Columns) -> Array:
     """Largest |λ| of the rattle at the fastest spins within reach, leaving out the fast decay due to friction.
 
-    This is the motion that an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.
+    This is the motion that an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.  A model
+    may tell it itself.
     """
+    if model.fastest_motion:
+        return model.fastest_motion(columns)
     reach = fastest_spin(model, columns)
     values = np.concatenate(
         [

@@ -25,12 +25,15 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from inspect import getfile
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sweep.jit import inline
+from sweep.models.origin import Origin
+from sweep.parameters import Parameter
 
 Array = NDArray[Any]
 Columns = Mapping[str, Array]
@@ -46,20 +49,39 @@ number of reversals; and the spins between which a tiny rattle decays, by the ei
 trajectories may settle; and Garcia and Hubbard's formula for the time of the first reversal."""
 
 
+OWN = "own"
+"""Units of a model that knows neither the paper's nor SI: the labels of the dataset then name none."""
+
+
+def nothing(columns: Columns) -> Array:
+    """Zeros, shape (cells,)."""
+    return np.zeros_like(next(iter(columns.values())))
+
+
 @inline
 def never_tilts(y: Any) -> float:  # noqa: ARG001
     """The default `tilt`: the equations know of no right angle."""
     return 0.0
 
 
+def never_upright(spin: Any) -> tuple[Any, ...]:
+    """The default `upright`: there is no such motion."""
+    raise NotImplementedError
+
+
 def nothing_decays(columns: Columns) -> Array:
     """The default `fastest_decay`: no mode is stiff."""
-    return np.zeros_like(columns["a"])
+    return nothing(columns)
+
+
+def never_rocks(columns: Columns) -> Array:
+    """The default `slower_period`: there is none."""
+    return nothing(columns) + np.inf
 
 
 def nothing_is_impossible(columns: Columns) -> Array:
     """The default `impossible`."""
-    return np.zeros(len(columns["a"]), bool)
+    return nothing(columns).astype(bool)
 
 
 @dataclass(frozen=True)
@@ -83,7 +105,7 @@ NO_RIPPLE = Ripple((), lambda columns: (), _nothing)  # noqa: ARG005
 """For a model whose spin does not ripple."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Tier:
     """One rung of the ladder of models: equations of motion, or a formula."""
 
@@ -91,13 +113,13 @@ class Tier:
     """As in the configuration."""
     summary: str
     """One line for the documentation."""
-    parameters: tuple[str, ...]
+    parameters: tuple[str, ...] = ()
     """Names of the physical parameters that it depends on; `sweep.parameters` has their meanings."""
     offers: frozenset[str]
     """What can be asked of it, out of the names above, such as `COUNT`."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Model(Tier):
     """A rung that is simulated.
 
@@ -116,10 +138,12 @@ class Model(Tier):
     from columns of parameters, each coefficient of shape (cells,)."""
     start: Callable[[Columns], tuple[Array, ...]]
     """(columns) -> the states at t = 0, each of shape (cells,)."""
-    slower_period: Callable[[Columns], Array]
-    """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none."""
-    upright: Callable[..., tuple[Any, ...]]
-    """Inline, (spin) -> the states of steady upright spin without rattle."""
+    slower_period: Callable[[Columns], Array] = never_rocks
+    """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none.  The
+    spin is averaged over it before its changes of sign are counted."""
+    upright: Callable[..., tuple[Any, ...]] = never_upright
+    """Inline, (spin) -> the states of steady upright spin without rattle.  A model that does not offer `LINEAR` may
+    have `fastest_motion` instead."""
     rhs: Callable[..., tuple[Any, ...]]
     """Inline, (states, constants) -> (derivatives, (spin, dissipated power, normal force, Painlevé denominator)).
     Of the last three, a model that lacks them returns the literals 0.0, 1.0 and 1.0."""
@@ -142,7 +166,7 @@ class Model(Tier):
     impossible: Callable[[Columns], Array] = nothing_is_impossible
     """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
     function is called for such a body."""
-    spin_unit: Callable[[Columns], Array] = lambda columns: np.ones_like(columns["a"])
+    spin_unit: Callable[[Columns], Array] = lambda columns: nothing(columns) + 1
     """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
     largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""
     faint: str = ""
@@ -155,7 +179,28 @@ class Model(Tier):
     """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
-    shows beside spin and energy, by names that `sweep.studies.trajectory` explains."""
+    shows beside spin and energy, by names that `sweep.studies.trajectory` or `series` explains."""
+    fastest_motion: Callable[[Columns], Array] | None = None
+    """(columns) -> bound on the rate of the fastest motion that steps have to follow, in sqrt(g/c), shape (cells,); by
+    default the largest eigenvalue about upright spin."""
+    own_parameters: tuple[Parameter, ...] = ()
+    """Parameters that are not in `sweep.parameters`, of a model that a user brings."""
+    series: tuple[tuple[str, str, str], ...] = ()
+    """Name, CF unit and meaning of what only this model can `observe`."""
+    units: str = OWN
+    """What the numbers of a model that a user brings are in, for the labels: "paper", "SI" or "own"."""
+    origin: Origin | None = None
+    """Where the model comes from, if a user brings it."""
+
+    @property
+    def key(self) -> str:
+        """What tells its compiled code from that of other models."""
+        return f"{self.name}@{self.origin.digest}" if self.origin else self.name
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files beside those of the package on which its compiled code depends and that `key` does not tell."""
+        return () if self.origin else (getfile(self.rhs),)
 
 
 def named(*fields: str) -> Any:

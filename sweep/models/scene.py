@@ -6,8 +6,8 @@ from collections.abc import Collection
 
 from sweep.models import general, solid, starts
 from sweep.models.couples import COUPLES
-from sweep.models.laws import LAWS
-from sweep.models.model import Tier
+from sweep.models.laws import LAWS, Law
+from sweep.models.model import Model
 from sweep.models.surfaces import ELLIPSOID, SURFACES
 
 PAPER, SI = "paper", "SI"
@@ -26,8 +26,18 @@ def is_papers(law: str, units: str, names: Collection[str], surface: str = ELLIP
     return law == PAPERS_LAW and units == PAPER and set(names) <= PAPERS and surface == ELLIPSOID.name
 
 
-def variant(base: str, law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> Tier:
-    """The variant of `slip` or `noslip` for a scene; its parameters are those that follow from `names`."""
+def variant(
+    base: str,
+    law: str,
+    units: str,
+    names: Collection[str],
+    surface: str = ELLIPSOID.name,
+    own: Law | None = None,
+) -> Model:
+    """The variant of `slip` or `noslip` for a scene; its parameters are those that follow from `names`.
+
+    `own` is the law of the name `law`, if it is not one of `LAWS`.
+    """
     homogeneous = SURFACES[surface].homogeneous and not set(INERTIA) & set(names)
     moments = ("delta",) if homogeneous else INERTIA
     system = ("mass", "gravity") if units == SI else ()
@@ -35,11 +45,14 @@ def variant(base: str, law: str, units: str, names: Collection[str], surface: st
     start = by_angles if {*starts.ANGLES, *starts.SLIP} & set(names) else starts.POINT
     couples = [name for name, couple in COUPLES.items() if set(couple.parameters) & set(names)]
     parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-    return general.variant(general.name_of(base, law, couples, surface), parameters)
+    return general.variant(general.name_of(base, law, couples, surface), parameters, own)
 
 
-def strangers(law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> dict[str, str]:
-    """The parameters that do not belong to a scene, with the reason."""
+def strangers(
+    law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name, own: Law | None = None
+) -> dict[str, str]:
+    """The parameters that do not belong to a scene, with the reason; `own` as of `variant`."""
+    theirs = (own or LAWS[law]).parameters
     names = set(names)
     found: dict[str, str] = {}
     inertia, angles, point = names & set(INERTIA), names & {*starts.ANGLES, *starts.SLIP}, names & set(starts.POINT)
@@ -53,8 +66,8 @@ def strangers(law: str, units: str, names: Collection[str], surface: str = ELLIP
     if units == PAPER:
         found |= dict.fromkeys(("mass", "gravity"), "with units: paper, in which it is 1; allowed: with units: SI")
     for other in LAWS.values():
-        foreign = set(other.parameters) - set(LAWS[law].parameters) - {"mu"}
-        words = ", ".join((*LAWS[law].parameters, *(name for couple in COUPLES.values() for name in couple.parameters)))
+        foreign = set(other.parameters) - set(theirs) - {"mu"}
+        words = ", ".join((*theirs, *(name for couple in COUPLES.values() for name in couple.parameters)))
         found |= dict.fromkeys(foreign, f"not of the law {law}; allowed: {words}")
     return {name: words for name, words in found.items() if name in names and (name not in point or angles)}
 

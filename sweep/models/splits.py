@@ -8,5 +8,7 @@ from sweep.models.split import Split
 
 
 def of(model: Model) -> Split | None:
-    """The split form of a model, or None if there is none."""
+    """The split form of a model; None if there is none, or if a user brings the model."""
+    if model.origin:
+        return None
     return slip_split.PAPERS if model.name == slip.MODEL.name else general_split.split(model)

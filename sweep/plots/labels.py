@@ -10,6 +10,7 @@ from sweep.kernels import status
 from sweep.models.surfaces import PARABOLOID
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
+from sweep.results.kind import is_of_own_body
 
 SYMBOLS = {"mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀"}
 
@@ -97,7 +98,8 @@ def unit(dataset: xr.Dataset, name: str) -> str:
 def words(dataset: xr.Dataset, name: str) -> str:
     """What a variable or coordinate is, without its unit."""
     of_surface = _PARABOLOID_WORDS if dataset.attrs.get("surface") == PARABOLOID.name else {}
-    short = {**_PARAMETER_WORDS, **_VARIABLE_WORDS, **of_surface}.get(name)
+    of_parameters = {} if is_of_own_body(dataset) else _PARAMETER_WORDS
+    short = {**of_parameters, **_VARIABLE_WORDS, **of_surface}.get(name)
     return short or _SCALE.sub("", _long_name(dataset, name)) or name.replace("_", " ")
 
 

@@ -12,9 +12,9 @@ from matplotlib.lines import Line2D
 from sweep.grid import Array
 from sweep.models import solid
 from sweep.models.surfaces import ELLIPSOID, SURFACES
-from sweep.parameters import PARAMETERS
 from sweep.plots import labels, legends, theory
 from sweep.plots.panels import heading
+from sweep.results.kind import is_of_own_body, parameters
 
 # Title and the series drawn together; two panels stand beside each other.
 _PANELS: tuple[tuple[str, dict[str, str]], ...] = (
@@ -57,6 +57,9 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     if variable is not None and variable not in series:
         raise ValueError(f"no series {variable}; allowed: {', '.join(series)}")
     panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and variable is None]
+    if is_of_own_body(dataset) and variable is None:
+        known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
+        panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
     figure = Figure(figsize=(11, 4.2 + 1.9 * rows), dpi=110, layout="constrained")
     figure.suptitle(heading(_constants_apart(dataset), figure.get_figwidth()), fontsize=10)
@@ -152,11 +155,17 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
 
 
 def reversal_times(one: xr.Dataset) -> Array:
-    """Times at which the ripple-free spin of one trajectory, averaged over a period of the rattle, changes sign."""
+    """Times at which the ripple-free spin of one trajectory, averaged over a period of the rattle, changes sign.
+
+    Of a user's model, the spin as it is.
+    """
     if "ripple_free_spin" not in one:
         return np.array([])
     good = np.isfinite(one["time"].values)
     time, spin = one["time"].values[good], one["ripple_free_spin"].values[good]
+    if is_of_own_body(one):  # whose period nobody knows
+        at = np.flatnonzero(spin[1:] * spin[:-1] < 0)
+        return np.asarray(time[at] + (time[at + 1] - time[at]) * spin[at] / (spin[at] - spin[at + 1]))
     columns = {name: np.atleast_1d(one[name].values) for name in solid.PARAMETERS if name in one}
     surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
     tau = float(solid.slower_period(columns, surface)[0])
@@ -169,7 +178,7 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 def _label(dataset: xr.Dataset, i: int) -> str:
     """The parameters that set this trajectory apart from the others, and its number of reversals."""
-    varying = [name for name in PARAMETERS if name in dataset and len(set(np.ravel(dataset[name].values))) > 1]
+    varying = [name for name in parameters(dataset) if len(set(np.ravel(dataset[name].values))) > 1]
     names = varying or [name for name in ("n0", "omega3") if name in dataset]
     named = ", ".join(labels.value(name, float(np.ravel(dataset[name].values)[i])) for name in names)
     return f"{named}: {int(dataset['reversals'][i])} reversals" if "reversals" in dataset else named
@@ -181,6 +190,6 @@ def _with_unit(words: str, unit: str) -> str:
 
 def _constants_apart(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the parameters that all trajectories share as scalar coordinates."""
-    values = {name: set(np.ravel(dataset[name].values)) for name in PARAMETERS if name in dataset}
+    values = {name: set(np.ravel(dataset[name].values)) for name in parameters(dataset)}
     shared = {name: float(found.pop()) for name, found in values.items() if len(found) == 1}
     return dataset.drop_vars(list(shared)).assign_coords(shared)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config
+from sweep.config import Config, ConfigError
 from sweep.grid import Array, Grid
 from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
@@ -19,7 +19,7 @@ from sweep.models import reversal_time
 from sweep.models.scene import PAPER, SI
 from sweep.models.surfaces import ELLIPSOID
 from sweep.prediction import Prediction
-from sweep.variables import Variable, in_si
+from sweep.variables import Variable, in_si, without_unit
 
 STATUSES = {
     0: "not_run",
@@ -126,7 +126,7 @@ def predicted(prediction: Prediction) -> dict[str, Array]:
         plus, minus = formulas.n_c1
         result["reversals_predicted"] = formulas.reversals
         result |= {"n_c1_plus": plus, "n_c1_minus": minus, "n_c2_plus": 2 * plus, "n_c2_minus": 2 * minus}
-    if stability := prediction.stability:
+    if (stability := prediction.stability) and stability.applies:
         finite = [np.where(np.isfinite(n), n, np.nan) for n in stability.n_c1]
         result["n_c1_plus_linear"], result["n_c1_minus_linear"] = finite
     if found := prediction.reversal_time:
@@ -152,9 +152,18 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
         coordinates["case"] = xr.Variable(("case",), index, {"long_name": "row of the table of cases", "units": "1"})
     for name, value in grid.constants.items():
         coordinates[name] = xr.Variable((), value, config.described(name))
-    head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals of a rattleback ({config.model} model)"}
+    of = " of a rattleback" if config.of_rattlebacks else ""
+    head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals{of} ({config.model} model)"}
     head |= {"surface": config.surface} if config.surface != ELLIPSOID.name else {}
     return xr.Dataset(variables, coordinates, {**head, **attributes})
+
+
+def check_names(config: Config, series: Iterable[str] = ()) -> None:
+    """Raise a `ConfigError` if a parameter has the name of a variable, or of one of these `series`."""
+    names = {*VARIABLES, *(f"verified_{name}" for name in ("cell", *VERIFIED)), *series} & set(config.tier.parameters)
+    if names:
+        words = f"parameter {min(names)}: also a name in datasets; allowed: another"
+        raise ConfigError([config.fault(("model",), words)])
 
 
 def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]:
@@ -221,7 +230,9 @@ def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr
 
 def described(spec: Variable, system: str = PAPER) -> dict[str, Any]:
     """The CF attributes of a variable in a system of units."""
-    units, long_name = in_si(spec.units, spec.long_name) if system == SI else (spec.units, spec.long_name)
+    units, long_name = spec.units, spec.long_name
+    if system != PAPER:
+        units, long_name = in_si(units, long_name) if system == SI else (units, without_unit(long_name))
     words: dict[str, Any] = {"long_name": long_name, "units": units}
     if spec.flags:
         words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)

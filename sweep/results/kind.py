@@ -4,9 +4,24 @@ from __future__ import annotations
 
 import xarray as xr
 
+from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 
 RUN, TRAJECTORY, CRITICAL = "a run", "single trajectories", "critical spins"
+
+
+OWN_BODY = "a model"
+"""What `model_brings` says of the model of a user that need not be of a rattleback."""
+
+
+def is_of_own_body(dataset: xr.Dataset) -> bool:
+    """Whether a user's model made it, which may be of anything."""
+    return dataset.attrs.get("model_brings") == OWN_BODY
+
+
+def parameters(dataset: xr.Dataset) -> list[str]:
+    """Names of the physical parameters that a dataset tells."""
+    return [name for name in str(dataset.attrs.get("model_parameters", "")).split() or PARAMETERS if name in dataset]
 
 
 def kind(dataset: xr.Dataset) -> str | None:

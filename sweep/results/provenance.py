@@ -17,8 +17,8 @@ import numba
 from sweep.config import Config
 from sweep.jit import fingerprint, vector_bits
 from sweep.kernels.methods import AUTO, METHODS
-from sweep.models import MODELS
 from sweep.results.identity import Identity
+from sweep.results.kind import OWN_BODY
 
 _PACKAGE = Path(__file__).parent.parent
 
@@ -68,6 +68,7 @@ def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] =
         "config_hash": identity.config_hash,
         "source_hash": identity.source_hash,
         "versions": identity.versions,
+        **_brought(config),
         "integrator": _integrator_words(config),
         "sweep_version": _version("rattleback-sweep"),
         "git_commit": _git_commit(),
@@ -82,8 +83,20 @@ def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] =
     }
 
 
+def _brought(config: Config) -> dict[str, str]:
+    """Of what a user brings: what it is, its file or entry point, the SHA-256 of that, and the model's parameters."""
+    if not (origin := config.origin):
+        return {}
+    return {
+        "model_brings": "a law of friction" if config.of_rattlebacks else OWN_BODY,
+        "model_place": origin.place,
+        "model_sha256": origin.digest,
+        "model_parameters": " ".join(config.tier.parameters),
+    }
+
+
 def _integrator_words(config: Config) -> str:
-    if config.model not in MODELS:
+    if not config.simulated:
         return "none"
     if config.integrator.step != "auto":
         return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"

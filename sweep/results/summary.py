@@ -9,9 +9,8 @@ import xarray as xr
 
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
-from sweep.parameters import PARAMETERS
 from sweep.results.dataset import EXISTS, REASONS, STATUSES
-from sweep.results.kind import CRITICAL, TRAJECTORY, kind
+from sweep.results.kind import CRITICAL, TRAJECTORY, kind, parameters
 
 
 def failed_fraction(dataset: xr.Dataset) -> float:
@@ -52,7 +51,7 @@ def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
     yield f"{dataset.sizes['trajectory']} trajectories, sampled in time"
     for i in range(min(dataset.sizes["trajectory"], most)):
         one = dataset.isel(trajectory=i)
-        where = ", ".join(f"{name} = {float(one[name]):g}" for name in PARAMETERS if name in one)
+        where = ", ".join(f"{name} = {float(one[name]):g}" for name in parameters(one))
         count = f", {int(one['reversals'])} reversals" if "reversals" in one else ""
         samples = int(np.isfinite(one["spin"]).sum())
         yield f"  {where}: {STATUSES[int(one['status'])]} at t = {float(one['t_stop']):.6g}{count}, {samples} samples"

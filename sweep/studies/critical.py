@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, Values
+from sweep.config.brought import explained
 from sweep.config.scenes import described_impossible
 from sweep.engine.reporter import Reporter
 from sweep.grid import Array, Grid
@@ -75,6 +76,11 @@ def critical(
 ) -> xr.Dataset:
     """As `sweep.api.critical`; what there is to tell goes to `reporter` alone, with progress counted in bodies."""
     config, reporter = _searchable(config), reporter or Reporter()
+    with explained(config.origin):
+        return _found(config, width, output, fresh, reporter)
+
+
+def _found(config: Config, width: float, output: str | Path | None, fresh: bool, reporter: Reporter) -> xr.Dataset:
     if output is None:
         return _search(config, width, Memory(), reporter)
     files, identity = RunFiles(Path(output), f"{config.name}_critical"), _identify(config, width)
@@ -133,6 +139,8 @@ def remarks(result: xr.Dataset) -> list[str]:
 def _searchable(config: Config) -> Config:
     """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
     stepwise(config)  # raises if there is nothing to simulate
+    if not config.of_rattlebacks:
+        raise ConfigError([config.fault(("model",), "no rattleback; critical spins are asked of: slip, noslip")])
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
         raise ConfigError([config.fault(("start", beyond[0]), "an axis; allowed: a number")])
     if "n0" not in config.tier.parameters:

@@ -13,23 +13,23 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
+from sweep.config.brought import explained
 from sweep.config.faults import suggestion
-from sweep.config.scenes import unfit
+from sweep.config.scenes import misplaced, unfit
 from sweep.config.schema import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS
 from sweep.engine.plan import plan
 from sweep.engine.repeats import cells_of, repeat_all
 from sweep.engine.reporter import Progress, Reporter
-from sweep.grid import Array, Grid, off_the_body
+from sweep.grid import Array, Grid
 from sweep.jit import threads
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import RUNNING
 from sweep.models.linear import fastest_motion
-from sweep.models.model import Columns, Model, Tier
-from sweep.parameters import PARAMETERS
+from sweep.models.model import Columns, Model
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.rounds import Simulations
@@ -110,7 +110,13 @@ def trajectory(
     ConfigError
         if the model is a formula, or `at` picks cells that cannot be run.
     """
-    chosen, reporter = choose(config, at), reporter or Reporter()
+    chosen = choose(config, at)
+    with explained(chosen.origin):
+        return _followed(chosen, every, reporter or Reporter())
+
+
+def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
+    """`trajectory` of all cells of `chosen`."""
     job = plan(chosen)
     (part,) = job.parts
     t_end, began = chosen.integrator.t_end, time.perf_counter()
@@ -131,15 +137,16 @@ def trajectory(
     series = [_series(part.kernel, *found) for found in _sample(part.kernel, marks, part.images, interval)]
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(job.grid.size), {"units": "1", "long_name": "number of the trajectory"})
-    return flat.assign_coords(trajectory=index).assign(_side_by_side(series, chosen.units))
+    return flat.assign_coords(trajectory=index).assign(_side_by_side(series, part.kernel.model, chosen.units))
 
 
-def _side_by_side(series: list[dict[str, Array]], system: str) -> xr.Dataset:
+def _side_by_side(series: list[dict[str, Array]], model: Model, system: str) -> xr.Dataset:
     """The series of all trajectories over (trajectory, time), NaN after the end of each."""
     times = max((one["time"] for one in series), key=len)
-    known = {name: Variable("float64", *words) for name, words in {"time": _TIME, **SERIES}.items()}
+    own = {name: (units, words) for name, units, words in model.series}
+    known = {name: Variable("float64", *words) for name, words in {"time": _TIME, **SERIES, **own}.items()}
     found: dict[str, Any] = {"time": ("time", times, dataset.described(known["time"], system))}
-    for name in filter(SERIES.__contains__, series[0]):
+    for name in filter({*SERIES, *own}.__contains__, series[0]):
         padded = np.full((len(series), len(times)), np.nan)
         for row, one in zip(padded, series, strict=True):
             row[: len(one[name])] = one[name]
@@ -152,7 +159,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
     chosen = choose(config, at)
     columns, integrator = Grid.of(chosen).columns(), chosen.integrator
     model, step = chosen.equations, integrator.step
-    steps = np.full(len(columns["a"]), integrator.t_end)
+    steps = np.full(Grid.of(chosen).size, integrator.t_end)
     steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
     samples = (integrator.t_end / _intervals(model, columns)).sum()
     # A step of a group of lanes takes as long whether they are idle or not.
@@ -171,7 +178,8 @@ def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
 def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
     config = stepwise(load_config(config))
-    wanted = _numbers(config.tier, at)
+    dataset.check_names(config, SERIES)
+    wanted = _numbers(config, at)
     if (count := prod(map(len, wanted.values()))) > MAX_TRAJECTORIES:
         raise ConfigError([Fault("", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
@@ -180,21 +188,21 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     cells = [dict(zip(wanted, values, strict=True)) for values in product(*wanted.values())]
     cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)
-    if beyond := unfit(chosen) or off_the_body(chosen):
+    if beyond := unfit(chosen) or misplaced(chosen):
         raise ConfigError([Fault("", None, None, (), beyond)])
     return chosen
 
 
-def _numbers(model: Tier, at: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
+def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
     """The numbers asked for each parameter; `ConfigError` with a fault for each that cannot be run."""
-    numbers, faults = {}, []
+    numbers, faults, model = {}, [], config.tier
     for name, value in at.items():
         if name not in model.parameters:
             message = f"no parameter of the {model.name} model{suggestion(name, model.parameters)}"
             faults.append(Fault("", None, None, (name,), f"{message}; allowed: {', '.join(model.parameters)}"))
             continue
         try:
-            numbers[name] = numbers_of(PARAMETERS[name], value)
+            numbers[name] = numbers_of(config.table[name], value)
         except ConfigError as error:
             faults += error.faults
     if faults:

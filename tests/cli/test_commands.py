@@ -87,7 +87,7 @@ def test_too_many_failures(write: Write, tmp_path: Path) -> None:
 def _cold(monkeypatch: pytest.MonkeyPatch) -> None:
     """As if no cache held anything; what is compiled takes no time."""
     monkeypatch.setattr(Cached, "is_missing", lambda _: True)
-    monkeypatch.setattr("sweep.kernels.build._start", lambda _: subprocess.Popen([sys.executable, "-c", ""]))
+    monkeypatch.setattr("sweep.kernels.build._start", lambda *_: subprocess.Popen([sys.executable, "-c", ""]))
 
 
 @pytest.mark.usefixtures("_cold")

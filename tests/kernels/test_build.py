@@ -31,7 +31,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     """What would be compiled if there were no cache, in the order in which processes start."""
     pieces: list[tuple[str, ...]] = []
 
-    def start(piece: tuple[str, ...]) -> subprocess.Popen[bytes]:
+    def start(piece: tuple[str, ...], _: object) -> subprocess.Popen[bytes]:
         pieces.append(piece)
         return subprocess.Popen([sys.executable, "-c", ""])
 
@@ -57,7 +57,7 @@ def test_no_more_processes_at_once_than_threads(monkeypatch: pytest.MonkeyPatch)
     alive: list[subprocess.Popen[bytes]] = []
     most = 0
 
-    def start(_: tuple[str, ...]) -> subprocess.Popen[bytes]:
+    def start(*_: object) -> subprocess.Popen[bytes]:
         nonlocal most
         alive.append(subprocess.Popen([sys.executable, "-c", "import time; time.sleep(0.2)"]))
         most = max(most, sum(process.poll() is None for process in alive))

@@ -1,0 +1,138 @@
+"""The tippe top: a sphere whose centre of mass lies off its centre turns over when it is spun fast on a plane.
+
+Lengths are in the radius R, times in sqrt(R/g), and the mass is one.  The axis e points from the centre of mass G to
+the centre of the sphere, up at rest, and a = α e - ẑ leads from G to the contact point.  L is the angular momentum
+about G, V the horizontal velocity of G, and ω3 = L·e/C the spin about the axis:
+
+    L' = a × F,   V' = F - (F·ẑ) ẑ,   e' = ω × e,   ω = L/A + ω3 (1 - C/A) e,
+    F = N (ẑ - μ v),   v = V + (ω × a) - the vertical part of it.
+
+As G is at the height 1 - α e·ẑ, the normal force is
+
+    N = (1 - (α/A²) ẑ·(L × (L × e))) / (1 + (α/A) ẑ·((a × (ẑ - μ v)) × e)).
+
+All of this is in axes fixed in space, where nothing is singular when the top stands on its head.  There ω3 has changed
+sign, while the top turns about the vertical in the same sense as before: a reversal is an inversion.
+
+Friction takes energy but leaves Jellett's integral -L·a as it is.  Spun fast enough, a top turns over completely if
+1 - α < A/C < 1 + α (S. Rauch-Wojciechowski and N. Rutstam, SIGMA 10 (2014), 017, arXiv 1306.2470).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, Model
+from sweep.parameters import Parameter
+
+PARAMETERS = (
+    Parameter("eccentricity", "body", "1", "distance α of the centre of mass from the centre, in R", 0.3,
+              above=0, below=1),
+    Parameter("ratio", "body", "1", "ratio A/C of the moments of inertia, across and along the axis", 0.936,
+              at_least=0.5, below=10),
+    Parameter("C", "body", "1", "moment of inertia about the axis, in m R^2", 0.4, above=0, below=1),
+    Parameter("mu", "friction", "1", "coefficient of viscous friction μ, in 1/sqrt(g R)", 0.15, at_least=0, below=100),
+    Parameter("n0", "start", "1", "start spin about the axis, in sqrt(g/R)", 7.0, above=0, below=1000),
+    Parameter("tilt", "start", "radian", "start angle of the axis with the vertical", 0.1, at_least=0, below=3.1),
+)  # fmt: skip
+
+
+class Constants(NamedTuple):
+    alpha: Any
+    A: Any
+    C: Any
+    mu: Any
+
+    @classmethod
+    def of(cls, columns: Columns) -> "Constants":
+        return cls(columns["eccentricity"], columns["ratio"] * columns["C"], columns["C"], columns["mu"])
+
+
+def start(columns: Columns) -> tuple[Array, ...]:
+    e1, e3 = np.sin(columns["tilt"]), np.cos(columns["tilt"])
+    L, nothing = columns["C"] * columns["n0"], 0 * columns["n0"]
+    return L * e1, nothing, L * e3, e1, nothing, e3, nothing, nothing
+
+
+@inline
+def motion(y: Any, p: Any) -> Any:
+    """e', ω3, and the horizontal slip velocity v of the contact point."""
+    L1, L2, L3, e1, e2, e3, V1, V2 = y
+    d1, d2, d3 = (L2 * e3 - L3 * e2) / p.A, (L3 * e1 - L1 * e3) / p.A, (L1 * e2 - L2 * e1) / p.A
+    spin = (L1 * e1 + L2 * e2 + L3 * e3) / p.C
+    more = spin * (1.0 - p.C / p.A)
+    # ω × a = α e' - ω × ẑ
+    v1 = V1 + p.alpha * d1 - (L2 / p.A + more * e2)
+    v2 = V2 + p.alpha * d2 + (L1 / p.A + more * e1)
+    return d1, d2, d3, spin, v1, v2
+
+
+@inline
+def rhs(y: Any, p: Any) -> Any:
+    L1, L2, _, e1, e2, e3, _, _ = y
+    d1, d2, d3, spin, v1, v2 = motion(y, p)
+    f1, f2 = -p.mu * v1, -p.mu * v2
+    a1, a2, a3 = p.alpha * e1, p.alpha * e2, p.alpha * e3 - 1.0
+    # The torque per unit of N.
+    t1, t2, t3 = a2 - a3 * f2, a3 * f1 - a1, a1 * f2 - a2 * f1
+    denominator = 1.0 + p.alpha / p.A * (t1 * e2 - t2 * e1)
+    N = (1.0 - p.alpha / p.A * (L1 * d2 - L2 * d1)) / denominator
+    power = N * p.mu * (v1 * v1 + v2 * v2)
+    return (N * t1, N * t2, N * t3, d1, d2, d3, N * f1, N * f2), (spin, power, N, denominator)
+
+
+@inline
+def energy(y: Any, p: Any) -> Any:
+    """ω3, the energy above rest without that of ω3, and C."""
+    _, _, _, _, _, e3, V1, V2 = y
+    d1, d2, d3, spin, _, _ = motion(y, p)
+    drift = V1 * V1 + V2 * V2 + (p.alpha * d3) * (p.alpha * d3)
+    return spin, 0.5 * (drift + p.A * (d1 * d1 + d2 * d2 + d3 * d3)) + p.alpha * (1.0 - e3), p.C
+
+
+def observe(y: Array, p: Any) -> dict[str, Array]:
+    L, e = y[:3], y[3:6]
+    jellett = L[2] - p.alpha * (L * e).sum(axis=0)
+    return {"inclination": np.arccos(np.clip(e[2], -1, 1)), "jellett": jellett, "normal_force": rhs(tuple(y), p)[1][2]}
+
+
+def nutation(columns: Columns) -> Array:
+    """Period of the nutation at the start, over which the spin is averaged."""
+    return 2 * np.pi * columns["ratio"] / columns["n0"]
+
+
+def fastest(columns: Columns) -> Array:
+    """Nutation at its fastest: the energy at the start bounds the angular velocity."""
+    least = columns["C"] * np.minimum(columns["ratio"], 1)
+    square = (columns["C"] * columns["n0"] ** 2 + 2 * columns["eccentricity"] * (1 - np.cos(columns["tilt"]))) / least
+    return np.sqrt(square) * np.maximum(1, 1 / columns["ratio"]) + np.sqrt(columns["eccentricity"] / least)
+
+
+def decay(columns: Columns) -> Array:
+    """Friction changes the slip at the rate μ N (1 + |a|²/J), with N up to what the fastest turning asks for."""
+    alpha, least = columns["eccentricity"], columns["C"] * np.minimum(columns["ratio"], 1)
+    return columns["mu"] * (1 + alpha * columns["n0"] ** 2) * (1 + (1 + alpha) ** 2 / least)
+
+
+MODEL = Model(
+    name="tippe_top",
+    summary="a sphere with its centre of mass off its centre, on a plane with viscous friction",
+    own_parameters=PARAMETERS,
+    offers=frozenset({COUNT, SPIN, ENERGY}),
+    states=("L1", "L2", "L3", "e1", "e2", "e3", "V1", "V2"),
+    spin_state=2,
+    constants=Constants,
+    start=start,
+    rhs=rhs,
+    energy=energy,
+    observe=observe,
+    series=(
+        ("inclination", "radian", "angle of the axis with the vertical"),
+        ("jellett", "1", "Jellett's integral, in m R sqrt(g R)"),
+    ),
+    slower_period=nutation,
+    fastest_motion=fastest,
+    fastest_decay=decay,
+    radians_a_step=0.05,
+)

@@ -1,0 +1,87 @@
+"""The model that a configuration names, if it is none of the package's: a Python file, or an entry point.
+
+Its code runs as soon as the configuration is read, so that a configuration from a dataset must not name one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from sweep.config import files
+from sweep.config.document import Document
+from sweep.config.faults import ConfigError, Fault, brief
+from sweep.config.schema import Config
+from sweep.models import TIERS, inspection, outside
+from sweep.models.origin import ModelError, Origin
+
+LIMIT = 1 * files.MIB
+
+SUFFIX = ".py"
+
+
+def named(source: Document, announce: Callable[[str], None] | None) -> Origin | None:
+    """Where the model of a document comes from, once its code has run; None if it is one of the package's, or unknown.
+
+    Parameters
+    ----------
+    announce : told in words that the code is about to run; None if it must not
+
+    Raises
+    ------
+    ConfigError
+        if the code cannot be read, does not define a model, or must not run.
+    """
+    name = source.values.get("model")
+    if not isinstance(name, str) or name in TIERS:
+        return None
+    origin = source.model if source.model and source.model.name == name else None
+    if origin is None and not name.endswith(SUFFIX) and (origin := outside.entry_point(name)) is None:
+        return None  # the schema refuses it
+    if announce is None:
+        words = "code of a user, which is not run for a configuration that comes from a dataset"
+        raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; allowed: {', '.join(TIERS)}")])
+    source.model = origin = origin or _read(source, name)
+    pinned = source.values.get("model_sha256")
+    if pinned is not None and pinned != origin.digest:
+        words = f"{pinned!r}, but {brief(name)} has {origin.digest}; allowed: that, or no model_sha256"
+        raise ConfigError([source.fault(("model_sha256",), words)])
+    announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
+    with explained(origin):
+        outside.load(origin)
+    return origin
+
+
+def _read(source: Document, name: str) -> Origin:
+    path = Path(source.file).parent / name
+    try:
+        return Origin.of_file(name, str(path), files.read(path, LIMIT))
+    except FileNotFoundError:
+        reason = f"no such file in {path.parent}"
+    except OSError as error:
+        reason = f"cannot be read: {error.strerror}"
+    except UnicodeDecodeError as error:
+        reason = f"not UTF-8 text: byte {error.start}"
+    raise ConfigError([source.fault(("model",), f"{brief(name)}: {reason}")])
+
+
+@contextmanager
+def explained(origin: Origin | None) -> Iterator[None]:
+    """Turn errors of the code of a user's model into a `ConfigError` that tells its file and line."""
+    try:
+        with outside.blamed(origin):
+            yield
+    except ModelError as error:
+        raise ConfigError([Fault(error.place, error.line, None, (), error.message)]) from None
+
+
+def try_out(config: Config) -> None:
+    """Call the functions of a user's model for the first and the last cell; `ConfigError` if they do not work."""
+    if config.origin:
+        ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
+        ends |= {name: np.array([column[0], column[-1]]) for name, column in (config.cases or {}).items()}
+        with explained(config.origin):
+            inspection.try_out(config.equations, ends)

@@ -1,0 +1,42 @@
+"""Where a model that a user brings comes from.
+
+A model of this package has no origin: it is one of its sources.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A file, or an entry point of a package.  Plain data, so that other processes can load the very same code."""
+
+    name: str
+    """As the configuration names it."""
+    place: str
+    """Path of the file, for messages; of an entry point "package.module:MODEL"."""
+    text: str
+    """What the file says, which is what runs wherever it is loaded; "" for an entry point."""
+    digest: str
+    """SHA-256 of the file, or of all Python files of the entry point's package."""
+
+    @classmethod
+    def of_file(cls, name: str, place: str, text: str) -> Origin:
+        return cls(name, place, text, hashlib.sha256(text.encode()).hexdigest())
+
+    @property
+    def is_file(self) -> bool:
+        return self.place.endswith(".py")
+
+
+class ModelError(Exception):
+    """What is wrong with a model that a user brings, and what is allowed."""
+
+    def __init__(self, place: str, line: int | None, message: str) -> None:
+        super().__init__(place, line, message)
+        self.place, self.line, self.message = place, line, message
+
+    def __str__(self) -> str:
+        return ":".join(str(part) for part in (self.place, self.line) if part is not None) + f": {self.message}"

@@ -1,0 +1,270 @@
+"""A user's model in a configuration: where it is found, when its code runs, and what is said of a broken one."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import own
+from support.cli import invoke, refused
+from support.own import FADING, PENDULUM
+
+import sweep
+from sweep.config import ConfigError, load_config
+from sweep.models import outside
+
+MARK = "import numpy as np\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return own.write(tmp_path)
+
+
+@pytest.fixture
+def ran(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A file that the code of the pendulum writes when it runs."""
+    sign = folder / "ran"
+    monkeypatch.setenv("SIGN_OF_THE_PENDULUM", str(sign))
+    sign_it = "import os\nopen(os.environ['SIGN_OF_THE_PENDULUM'], 'w').close()\n"
+    (folder / "pendulum.py").write_text(PENDULUM.replace(MARK, MARK + sign_it, 1), encoding="utf-8")
+    outside.load.cache_clear()
+    yield sign
+    outside.load.cache_clear()
+
+
+def after(text: str, old: str, new: str, message: str, at: str = "MODEL =") -> tuple[str, int, str]:
+    """A model with an edit, the line that has `at`, and what is said of it."""
+    assert text.count(old) >= 1, old
+    edited = text.replace(old, new, 1)
+    line = next((i for i, each in enumerate(edited.splitlines(), 1) if each.startswith(at)), 0)
+    return edited, line, message
+
+
+def line_of(text: str, part: str) -> int:
+    return text[: text.index(part)].count("\n") + 1
+
+
+RHS = "    angle, rate, phase = y\n"
+BROKEN = {
+    "no model": after(PENDULUM, "MODEL =", "OTHER =", "defines no MODEL; allowed: MODEL = Model(…)"),
+    "empty": ("", 0, "defines no MODEL"),
+    "syntax": after(PENDULUM, "def start(columns):", "def start(columns:", "not Python: ", "def start"),
+    "a NUL": (PENDULUM + "\0", 0, "not Python: "),
+    "import": after(PENDULUM, MARK, "import nowhere\n", "ModuleNotFoundError: No module named 'nowhere'", "import now"),
+    "exception": after(PENDULUM, MARK, "1 / 0\n" + MARK, "ZeroDivisionError", "1 / 0"),
+    "exit": after(PENDULUM, MARK, "raise SystemExit(0)\n" + MARK, "it ends the program", "raise"),
+    "not a model": (PENDULUM.split("MODEL =")[0] + "MODEL = 3\n", line_of(PENDULUM, "MODEL ="),
+                    "MODEL is of the type int; allowed: Model(…), or with_law(…)"),
+    "no rhs": after(PENDULUM, "    rhs=rhs,\n", "", "missing 1 required keyword-only argument: 'rhs'"),
+    "arity": after(PENDULUM, "def rhs(y, p)", "def rhs(y)", "rhs(y); allowed: rhs(states, constants)", "@inline"),
+    "branch": after(PENDULUM, RHS, RHS + "    if rate > 0: rate = 0.0\n", "a branch on arrays; allowed: plain arith",
+                    "    if"),
+    "derivatives": after(PENDULUM, "(rate, turning, 2 / 3)", "(rate, turning)", "rhs: derivatives has 2 values; allo",
+                         "@inline"),
+    "a list": after(PENDULUM, "(rate, turning, 2 / 3)", "[rate, turning, 2 / 3]", "of the type list; allowed: a tuple",
+                    "@inline"),
+    "energy": (PENDULUM.replace("return y[1], 0.0, 1.0", "return y[1]"), line_of(PENDULUM, "@inline\ndef energy"),
+               "energy is of the type ndarray; allowed: a tuple"),
+    "a constant": after(PENDULUM, 'columns["torque"])', "1.0)", "constant torque has the shape (); allowed: (2,)",
+                        "    @classmethod"),
+    "a column": after(PENDULUM, 'cls(columns["damping"]', 'cls(columns["dampng"]', "KeyError: 'dampng'; allowed: names",
+                      "        return cls"),
+    "start": after(PENDULUM, 'return columns["angle"], nothing', "return nothing", "start has 2 values; allowed: 3",
+                   "def start"),
+    "name": after(PENDULUM, 'name="pendulum"', 'name="slip"', "name 'slip'; allowed: letters, digits and _, and none"),
+    "states": after(PENDULUM, '("angle", "rate"', '("rate", "rate"', "allowed: a tuple of distinct names"),
+    "spin_state": after(PENDULUM, "spin_state=1", "spin_state=3", "spin_state 3; allowed: 0 to 2"),
+    "offers": after(PENDULUM, "COUNT, SPIN})", 'COUNT, "modes"})', "offers modes; allowed: COUNT, SPIN, ENERGY, L"),
+    "units": after(PENDULUM, "spin_state=1,", 'spin_state=1, units="CGS",', "units 'CGS'; allowed: paper, SI, own"),
+    "default": after(PENDULUM, "0.5, at_least=0", "-1.0, at_least=0", "body.damping: default -1; allowed: a finite"),
+    "taken": after(PENDULUM, 'Parameter("torque"', 'Parameter("step"', "drive.step: 'step' is taken or no word"),
+    "unknown": after(PENDULUM, "spin_state=1,", 'spin_state=1, parameters=("nu",),', "unknown parameter 'nu'; allowed"),
+    "no motion": (PENDULUM.replace("2 + columns", "0 * columns").replace("0.5 + 0 * columns", "np.inf + columns"),
+                  line_of(PENDULUM, "    fastest_motion"), "the fastest motion is 0, by which steps are chosen"),
+    "law": after(FADING, "resistance,\n", "3,\n", "resistance is no function; allowed: resistance(square, p)"),
+    "law's arity": after(FADING, "def resistance(square, p)", "def resistance(p)", "resistance(p); allowed", "@inline"),
+    "law's section": after(FADING, '"fading", "friction"', '"fading", "body"', "body.fading; allowed: of the section"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_broken_file_is_refused_with_its_line(folder: Path, kind: str) -> None:
+    text, line, message = BROKEN[kind]
+    (folder / "broken.py").write_text(text, encoding="utf-8")
+    config = folder / ("fading.yaml" if "law" in kind else "pendulum.yaml")
+    result = invoke("run", config, "--set", "model=broken.py", "--dry-run")
+    assert result.exit_code == 2, result.output
+    said = result.stderr.splitlines()
+    assert said[0].startswith(f"running the code of {folder / 'broken.py'} (SHA-256 ")
+    place = f"{folder / 'broken.py'}:{line}: " if line else f"{folder / 'broken.py'}: "
+    assert said[1].startswith(place), said
+    assert message in said[1], said
+    assert len(said) == 2
+
+
+@pytest.mark.parametrize("name", ["missing.py", "."])
+def test_a_file_that_cannot_be_read_is_refused(folder: Path, name: str) -> None:
+    (folder / "sub.py").mkdir()
+    name = "sub.py" if name == "." else name
+    refused(invoke("run", folder / "pendulum.yaml", "--set", f"model={name}"), "--set model: ", name)
+
+
+def test_an_unknown_model_is_refused_with_what_is_allowed(folder: Path) -> None:
+    result = invoke("run", folder / "pendulum.yaml", "--set", "model=sliip")
+    assert result.exit_code == 2
+    said = result.stderr.splitlines()[0]
+    assert said.startswith("--set model: 'sliip' (did you mean slip?); allowed: slip, noslip, ")
+    assert "a Python file such as my_model.py" in said
+
+
+def test_its_code_is_announced_before_it_runs(folder: Path, ran: Path) -> None:
+    told = []
+
+    def announce(words: str) -> None:
+        told.append((words, ran.exists()))
+
+    load_config(folder / "pendulum.yaml", announce=announce)
+    ((words, already),) = told
+    assert words.startswith(f"running the code of {folder / 'pendulum.py'}")
+    assert ran.exists()
+    assert not already
+
+
+def test_quiet_commands_say_it_too(folder: Path) -> None:
+    result = invoke("run", folder / "pendulum.yaml", "--quiet", "--dry-run")
+    assert result.stderr.startswith("running the code of ")
+
+
+def test_what_only_opens_the_dataset_does_not_run_it(folder: Path, ran: Path) -> None:
+    sweep.run(folder / "pendulum.yaml", folder, damping=[0.3, 0.5], torque=1.0, t_end=5)
+    assert ran.exists()
+    ran.unlink()
+    outside.load.cache_clear()
+    file = folder / "pendulum.nc"
+    assert invoke("info", file).exit_code == 0
+    assert invoke("plot", file, "--output", folder / "map.png").exit_code == 0
+    sweep.open(file)
+    sweep.plot(file)
+    assert not ran.exists()
+
+
+def test_where_it_must_not_run_it_is_refused_unread(folder: Path, ran: Path) -> None:
+    with pytest.raises(
+        ConfigError, match=r"model: pendulum.py: code of a user, which is not run for a config.* dataset"
+    ):
+        load_config(folder / "pendulum.yaml", announce=None)
+    assert not ran.exists()
+
+
+def test_a_pinned_file_is_the_only_one_that_runs(folder: Path, ran: Path) -> None:
+    digest = hashlib.sha256((folder / "pendulum.py").read_bytes()).hexdigest()
+    with pytest.raises(ConfigError, match=f"model_sha256: '{'0' * 64}', but pendulum.py has {digest}; allowed: that"):
+        load_config(folder / "pendulum.yaml", {"model_sha256": "0" * 64})
+    assert not ran.exists()
+    assert load_config(folder / "pendulum.yaml", {"model_sha256": digest}).origin.digest == digest
+    with pytest.raises(ConfigError, match="the slip model is no file"):
+        load_config({"friction": {"mu": 60}, "model_sha256": digest})
+
+
+def test_parameters_are_known_to_settings_messages_and_tables(folder: Path) -> None:
+    file = folder / "pendulum.yaml"
+    assert load_config(file, {"torque": 0.7}).parameters["torque"].numbers == (0.7,)
+    assert load_config(file, {"angle": "90 deg"}).parameters["angle"].numbers == pytest.approx((np.pi / 2,))
+    assert list(load_config(file).axes) == ["damping", "torque"]
+    for key, value, message in (
+        ("drive.torq", 1.0, r"drive.torq: unknown key \(did you mean torque\?\); allowed: torque"),
+        ("torque", -1.0, "torque: -1 is out of bounds; allowed: a finite number >= 0 and < 10"),
+        ("body.a", 3.0, "body.a: unknown key; allowed: damping"),
+        ("units", "SI", "units: the model's file says its units; allowed: no units"),
+        ("integrator.method", "adams", "cannot run the pendulum model; allowed: dopri5, auto"),
+        ("measure", ["energy_error"], "not measured on the pendulum model; allowed: reversals"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            load_config(file, {key: value})
+    (folder / "cells.csv").write_text("torque,damping\n0.5,0.2\n1.5,0.4\n", encoding="utf-8")
+    cells = load_config({"model": str(folder / "pendulum.py"), "cases": str(folder / "cells.csv")})
+    assert cells.cases == {"torque": (0.5, 1.5), "damping": (0.2, 0.4)}
+
+
+def test_a_configuration_keeps_its_model_wherever_it_goes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = load_config(folder / "pendulum.yaml")
+    elsewhere = folder / "elsewhere"
+    elsewhere.mkdir()
+    (folder / "pendulum.py").rename(elsewhere / "moved.py")
+    monkeypatch.chdir(elsewhere)
+    copy = load_config(replace(first, name="copy"), {"torque": 0.5})  # made of what was read
+    assert copy.parameters["torque"].numbers == (0.5,)
+    assert copy.origin == first.origin
+    body = {"damping": {"start": 0.1, "stop": 0.9, "num": 33}}
+    drive = {"torque": {"start": 0.0, "stop": 1.5, "num": 33}}
+    rest = {"start": {"angle": 1.0}, "integrator": {"t_end": 200}}
+    there = load_config({"model": Path("moved.py"), "body": body, "drive": drive, **rest})
+    assert there.fingerprint() == first.fingerprint()
+    (folder / "written.yaml").write_text(there.to_yaml(), encoding="utf-8")
+    (folder / "moved.py").write_bytes((elsewhere / "moved.py").read_bytes())
+    assert load_config(folder / "written.yaml").fingerprint() == first.fingerprint()
+    (folder / "moved.py").write_text(PENDULUM + "\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="model_sha256"):
+        load_config(folder / "written.yaml")
+
+
+def test_the_law_of_a_file_takes_the_place_of_law(folder: Path) -> None:
+    file = folder / "fading.yaml"
+    assert load_config(file).equations.name == "slip+fading+sigma"
+    for key, value, message in (
+        ("friction.law", "coulomb", "friction.law: unknown key"),
+        ("mu_static", 1.0, "mu_static: not of the law fading; allowed: mu, speed, fading"),
+        ("offset", 0.03, r"centre of mass outside the ellipsoid"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            load_config(file, {key: value})
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An installed package that offers the pendulum, and a broken model."""
+    (tmp_path / "swings").mkdir()
+    (tmp_path / "swings" / "__init__.py").write_text("", encoding="utf-8")
+    (tmp_path / "swings" / "one.py").write_text(PENDULUM, encoding="utf-8")
+    info = tmp_path / "swings-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: swings\nVersion: 1.0\n", encoding="utf-8")
+    offered = "[sweep.models]\nswing = swings.one:MODEL\nlost = swings.one:NOTHING\n"
+    (info / "entry_points.txt").write_text(offered, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in ("swings", "swings.one"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    return tmp_path / "swings"
+
+
+def test_a_package_offers_models_by_entry_points(package: Path) -> None:
+    said = list[str]()
+    first = load_config({"model": "swing", "drive": {"torque": 0.3}}, announce=said.append)
+    assert first.equations.name == "pendulum"
+    assert said[0].startswith("running the code of swings.one:MODEL")
+    with pytest.raises(ConfigError, match=r"entry point lost = swings.one:NOTHING: .*no attribute 'NOTHING'"):
+        load_config({"model": "lost"})
+    with pytest.raises(ConfigError, match="code of a user, which is not run"):
+        load_config({"model": "swing"}, announce=None)
+    (package / "helper.py").write_text("x = 1\n", encoding="utf-8")
+    assert load_config({"model": "swing", "drive": {"torque": 0.3}}).fingerprint() != first.fingerprint()
+
+
+@pytest.mark.parametrize("name", ["t_stop", "verified_spin_final", "reversal_times", "contact_x"])
+def test_names_of_the_dataset_are_no_names_of_parameters(folder: Path, name: str) -> None:
+    text = PENDULUM.replace('Parameter("damping"', f'Parameter("{name}"').replace(
+        'columns["damping"]', f'columns["{name}"]'
+    )
+    (folder / "pendulum.py").write_text(text, encoding="utf-8")
+    words = f"parameter {name}: also a name in datasets; allowed: another"
+    with pytest.raises(ConfigError, match=words):
+        sweep.trajectory({"model": str(folder / "pendulum.py")})
+    if name != "contact_x":
+        with pytest.raises(ConfigError, match=words):
+            sweep.run({"model": str(folder / "pendulum.py")})

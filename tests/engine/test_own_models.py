@@ -1,0 +1,262 @@
+"""Runs of a user's model: killed and resumed, in other processes, and never from what another file has left."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import distributed
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.integrate import solve_ivp
+from support import ROOT, newton, nursery, own
+from support.own import FADING, PENDULUM
+from support.runs import same_numbers
+from support.same import contents
+
+import sweep
+from sweep.config import ConfigError, load_config
+from sweep.engine.cluster import Cluster
+from sweep.engine.plan import kernels
+from sweep.explore import cells
+from sweep.explore.controls import still
+from sweep.explore.slices import open_source
+from sweep.kernels import build as builder
+from sweep.kernels.build import build
+from sweep.plots import labels, trajectories
+from sweep.results.store import StoreError
+from sweep.results.summary import describe
+
+FEW = {"damping": [0.3, 0.5, 0.7], "torque": [0.5, 1.0, 1.2, 1.5], "t_end": 60}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return own.write(tmp_path)
+
+
+@pytest.fixture
+def few(folder: Path) -> xr.Dataset:
+    """The dataset of the pendulum, which it leaves in `folder` too."""
+    return sweep.run(folder / "pendulum.yaml", folder, **FEW)
+
+
+def test_the_pendulum_swings_as_scipy_says(few: xr.Dataset, folder: Path) -> None:
+    def slopes(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], 1.2 * np.cos(2 / 3 * t) - np.sin(y[0]) - 0.5 * y[1]]
+
+    one = sweep.trajectory(folder / "pendulum.yaml", t_end=60, every=0.5, damping=0.5, torque=1.2).isel(trajectory=0)
+    rates = solve_ivp(slopes, (0, 60), [1.0, 0.0], "DOP853", one["time"].values, rtol=1e-12, atol=1e-12).y[1]
+    np.testing.assert_allclose(one["spin"], rates, rtol=0, atol=1e-7)
+    cell = few.sel(damping=0.5, torque=1.2)
+    assert cell["spin_final"].item() == pytest.approx(rates[-1], abs=1e-7)
+    assert cell["reversals"].item() == one["reversals"].item() > 5
+
+
+def test_its_dataset_tells_the_file_its_hash_and_its_parameters(few: xr.Dataset, folder: Path) -> None:
+    assert few.attrs["model_place"] == str(folder / "pendulum.py")
+    assert few.attrs["model_sha256"] == load_config(folder / "pendulum.yaml").origin.digest
+    assert few["torque"].attrs == {"long_name": "torque of the drive, in m g length", "units": "1"}
+    assert not [name for name in few.data_vars if name.startswith("n_c") or name in ("form_factor", "energy_error")]
+    assert "g/c" not in " ".join(str(v.attrs["long_name"]) for v in few.data_vars.values())
+    assert few.attrs["title"] == "pendulum: reversals (pendulum.py model)"
+
+
+def test_pictures_and_summaries_take_its_words(folder: Path) -> None:
+    (folder / "pendulum.py").write_text(
+        PENDULUM.replace("damping", "mu").replace("drive", "friction"), encoding="utf-8"
+    )
+    one = sweep.trajectory({"model": str(folder / "pendulum.py"), "integrator": {"t_end": 5}}, torque=[1.0, 1.2])
+    assert labels.words(one, "mu") == "mu, in sqrt(g/length)"
+    assert "  mu = 0.5, torque = 1.2, angle = 1: time_limit at t = 5" in describe(one)
+    assert trajectories.draw(one).axes[0].get_lines()
+    law = sweep.predict(folder / "fading.yaml")
+    assert law["fading"].attrs == {"long_name": "slip velocity that halves friction", "units": "m s-1"}
+    assert law["mu"].attrs == {"long_name": "coefficient of friction", "units": "1"}
+    assert labels.words(law, "b") == "short semi-axis b"
+
+
+def strike(config: Path, out: Path, moment: str) -> bool:
+    """Start the command, and kill it at a moment; False if it ended before."""
+    log = out.parent / f"{out.name}.log"
+    process = nursery.context().Process(target=nursery.command, args=(["run", str(config), "--output", str(out)], log))
+    process.start()
+    images = out / "tippe_top.checkpoint" / "running.npz"
+    left = images.stat().st_mtime_ns if images.exists() else 0
+
+    def now() -> bool:
+        if moment == "tile":
+            return len(list(images.parent.glob("0*.npz"))) > 0
+        return images.exists() and images.stat().st_mtime_ns != left
+
+    while moment and process.is_alive() and not now():
+        time.sleep(2e-4)
+    if moment and process.is_alive():
+        os.kill(process.pid, signal.SIGKILL)
+    process.join(120)
+    killed = process.exitcode == -signal.SIGKILL
+    assert killed or process.exitcode == 0, log.read_text(encoding="utf-8")
+    process.close()
+    return killed
+
+
+def test_the_tippe_top_is_killed_and_goes_on_to_the_same_files(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "configs" / "tippe_top.py", tmp_path)
+    config = tmp_path / "tippe_top.yaml"
+    few = "body: {eccentricity: [0.04, 0.1, 0.3]}\nstart: {n0: [2, 4, 6, 7]}\nintegrator: {t_end: 600}\n"
+    config.write_text(f"model: tippe_top.py\n{few}", encoding="utf-8")
+    build(kernels(load_config(config)))
+    assert not strike(config, tmp_path / "undisturbed", "")
+    killed = [strike(config, tmp_path / "out", moment) for moment in ("images", "images", "tile")]
+    assert sum(killed) >= 2
+    strike(config, tmp_path / "out", "")
+    assert contents(tmp_path / "out") == contents(tmp_path / "undisturbed")
+    assert xr.load_dataset(tmp_path / "out" / "tippe_top.nc")["reversals"].values.sum() > 0
+
+
+@pytest.mark.usefixtures("few")
+@pytest.mark.parametrize(
+    "more", [{}, {"torque": [0.5, 1.0, 1.2, 1.4, 1.5]}, {"t_end": 70}], ids=["same", "axis", "longer"]
+)
+def test_another_file_goes_on_with_nothing(folder: Path, more: dict[str, Any]) -> None:
+    """Not with the same cells, nor by taking over those that a larger run shares."""
+    before = load_config(folder / "pendulum.yaml").origin.digest
+    (folder / "pendulum.py").write_text(PENDULUM.replace("2 / 3", "3 / 4"), encoding="utf-8")
+    after = load_config(folder / "pendulum.yaml").origin.digest
+    with pytest.raises(StoreError) as refusal:
+        sweep.run(folder / "pendulum.yaml", folder, **FEW | more)
+    assert f"- model_sha256: {before}" in str(refusal.value)
+    assert f"+ model_sha256: {after}" in str(refusal.value)
+
+
+def test_a_larger_run_of_the_same_file_takes_its_cells_over(few: xr.Dataset, folder: Path) -> None:
+    (folder / "moved").mkdir()
+    (folder / "pendulum.py").rename(folder / "moved" / "same.py")
+    notes = Notes()
+    more = FEW | {"torque": [0.5, 1.0, 1.2, 1.4, 1.5]}
+    larger = sweep.run(folder / "pendulum.yaml", folder, model="moved/same.py", reporter=notes, **more)
+    assert any(note.startswith("12 of 15 cells are taken over") for note in notes.said)
+    assert notes.said[0].startswith("running the code of ")
+    same_numbers(larger.sel(torque=few["torque"]), few)
+
+
+class Notes(sweep.engine.reporter.Reporter):  # type: ignore[name-defined]
+    def __init__(self) -> None:
+        self.said = list[str]()
+
+    def note(self, message: str) -> None:
+        self.said.append(message)
+
+
+def test_kernels_depend_on_what_the_file_says_not_on_where_it_lies(folder: Path) -> None:
+    def compiled(file: str) -> bool:
+        return all(kernel.is_compiled() for kernel in kernels(load_config(folder / "pendulum.yaml", {"model": file})))
+
+    sweep.run(folder / "pendulum.yaml", **FEW)
+    (folder / "copy.py").write_text(PENDULUM, encoding="utf-8")
+    assert compiled("copy.py")
+    (folder / "edited.py").write_text(PENDULUM.replace("return y[1], 0.0, 1.0", "return y[1], 0.0, 2.0"), "utf-8")
+    assert not compiled("edited.py")
+    law = load_config(folder / "fading.yaml")
+    (folder / "other.py").write_text(FADING.replace("1.0 + square", "2.0 + square"), encoding="utf-8")
+    other = load_config(folder / "fading.yaml", {"model": "other.py"})
+    assert law.equations.name == other.equations.name
+    assert law.equations.key != other.equations.key
+
+
+@pytest.mark.usefixtures("few")
+def test_the_process_that_compiles_gets_the_text_of_the_file(folder: Path) -> None:
+    config = load_config(folder / "pendulum.yaml")
+    (folder / "pendulum.py").unlink()
+    origin, key = config.origin, config.equations.key
+    for piece in (("kernel", "dopri5", key, "reversals"), ("approach", key)):
+        with builder._start(piece, origin) as process:
+            assert process.wait() == 0
+    with builder._start(("approach", key), replace(origin, text="1 / 0")) as process:
+        assert process.wait() != 0
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[distributed.Client]:
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
+        ) as c,
+        distributed.Client(c) as client,
+    ):
+        yield client
+
+
+def test_workers_need_no_file(few: xr.Dataset, folder: Path, workers: distributed.Client) -> None:
+    """They get its text with the configuration."""
+    config = load_config(folder / "pendulum.yaml", FEW)
+    (folder / "pendulum.py").unlink()
+    same_numbers(sweep.run(config, cluster=Cluster(workers)), few)
+
+
+LATE = 'if columns["torque"].max() > 1.1 and len(columns["torque"]) > 2:\n        raise ValueError("too much")\n    '
+
+
+def test_an_error_in_a_worker_names_its_line(folder: Path, workers: distributed.Client) -> None:
+    text = PENDULUM.replace("nothing = 0", f"{LATE}nothing = 0", 1)
+    (folder / "pendulum.py").write_text(text, encoding="utf-8")
+    for cluster in (None, Cluster(workers)):
+        with pytest.raises(ConfigError, match=r"pendulum.py:\d+: ValueError: too much") as error:
+            sweep.run(folder / "pendulum.yaml", cluster=cluster, **FEW)
+        assert 'raise ValueError("too much")' in text.splitlines()[error.value.faults[0].line - 1]
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("pendulum", "    angle, rate, phase = y\n", "    angle, rate, phase = half(y)\n",
+         "does not compile: Untyped global name 'half'"),
+        ("fading", "    return p.mu /", "    return half(p.mu) /", "does not compile: Untyped global name 'half'"),
+    ],
+    ids=["helper", "law"],
+)  # fmt: skip
+def test_what_does_not_compile_is_told_with_its_line(folder: Path, file: str, old: str, new: str, message: str) -> None:
+    text = own.SHOWN[f"{file}.py"].replace(old, new, 1) + "\n\ndef half(x):\n    return x\n"
+    (folder / f"{file}.py").write_text(text, encoding="utf-8")
+    line = text[: text.index(new)].count("\n") + 1
+    with pytest.raises(ConfigError) as error:
+        sweep.run(folder / f"{file}.yaml")
+    (fault,) = error.value.faults
+    assert (fault.file, fault.line) == (str(folder / f"{file}.py"), line), fault
+    assert fault.message.startswith(message)
+
+
+def test_a_law_of_ones_own_moves_the_body_as_newton_says(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fading(x: float, p: dict[str, float]) -> float:
+        return p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2)
+
+    monkeypatch.setitem(newton.LAWS, "fading", fading)
+    at = {"t_end": 0.5, "every": 0.1, "tolerance": 1e-12, "fading": 0.1, "slip1": 0.2}
+    one = sweep.trajectory(folder / "fading.yaml", **at).isel(trajectory=0)
+    p = {name: one[name].item() for name in load_config(folder / "fading.yaml").equations.parameters}
+    u1, u2 = np.cos(p["roll"]) * np.sin(p["pitch"]), -np.sin(p["roll"])
+    start = np.array([u1, u2, p["omega1"], p["omega2"], p["omega3"], p["slip1"] * np.cos(p["pitch"]), 0.0])
+    y = newton.follow(start, p, "fading", one["time"].values)
+    spins = y[0] * y[2] + y[1] * y[3] - np.sqrt(1 - y[0] ** 2 - y[1] ** 2) * y[4]
+    np.testing.assert_allclose(one["spin"], spins, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(one["slip_1"], y[5], rtol=0, atol=1e-9)
+
+
+@pytest.mark.usefixtures("few")
+def test_the_explorer_shows_its_maps_and_runs_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.models.outside.load", lambda origin: pytest.fail(f"ran {origin.place}"))
+    source = open_source(folder / "pendulum.nc")
+    assert cells.usable(source) is None
+    with pytest.raises(
+        ConfigError, match="code of a user, which is not run for a configuration that comes from a data"
+    ):
+        cells.Setup(source)
+    assert f"Its model is code of a user, {folder / 'pendulum.py'}, which the explorer does not run." in still(source)
+    assert source.describe({"damping": 0, "torque": 1})

@@ -1,0 +1,133 @@
+"""The example of a user's model: the tippe top, against Newton and Euler's equations of a body and published theory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
+from support import ROOT
+
+import sweep
+
+CONFIG = ROOT / "configs" / "tippe_top.yaml"
+TOP = {"eccentricity": 0.3, "ratio": 0.936, "C": 0.4, "mu": 0.3, "n0": 6.0, "tilt": 0.1}
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def slopes(y: np.ndarray, p: dict[str, float]) -> np.ndarray:
+    """Of the matrix that turns body axes into space, the angular velocity and the velocity of G, both in space.
+
+    Nothing is solved by hand: the accelerations and the normal force are unknowns of one linear system.
+    """
+    turned, w, v = y[:9].reshape(3, 3), y[9:12], y[12:]
+    e, C = turned[:, 2], p["C"]
+    a = p["eccentricity"] * e - Z
+    inertia = turned @ np.diag([p["ratio"] * C, p["ratio"] * C, C]) @ turned.T
+    force = Z - p["mu"] * (v + np.cross(w, a))  # per unit of the normal force
+    moving = p["eccentricity"] * np.cross(w, e)
+    matrix, right = np.zeros((7, 7)), np.zeros(7)
+    matrix[:3, :3], matrix[:3, 6], right[:3] = np.eye(3), -force, -Z
+    matrix[3:6, 3:6], matrix[3:6, 6] = inertia, -np.cross(a, force)
+    right[3:6] = -np.cross(w, inertia @ w)
+    # The velocity of the contact point has no vertical part.
+    matrix[6, :3], matrix[6, 3:6], right[6] = Z, np.cross(a, Z), -np.cross(w, moving) @ Z
+    found = np.linalg.solve(matrix, right)
+    return np.concatenate([np.cross(w, turned.T).T.ravel(), found[3:6], found[:3]])
+
+
+def test_it_turns_over_as_newton_and_euler_say() -> None:
+    one = sweep.trajectory(CONFIG, t_end=60, tolerance=1e-12, every=2.0, **TOP).isel(trajectory=0)
+    sin, cos = np.sin(TOP["tilt"]), np.cos(TOP["tilt"])
+    turned = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+    y = np.concatenate([turned.ravel(), TOP["n0"] * turned[:, 2], np.zeros(3)])
+    times = one["time"].values
+    y = solve_ivp(lambda _, y: slopes(y, TOP), (0, times[-1]), y, "DOP853", times, rtol=1e-12, atol=1e-13).y
+    e = y[:9].reshape(3, 3, -1)[:, 2]
+    np.testing.assert_allclose(one["spin"], (y[9:12] * e).sum(axis=0), rtol=0, atol=2e-9)
+    np.testing.assert_allclose(one["inclination"], np.arccos(e[2]), rtol=0, atol=1e-7)
+    assert one["inclination"].min() < 0.2
+    assert one["inclination"].max() > 3.0
+    assert int(one["reversals"]) == 1
+
+
+def test_energy_balances_and_jelletts_integral_stays() -> None:
+    one = sweep.trajectory(CONFIG, t_end=100, **TOP).isel(trajectory=0)
+    lost = float(one["energy"][0] - one["energy"][-1])
+    assert lost > 0.5 * float(one["energy"][0])
+    total = one["energy"] + one["dissipated"]
+    np.testing.assert_allclose(total, total[0], rtol=1e-7)
+    assert float(one["energy_error"]) < 1e-7
+    jellett = TOP["C"] * TOP["n0"] * (np.cos(TOP["tilt"]) - TOP["eccentricity"])
+    np.testing.assert_allclose(one["jellett"], jellett, rtol=1e-8)
+
+
+def steady(p: dict[str, float]) -> tuple[float, float]:
+    """cos θ and spin of the nearest motion without slip downhill in energy, for the Jellett integral λ of the start.
+
+    The angular velocity is then along a, and the energy λ²/(2 a·Ja) + α (1 - cos θ).
+    """
+    alpha, C, A = p["eccentricity"], p["C"], p["ratio"] * p["C"]
+    jellett = C * p["n0"] * (np.cos(p["tilt"]) - alpha)
+
+    def inertia(c: float) -> float:
+        return A * (1 - c**2) + C * (c - alpha) ** 2
+
+    grid = np.linspace(-1, 1, 2001)
+    energies = jellett**2 / (2 * inertia(grid)) + alpha * (1 - grid)
+    i = int(np.searchsorted(grid, np.cos(p["tilt"])))
+    while 0 < i < len(grid) - 1 and energies[i - 1 : i + 2].argmin() != 1:
+        i += int(energies[i - 1 : i + 2].argmin()) - 1
+    c = float(grid[i])
+    if 0 < i < len(grid) - 1:
+        span = (grid[i - 1], grid[i + 1])
+        c = minimize_scalar(
+            lambda c: jellett**2 / (2 * inertia(c)) + alpha * (1 - c), bounds=span, method="bounded",
+            options={"xatol": 1e-10},
+        ).x  # fmt: skip
+    return c, jellett * (c - alpha) / inertia(c)
+
+
+RATIOS = [0.6, 0.9, 1.1, 1.5]
+
+
+@pytest.fixture(scope="module")
+def ends() -> xr.Dataset:
+    tops = {**TOP, "mu": 1.0, "ratio": RATIOS, "n0": [5.0, 6.0]}
+    return sweep.run(CONFIG, t_end=4000, **tops)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_it_ends_in_the_steady_motion_downhill(ends: xr.Dataset, ratio: float) -> None:
+    """Rauch-Wojciechowski and Rutstam (2014), section 1: LaSalle's theorem."""
+    for n0 in ends["n0"].values:
+        _, spin = steady({**TOP, "ratio": ratio, "n0": float(n0)})
+        assert float(ends["spin_final"].sel(ratio=ratio, n0=n0).item()) == pytest.approx(spin, abs=2e-6)
+
+
+def test_it_turns_over_completely_if_its_moments_are_in_the_published_range(ends: xr.Dataset) -> None:
+    """1 - α < A/C < 1 + α; below it does not turn over, above not completely."""
+    alpha, complete = TOP["eccentricity"], {}
+    for ratio in RATIOS:
+        jellett = TOP["C"] * 6 * (np.cos(TOP["tilt"]) - alpha)
+        upside_down = -jellett / (TOP["C"] * (1 + alpha))
+        found = float(ends["spin_final"].sel(ratio=ratio, n0=6).item())
+        complete[ratio] = abs(found - upside_down) < 1e-6
+    assert complete == {ratio: 1 - alpha < ratio < 1 + alpha for ratio in RATIOS}
+    assert ends["reversals"].sel(n0=6).values.ravel().tolist() == [0, 1, 1, 1]
+
+
+def test_the_map_shows_where_it_turns_over() -> None:
+    """Fast tops turn over from α = 1 - A/C on, slow ones never: upright spin is stable for them."""
+    counts = sweep.run(CONFIG, eccentricity=[0.04, 0.055, 0.08, 0.2, 0.3], n0=[1.0, 7.0])["reversals"]
+    assert counts.sel(n0=7.0).values.ravel().tolist() == [0, 0, 1, 1, 1]
+    assert not counts.sel(n0=1.0).any()
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
+def test_the_automatic_step_keeps_the_tolerance(tolerance: float) -> None:
+    asked = {**TOP, "n0": [2.0, 6.0], "eccentricity": [0.1, 0.3], "t_end": 100}
+    found = sweep.run(CONFIG, tolerance=tolerance, **asked)["spin_final"]
+    exact = sweep.run(CONFIG, tolerance=1e-13, **asked)["spin_final"]
+    assert abs(found - exact).max() < tolerance

@@ -1,0 +1,22 @@
+"""The files of `docs/how-to/bring-a-model.md`: a user's model, a law of friction, and their configurations."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from support import ROOT
+
+_PAGE = (ROOT / "docs" / "how-to" / "bring-a-model.md").read_text(encoding="utf-8")
+
+SHOWN: dict[str, str] = dict(re.findall(r"```\{code-block\}\n:caption: (\S+)\n\n(.*?)```", _PAGE, re.DOTALL))
+"""What the page shows, by the name of the file."""
+
+PENDULUM, FADING = SHOWN["pendulum.py"], SHOWN["fading.py"]
+
+
+def write(folder: Path) -> Path:
+    """Write the files to a folder, and return it."""
+    for name, text in SHOWN.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
