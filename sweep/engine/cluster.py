@@ -22,7 +22,6 @@ from sweep.engine.local import Done, run_group
 from sweep.engine.plan import kernels
 from sweep.grid import Tile
 from sweep.kernels.build import build
-from sweep.models.outside import blamed
 from sweep.results.identity import Identity
 from sweep.results.provenance import identify, sources
 from sweep.results.store import StoreError
@@ -116,7 +115,7 @@ def _work(shared: Shared, tile: int) -> Done:
     source_hash, versions = _own_sources()
     if reason := identity.difference(replace(identity, source_hash=source_hash, versions=versions)):
         raise StoreError(f"{get_worker().address}: the worker has {reason}")
-    with _one_tile, blamed(config.origin):
+    with _one_tile:
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         numba.set_num_threads(min(get_worker().state.nthreads, most))
         (done,) = run_group(config, tiles, [tile])
