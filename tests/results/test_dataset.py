@@ -31,6 +31,11 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
     assert set(small.data_vars) == {n for n in VARIABLES if not n.endswith("_reason") and "simulated" not in n} - {
         "method",
         "t_first_reversal",
+        "t_first_reversal_predicted",
+        "cycle_mean",
+        "cycle_variation",
+        "lyapunov",
+        "lyapunov_error",
         "inferred",
         "reversal_times",
         "raw_reversals",
