@@ -12,9 +12,10 @@ from sweep.grid import Array
 from sweep.kernels.lanes import STABLE
 from sweep.kernels.measures.sensitivity import Sensitivity
 from sweep.kernels.status import FAILURES
+from sweep.parameters import START
 
 NUDGE = 1e-10
-"""Relative difference of the starts: spin and contact point."""
+"""Relative difference of the starts, in all their parameters."""
 
 SHORTER = 0.8
 """Ratio of the steps, so that a count that depends on the step shows too."""
@@ -44,7 +45,7 @@ def _again(job: Plan, part: Part, number: int, after_chunk: Callable[[], None]) 
     if not sound.any():
         return counts
     columns = {name: values[sound] for name, values in part.columns.items()}
-    for name in ("n0", "x0", "y0"):
+    for name in START & columns.keys():
         columns[name] = columns[name] * (1 + number * NUDGE)
     stable = table.columns(STABLE)[sound].T
     images = part.kernel.images(columns, SHORTER * table["step"][sound], integrator.t_end, stable)

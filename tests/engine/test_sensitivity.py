@@ -58,3 +58,10 @@ def test_settled_trajectories_come_to_rest_where_they_are_said_to() -> None:
     np.testing.assert_allclose(rest, end, rtol=1e-3)
     assert np.abs(left.spin_final.values[settled] / end - 1).max() > 0.01
     assert np.isnan(left.spin_rest.values[~settled]).all()
+
+
+def test_a_start_by_angles_is_nudged_too() -> None:
+    body, start = {"b": 3.0, "offset": 0.1}, {"roll": 0.01, "omega3": -0.05}
+    scene = {"body": body, "friction": {"mu": 60.0}, "start": start, "measure": ["reversals", "sensitivity"]}
+    found = sweep.run(scene, t_end=300.0)
+    assert int(found.reversals_low) <= int(found.reversals) <= int(found.reversals_high)
