@@ -12,8 +12,8 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 4. Say what the model depends on and what can be asked of it (`parameters`, `offers`).
 5. If friction or anything else makes the model stiff, bound its fastest decay (`fastest_decay`).
 
-A model of a user (`sweep.models.outside`) may be of any body.  Where that has no upright spin, no state need vanish: the
-model does not offer `LINEAR`, tells its `fastest_motion`, and never settles.
+A model of a user (`sweep.models.outside`) may be of any body.  Where that has no upright spin, no state need vanish:
+the model does not offer `LINEAR`, tells its `fastest_motion`, and never settles.
 
 `constants.of`, `start` and `energy` are called when a run is prepared, `rhs` in every stage of a step, and `energy`
 again at every look.  The linear theory of `sweep.models.linear` calls `upright` and `rhs`, the latter with complex
