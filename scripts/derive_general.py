@@ -13,7 +13,8 @@ taken.  Friction is -N k s and the couple is -(σ + N κ) ω.
 
     python scripts/derive_general.py
 
-prints the largest relative difference between the two derivations, for each law with each set of couples, at random
+has neither couples about the normal nor Contensou's law, and only the ellipsoid.  It prints the largest relative
+difference between the two derivations, for each law with each set of couples, at random
 states of random bodies.  It needs SymPy, of the extra `test`.
 """
 

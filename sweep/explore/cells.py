@@ -78,6 +78,13 @@ class Setup:
         self.base: Cell = {name: here.get(name, v.numbers[0]) for name, v in self.config.parameters.items()}
 
 
+def why_still(source: Source) -> str:
+    """Why no trajectory is run of a file that is not `usable`."""
+    if place := source.dataset.attrs.get("model_place"):
+        return f"Its model is code of a user, {place}, which the explorer does not run."
+    return "This file tells no configuration to run trajectories from."
+
+
 def usable(source: Source) -> Setup | None:
     """The setup of the dataset, None if it has no configuration to run trajectories from."""
     try:

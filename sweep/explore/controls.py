@@ -10,6 +10,7 @@ from typing import Any
 
 from bokeh.models import Column, CustomJS, Div, RadioButtonGroup, Row, Select, Slider
 
+from sweep.explore.cells import why_still
 from sweep.explore.slices import Axis, Source
 from sweep.explore.state import State
 from sweep.plots import labels
@@ -32,10 +33,7 @@ BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6
 
 def still(source: Source) -> str:
     """The hint for a file from which no trajectory is run."""
-    why = "This file tells no configuration to run trajectories from."
-    if place := source.dataset.attrs.get("model_place"):
-        why = f"Its model is code of a user, {escaped(str(place))}, which the explorer does not run."
-    return _SOFT.format(f"Point at a cell to read it. {why}")
+    return _SOFT.format(f"Point at a cell to read it. {escaped(why_still(source))}")
 
 
 def escaped(text: str) -> str:

@@ -26,7 +26,6 @@ from sweep.config import ConfigError, load_config
 from sweep.engine.cluster import Cluster
 from sweep.engine.plan import kernels
 from sweep.explore import cells
-from sweep.explore.controls import still
 from sweep.explore.slices import open_source
 from sweep.kernels import build as builder
 from sweep.kernels.build import build
@@ -258,5 +257,6 @@ def test_the_explorer_shows_its_maps_and_runs_nothing(folder: Path, monkeypatch:
         ConfigError, match="code of a user, which is not run for a configuration that comes from a data"
     ):
         cells.Setup(source)
-    assert f"Its model is code of a user, {folder / 'pendulum.py'}, which the explorer does not run." in still(source)
+    why = f"Its model is code of a user, {folder / 'pendulum.py'}, which the explorer does not run."
+    assert cells.why_still(source) == why
     assert source.describe({"damping": 0, "torque": 1})

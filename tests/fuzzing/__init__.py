@@ -153,8 +153,8 @@ def at(random: Random, folder: Path) -> bool:
         texts.append(damage(random, texts.pop().encode()).decode("utf-8", "surrogateescape"))
 
     def pick() -> Any:
-        with cli._of_option("--at"):
-            return choose(_config_at(folder / "base.yaml"), cli._cells(tuple(texts)))
+        with cli._of_option("--at", PARAMETERS):
+            return choose(_config_at(folder / "base.yaml"), cli._cells(tuple(texts), PARAMETERS))
 
     return _refused(pick, "--at") is not None
 

@@ -14,7 +14,7 @@ def test_cycles_are_those_of_the_reversal_times() -> None:
         "start": {"n0": [0.05, 0.2, 0.4], "x0": 0.01, "y0": 0.01},
         "measure": ["reversals", {"reversal_times": 60}, "cycles"],
     }
-    found = sweep.run(scene, t_end=2500)
+    found = sweep.run(scene, t_end=2000)
     times = found.reversal_times.values
     assert (found.reversals <= 60).all()
     for row, mean, variation in zip(times, found.cycle_mean.values, found.cycle_variation.values, strict=True):
