@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -83,7 +84,7 @@ def _coarsen(value: Any) -> Any:
 
 
 @pytest.fixture
-def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder like the repository's, with small configurations."""
     yaml = YAML(typ="safe", pure=True)
     (tmp_path / "configs").mkdir()
@@ -98,7 +99,8 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(mpl, "rcParams", mpl.RcParams(mpl.rcParams | {"figure.max_open_warning": 0}))
     mpl.use("Agg")
-    return tmp_path
+    yield tmp_path
+    plt.close("all")  # or the next page draws on
 
 
 def _run_command(block: Block, command: str) -> None:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sweep.plots import cells, labels, legends
+from sweep.plots.figure import Picture
 from sweep.plots.maps import arrangement, draw_bar, draw_map, label_axes, shared_scale, thinned
 from sweep.plots.marks import WORDS, marks, meaning
 from sweep.plots.panels import MAX_PANELS, Panels, in_lines, title
@@ -35,7 +36,7 @@ def draw(each: list[Panels], limits: Limits | None = None, cmap: str | None = No
     if short := [_name(panels.dataset) for panels in each if len(panels.across) < 2]:
         raise ValueError(f"{', '.join(short)} has no two axes; allowed: maps side by side")
     rows, columns = arrangement(len(shown), 1)
-    figure = Figure((_WIDTH * columns + _SIDE, 1.8 + _WIDTH * _RATIO * rows), dpi=110, layout="constrained")
+    figure = Picture((_WIDTH * columns + _SIDE, 1.8 + _WIDTH * _RATIO * rows), dpi=110, layout="constrained")
     common = in_lines(_constants([panels.dataset for panels in each]), figure.get_figwidth())
     figure.suptitle(f"{labels.words(each[0].dataset, name)}\n{common}".strip(), fontsize=10)
     scale = shared_scale(each, limits, cmap)

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from sweep.plots import labels, legends, theory
 from sweep.plots.axes import set_scale
+from sweep.plots.figure import Picture
 from sweep.plots.maps import arrangement
 from sweep.plots.panels import MAX_PANELS, heading, indices, title
 
@@ -31,7 +32,7 @@ def draw(dataset: xr.Dataset) -> Figure:
     x = dims[0] if dims else None
     panels = list(indices(dataset, dims[1:]))[:MAX_PANELS]
     rows, columns = arrangement(len(panels), 2)
-    figure = Figure(figsize=(min(8 * columns, 14), 2 + 3.2 * rows), dpi=110, layout="constrained")
+    figure = Picture(figsize=(min(8 * columns, 14), 2 + 3.2 * rows), dpi=110, layout="constrained")
     figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):

@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from sweep.grid import Array
 from sweep.plots import labels, legends, theory
 from sweep.plots.axes import set_scale
+from sweep.plots.figure import Picture
 from sweep.plots.maps import arrangement
 from sweep.plots.marks import COMPARISONS, PREDICTIONS, blank, legend, marks
 from sweep.plots.panels import Panels, heading, title
@@ -39,7 +40,7 @@ def draw(panels: Panels, limits: Limits | None = None) -> Figure:
     dataset, names = panels.dataset, [name for name in panels.names if name not in COMPARISONS] or panels.names
     rows, columns = arrangement(len(panels.each), 2)
     width = min(7.0, 14 / columns)
-    figure = Figure(figsize=(width * columns, 1.9 + 2.6 * rows), dpi=110, layout="constrained")
+    figure = Picture(figsize=(width * columns, 1.9 + 2.6 * rows), dpi=110, layout="constrained")
     figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
     x = panels.across[0] if panels.across else None

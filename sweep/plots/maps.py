@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from sweep.grid import Array
 from sweep.plots import cells, labels, legends, scales, theory
 from sweep.plots.axes import set_scale
+from sweep.plots.figure import Picture
 from sweep.plots.marks import COMPARISONS, blank, legend, marks
 from sweep.plots.panels import Panels, edges, heading, title
 from sweep.plots.scales import Limits, Scale
@@ -50,7 +51,7 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) 
     rows, groups = arrangement(len(panels.each), len(panels.names))
     columns = groups * len(panels.names)
     width = min(_PAGE / columns, _WIDEST)
-    figure = Figure(figsize=(width * columns + 1.2, 1.6 + width * _RATIO * rows), dpi=110, layout="constrained")
+    figure = Picture(figsize=(width * columns + 1.2, 1.6 + width * _RATIO * rows), dpi=110, layout="constrained")
     figure.suptitle(heading(panels.dataset, figure.get_figwidth()), fontsize=10)
     kinds = _columns(panels)
     grid = figure.add_gridspec(rows, groups * len(kinds), width_ratios=groups * [_BAR if k == "" else 1 for k in kinds])

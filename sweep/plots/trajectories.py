@@ -13,6 +13,7 @@ from sweep.grid import Array
 from sweep.models import solid
 from sweep.models.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, legends, theory
+from sweep.plots.figure import Picture
 from sweep.plots.panels import heading
 from sweep.results.kind import is_of_own_body, parameters
 
@@ -61,7 +62,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
-    figure = Figure(figsize=(11, 4.2 + 1.9 * rows), dpi=110, layout="constrained")
+    figure = Picture(figsize=(11, 4.2 + 1.9 * rows), dpi=110, layout="constrained")
     figure.suptitle(heading(_constants_apart(dataset), figure.get_figwidth()), fontsize=10)
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])

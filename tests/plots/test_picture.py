@@ -340,3 +340,8 @@ def test_numbers_along_a_further_dimension_get_panels() -> None:
     more = dataset.assign(reversal_times=(("mu", "b", "n0", "reversal"), times, described(spec)))
     more = more.assign_coords(numbers_along({"reversal_times": times.shape}))
     assert len(maps(picture.draw(more, "reversal_times"))) == 2
+
+
+def test_a_notebook_shows_a_map_before_pyplot_is_imported(small: xr.Dataset) -> None:
+    shown = sweep.plot(small)._repr_png_()
+    assert shown.startswith(b"\x89PNG")
