@@ -27,7 +27,7 @@ Write = Callable[..., Path]
 
 # Inputs of each kind: what a few seconds allow.
 EXAMPLES = {
-    "yaml_tree": 600, "yaml_bytes": 600, "setting": 1000, "value": 600, "at": 2000, "table": 600,
+    "yaml_tree": 600, "yaml_bytes": 600, "setting": 1000, "value": 200, "at": 2000, "table": 600,
     "identity": 400, "archive": 200, "dry_run": 30, "foreign": 15, "damaged": 80,
 }  # fmt: skip
 

@@ -31,9 +31,9 @@ def test_nearly_round_bodies_do_not_settle_ahead_of_a_reversal(method: str, tmp_
 
 def test_what_has_settled_beyond_n_c1_reverses_no_more(tmp_path: Path) -> None:
     """Far beyond the paper's bodies, from 1 to 3.5 n_c1: the counts are those of runs that go on."""
-    bodies, random = wide_bodies(400), np.random.default_rng(2)
+    bodies, random = wide_bodies(200), np.random.default_rng(2)
     below, above = stability.stable_ranges(MODELS["slip"], bodies)[:2]
-    spin = np.where(random.random(400) < 0.5, below, above) * random.uniform(1, 3.5, 400)
+    spin = np.where(random.random(200) < 0.5, below, above) * random.uniform(1, 3.5, 200)
     cells = {name: bodies[name] for name in ("a", "b", "c", "delta", "mu")} | {"n0": spin}
     kept = np.isfinite(spin) & (np.abs(spin) < 0.5) & (np.abs(spin) > 1e-3) & (bodies["mu"] > 1)
     table = np.column_stack(list(cells.values()))[kept]
@@ -47,5 +47,5 @@ def test_what_has_settled_beyond_n_c1_reverses_no_more(tmp_path: Path) -> None:
     settled = ended.status.values == SETTLED
     spins = ended.spin_final.values
     beyond = settled & (np.abs(spins) > np.abs(np.where(spins > 0, ended.n_c1_plus_linear, ended.n_c1_minus_linear)))
-    assert beyond.sum() > 20
+    assert beyond.sum() > 10
     np.testing.assert_array_equal(ended.reversals.values[settled], gone_on.reversals.values[settled])

@@ -217,7 +217,7 @@ gravity: 9.81
 body: {BODY.replace("a: 0.2, b: 0.03", "surface: paraboloid, a: 0.005, b: 0.22")}
 friction: {{mu: 20, sigma: 1.0e-4}}
 start: {{n0: [-5, 5], x0: 0.04, y0: [0.004, 0.02]}}
-integrator: {{t_end: 1}}
+integrator: {{t_end: 1, method: dopri5}}
 """
     result = run(tmp_path, text).stack(cell=("n0", "y0"))
     config = load_config(tmp_path / "scene.yaml")

@@ -13,6 +13,7 @@ from matplotlib.colors import BoundaryNorm, to_rgb
 from matplotlib.figure import Figure
 from support.cli import invoke, refused
 
+import sweep
 from sweep.kernels.status import DIVERGED, SETTLED, TIME_LIMIT
 from sweep.plots import picture, scales
 from sweep.plots.cells import outline
