@@ -15,7 +15,7 @@ from sphinx.util.docutils import SphinxDirective
 from sweep.config import messages, schema
 from sweep.kernels import measures, methods
 from sweep.kernels.status import FAILURES
-from sweep.models import TIERS
+from sweep.models import MODELS, TIERS
 from sweep.models.model import Model
 from sweep.parameters import PARAMETERS
 from sweep.results import dataset
@@ -99,7 +99,7 @@ def _measurements() -> tuple[Row, list[Row]]:
 def _methods() -> tuple[Row, list[Row]]:
     rows = []
     for method in methods.METHODS.values():
-        models = "all" if method.models is None else ", ".join(f"`{m}`" for m in sorted(method.models))
+        models = ", ".join(f"`{m.name}`" for m in MODELS.values() if method.runs(m))
         rows.append((f"`{method.name}`", method.summary, models))
     return ("method", "what it is", "models"), rows
 
