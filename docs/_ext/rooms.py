@@ -25,7 +25,8 @@ def _modules(folder: Path) -> list[str]:
 def _page(title: str, modules: list[str]) -> str:
     lines = [f"# {title}", ""]
     for name in modules:
-        directive = [f".. automodule:: {name}", "   :members:", "   :ignore-module-all:"]
+        # Matplotlib gives each class of figures a `set` of its own, in markup of its own.
+        directive = [f".. automodule:: {name}", "   :members:", "   :exclude-members: set", "   :ignore-module-all:"]
         lines += [f"## `{name}`", "", "```{eval-rst}", *directive, "```", ""]
     return "\n".join(lines)
 
