@@ -53,7 +53,12 @@ def load_numba() -> Any:
 
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # set when it is imported
         raise NotCompiled("NUMBA_DISABLE_JIT is set, but kernels have to be compiled; allowed: unset, or 0")
+    from llvmlite import binding
     from numba.core.bytecode import FunctionIdentity
+
+    # LLVM vectorises a loop only if a few comparisons show that its arrays lie apart.  By default it gives up merging
+    # these after 100 places in memory, and adams for any body has more: its step took seven times as long.
+    binding.set_option(__name__, "--memory-check-merge-threshold=1000")
 
     # Numba numbers the functions of each process from 1, and only that number distinguishes the symbols of two
     # closures with the same name.  When one process loaded two kernels that two others had compiled, these shared

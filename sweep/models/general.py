@@ -174,16 +174,15 @@ def _resistance(law: Law) -> Any:
     return resistance
 
 
-def _drag(couples: Sequence[Couple], law: Law | None = None) -> tuple[Any, Any]:
+def _drag(couples: Sequence[Couple], law: Law | None = None) -> Any:
     """Inline, (k, ω, u, v², constants) -> (k', d): the couple per unit of the normal force is -k' d.
 
-    It is -k ω, and where `couples` have one about the normal, or the law, also that one.  The other function is
-    (R k', k0, ω², d · ω) -> power of all couples, where k0 is the resistance by itself.
+    It is -k ω, and where `couples` have one about the normal, or the law, also that one.
     """
     about_normal = [couple.resistance for couple in couples if couple.about_normal]
     coupled = law.coupled if law else None
     if not about_normal and coupled is None:
-        return _isotropic, _isotropic_power
+        return _isotropic
     spinning = about_normal[0] if about_normal else nothing
     of_slip = coupled or _no_couple
 
@@ -194,16 +193,7 @@ def _drag(couples: Sequence[Couple], law: Law | None = None) -> tuple[Any, Any]:
         m = (spinning(n * n, p) + of_law) * n
         return 1.0, k * w1 + m * u1, k * w2 + m * u2, k * w3 + m * u3
 
-    @inline
-    def lost(load: Any, k0: Any, turn_square: Any, turned: Any) -> Any:
-        return load * turned + k0 * turn_square
-
-    return drag, lost
-
-
-@inline
-def _isotropic_power(load: Any, k0: Any, turn_square: Any, turned: Any) -> Any:  # noqa: ARG001
-    return (load + k0) * turn_square
+    return drag
 
 
 @inline
@@ -220,7 +210,9 @@ def _isotropic(
 
 def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     contact, general_energy = surface.contact, solid.energy_on(surface)
-    resistance, (plain, loaded), (drag, _) = _resistance(law), resistances(couples), _drag(couples, law)
+    resistance, (plain, loaded), drag = _resistance(law), resistances(couples), _drag(couples, law)
+    # A product with 0.0 would remain: the compiler has to allow for infinity.  A branch on these does not.
+    damps, drags = plain is not nothing, loaded is not nothing or drag is not _isotropic
     names, values = _couple_constants(couples, law)
 
     @inline
@@ -240,11 +232,14 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
         k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, slip_square, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
-        m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
+        if damps:
+            m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
         al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
         al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
         al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
-        t1, t2, t3 = y_ * f3 - z * f2 - k1 * d1, z * f1 - x * f3 - k1 * d2, x * f2 - y_ * f1 - k1 * d3
+        t1, t2, t3 = y_ * f3 - z * f2, z * f1 - x * f3, x * f2 - y_ * f1
+        if drags:
+            t1, t2, t3 = t1 - k1 * d1, t2 - k1 * d2, t3 - k1 * d3
         be1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
         be2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
         be3 = p.inv_J13 * t1 + p.inv_J23 * t2 + p.inv_J33 * t3
@@ -258,7 +253,12 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
         dv2 = R * f2 - p.g * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
 
         spin = u1 * w1 + u2 * w2 + u3 * w3
-        power = R * (k * slip_square + k1 * (d1 * w1 + d2 * w2 + d3 * w3)) + k0 * turn_square
+        per_load = k * slip_square
+        if drags:
+            per_load = per_load + k1 * (d1 * w1 + d2 * w2 + d3 * w3)
+        power = R * per_load
+        if damps:
+            power = power + k0 * turn_square
         return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, power, R, denominator)
 
     @inline
@@ -308,7 +308,8 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
 
 def _rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     contact, general_energy = surface.contact, solid.energy_on(surface)
-    (plain, loaded), (drag, lost) = resistances(couples), _drag(couples)
+    (plain, loaded), drag = resistances(couples), _drag(couples)
+    damps, drags = plain is not nothing, loaded is not nothing or drag is not _isotropic
     names, values = _couple_constants(couples)
 
     @inline
@@ -323,9 +324,9 @@ def _rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters:
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
         k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, 0.0, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
-        t1 = m1 + y_ * h3 - z * h2 - k0 * w1
-        t2 = m2 + z * h1 - x * h3 - k0 * w2
-        t3 = m3 + x * h2 - y_ * h1 - k0 * w3
+        t1, t2, t3 = m1 + y_ * h3 - z * h2, m2 + z * h1 - x * h3, m3 + x * h2 - y_ * h1
+        if damps:
+            t1, t2, t3 = t1 - k0 * w1, t2 - k0 * w2, t3 - k0 * w3
 
         # P = J + |x_p|² - x_p x_pᵀ, and the adjugate C of it
         P11, P22, P33 = p.J11 + y_ * y_ + z * z, p.J22 + z * z + x * x, p.J33 + x * x + y_ * y_
@@ -333,21 +334,26 @@ def _rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters:
         C11, C22, C33 = P22 * P33 - P23 * P23, P11 * P33 - P13 * P13, P11 * P22 - P12 * P12
         C12, C13, C23 = P13 * P23 - P12 * P33, P12 * P23 - P13 * P22, P12 * P13 - P11 * P23
         inv = 1.0 / (P11 * C11 + P12 * C12 + P13 * C13)
-        # ω' = a - R k1 b
         a1 = inv * (C11 * t1 + C12 * t2 + C13 * t3)
         a2 = inv * (C12 * t1 + C22 * t2 + C23 * t3)
         a3 = inv * (C13 * t1 + C23 * t2 + C33 * t3)
-        b1 = inv * (C11 * d1 + C12 * d2 + C13 * d3)
-        b2 = inv * (C12 * d1 + C22 * d2 + C23 * d3)
-        b3 = inv * (C13 * d1 + C23 * d2 + C33 * d3)
-
         q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
-        denominator = 1.0 + k1 * (q1 * b1 + q2 * b2 + q3 * b3)
-        R = (p.g + (u1 * c1 + u2 * c2 + u3 * c3) + (q1 * a1 + q2 * a2 + q3 * a3)) / denominator
-        load = R * k1
+        R = p.g + (u1 * c1 + u2 * c2 + u3 * c3) + (q1 * a1 + q2 * a2 + q3 * a3)
         spin = u1 * w1 + u2 * w2 + u3 * w3
-        power = lost(load, k0, turn_square, d1 * w1 + d2 * w2 + d3 * w3)
-        return (du1, du2, a1 - load * b1, a2 - load * b2, a3 - load * b3), (spin, power, R, denominator)
+        denominator, power = 1.0, 0.0
+        if drags:
+            # ω' = a - R k1 b
+            b1 = inv * (C11 * d1 + C12 * d2 + C13 * d3)
+            b2 = inv * (C12 * d1 + C22 * d2 + C23 * d3)
+            b3 = inv * (C13 * d1 + C23 * d2 + C33 * d3)
+            denominator = 1.0 + k1 * (q1 * b1 + q2 * b2 + q3 * b3)
+            R = R / denominator
+            load = R * k1
+            a1, a2, a3 = a1 - load * b1, a2 - load * b2, a3 - load * b3
+            power = load * (d1 * w1 + d2 * w2 + d3 * w3)
+        if damps:
+            power = power + k0 * turn_square
+        return (du1, du2, a1, a2, a3), (spin, power, R, denominator)
 
     @inline
     def energy(y: Any, p: Any) -> Any:

@@ -21,7 +21,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models import general, solid, steady
-from sweep.models.couples import Couple
+from sweep.models.couples import Couple, nothing
 from sweep.models.laws import LAWS, Law
 from sweep.models.model import Array, Columns, Model, Ripple, named
 from sweep.models.slip_split import Geometry
@@ -52,6 +52,7 @@ def split(model: Model) -> Split | None:
 def _split(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface) -> Split:
     resistance, contact, general_energy = law.resistance, surface.contact, solid.energy_on(surface)
     couple, _ = general.resistances(couples)
+    damps = couple is not nothing
     fields = (*full.constants._fields, *ROCKING)
 
     class Constants(named(*fields)):  # type: ignore[misc]
@@ -85,9 +86,11 @@ def _split(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface)
         s1, s2, s3 = s1 - dx, s2 - dy, s3 - dz
         q1, q2, q3 = u2 * z - u3 * y, u3 * x - u1 * z, u1 * y - u2 * x
         k0 = couple(w1 * w1 + w2 * w2 + w3 * w3, p)
-        dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - p.g * q1 - k0 * w1
-        dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - p.g * q2 - k0 * w2
-        dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - p.g * q3 - k0 * w3
+        dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - p.g * q1
+        dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - p.g * q2
+        dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - p.g * q3
+        if damps:
+            dM1, dM2, dM3 = dM1 - k0 * w1, dM2 - k0 * w2, dM3 - k0 * w3
         geometry = Geometry(u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
         return (du1, du2, dM1, dM2, dM3), geometry
 
@@ -96,7 +99,8 @@ def _split(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface)
         u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3 = geometry
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         k0 = couple(w1 * w1 + w2 * w2 + w3 * w3, p)
-        m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
+        if damps:
+            m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
         al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
         al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
         al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
@@ -130,7 +134,10 @@ def _split(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface)
         v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
         slip_square = v1 * v1 + v2 * v2 + v3 * v3
         turn_square = geometry.w1 * geometry.w1 + geometry.w2 * geometry.w2 + geometry.w3 * geometry.w3
-        return R * resistance(slip_square, p) * slip_square + couple(turn_square, p) * turn_square
+        lost = R * resistance(slip_square, p) * slip_square
+        if damps:
+            lost = lost + couple(turn_square, p) * turn_square
+        return lost
 
     @inline
     def energy(y: Any, p: Any) -> Any:

@@ -14,12 +14,14 @@ from support.kernels import finish, images, kernel, run, spin, threads
 
 import sweep
 from sweep import ConfigError
+from sweep.kernels import measures
+from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.adams.step import BDF, BDF_GAMMA, CORRECTOR_NODES, EXTRAPOLATE, PREDICTOR_NODES
 from sweep.kernels.adams.weights import fitted_weights, plain_weights
 from sweep.kernels.layout import LANES
-from sweep.kernels.methods import automatic_step
+from sweep.kernels.methods import automatic_step, make_kernel
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
-from sweep.models import MODELS, slip, slip_split
+from sweep.models import MODELS, find, slip, slip_split
 from sweep.models.model import take
 from sweep.models.rocking import frequencies
 
@@ -209,10 +211,13 @@ def test_energy_balance() -> None:
 
 
 @pytest.mark.campaign
-def test_the_loop_over_lanes_is_vector_instructions() -> None:
+@pytest.mark.parametrize("model", ["slip", "slip+viscous+sigma"])
+def test_the_loop_over_lanes_is_vector_instructions(model: str) -> None:
     """The step of start-up, made of the same lines, is looked at in `test_start_up`."""
-    block = ADAMS._make_run_block()
-    block(np.zeros(len(ADAMS.layout.names) * LANES))
+    adams = make_kernel("adams", find(model), measures.default(find(model)))
+    assert isinstance(adams, AdamsKernel)
+    block = adams._make_run_block()
+    block(np.zeros(len(adams.layout.names) * LANES))
     assembly = next(iter(block.inspect_asm().values()))
     # The scalar loop beside it is for a history that overlaps the group, which it never does.
     assert assembly.count("divpd") >= 3
