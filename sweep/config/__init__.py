@@ -289,9 +289,13 @@ def _misfits(
             yield source.fault(path, f"also a column of {checked.cases}; allowed: one of the two", at_key=True)
         elif columns is not None and given[name].is_axis:
             yield source.fault(path, "an axis with cases; allowed: a number, or a column of the table")
-    for name in columns or {}:
+        if name in model.positive and 0.0 in given[name].numbers:
+            yield source.fault(path, f"0; allowed with the {model.name} model: a number > 0")
+    for name, values in (columns or {}).items():
         if name not in model.parameters:
             yield source.fault(("cases",), f"column {name}: the {model.name} model has no {name}")
+        elif name in model.positive and 0.0 in values:
+            yield source.fault(("cases",), f"column {name}: 0; allowed with the {model.name} model: numbers > 0")
     if isinstance(model, Model) and checked.integrator.method not in (*methods.allowed(model), methods.AUTO):
         names = ", ".join((*methods.allowed(model), methods.AUTO))
         yield source.fault(("integrator", "method"), f"cannot run the {model.name} model; allowed: {names}")

@@ -74,6 +74,7 @@ MODEL = Model(
     states=("A", "B", "n"),
     spin_state=2,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
+    positive=frozenset({"mu"}),  # the slip is a term of order 1/μ
     offers=frozenset({COUNT, SPIN, ENERGY, FORMULAS, LINEAR}),
     constants=Constants,
     start=start,

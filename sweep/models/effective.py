@@ -120,6 +120,7 @@ MODEL = Model(
     states=("X", "Y", "dX", "dY", "n"),
     spin_state=4,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
+    positive=frozenset({"mu"}),  # the slip is a term of order 1/μ
     offers=frozenset({COUNT, SPIN, FORMULAS, LINEAR}),
     constants=Constants,
     start=start,

@@ -120,6 +120,8 @@ class Tier:
     """Names of the physical parameters that it depends on; `sweep.parameters` has their meanings."""
     offers: frozenset[str]
     """What can be asked of it, out of the names above, such as `COUNT`."""
+    positive: frozenset[str] = frozenset()
+    """Parameters that must not be zero, although `sweep.parameters` allows it."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -241,3 +241,15 @@ def test_a_finer_range_has_the_values_of_a_coarser_one(
     assert (coarse[0], coarse[-1]) == (start, stop)
     spaced = np.linspace if spacing == "linear" else np.geomspace
     np.testing.assert_allclose(coarse, spaced(start, stop, num), rtol=1e-11, atol=1e-9 if spacing == "linear" else 0)
+
+
+@pytest.mark.parametrize("model", ["effective", "averaged"])
+def test_models_of_strong_friction_need_some(model: str, write: Write) -> None:
+    """Their slip is a term of order 1/μ."""
+    text = f"model: {model}\nfriction: {{mu: [0, 60]}}\n"
+    with pytest.raises(ConfigError, match=rf"2:16: friction\.mu: 0; allowed with the {model} model: a number > 0"):
+        load_config(write(text))
+    (write(text).parent / "cells.csv").write_text("mu\n60\n0\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="column mu: 0; allowed"):
+        load_config(write(f"model: {model}\ncases: cells.csv\n"))
+    assert load_config(write(text.replace(model, "slip"))).axes["mu"] == (0.0, 60.0)
