@@ -28,20 +28,21 @@ Without slip.  v_g = v_0, and the contact force is g u + v_g' + ω × v_g whatev
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, partial
-from types import SimpleNamespace
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.models import bodies, noslip, slip, solid, starts, steady
+from sweep.models.bounds import couples_decay, faint_energy, hardest_turn, still_energy, strongest_grip
 from sweep.models.couples import COUPLES, Couple, nothing
 from sweep.models.laws import LAWS, Law
 from sweep.models.model import COUNT, ENERGY, LINEAR, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.origin import Origin
+from sweep.models.resisting import drag_of, isotropic_drag, resistance_of, resistances
 from sweep.models.solid import gyroscopic
 from sweep.models.surfaces import ELLIPSOID, SURFACES, Surface
 from sweep.parameters import Parameter
@@ -132,87 +133,17 @@ def _couple_constants(couples: Sequence[Couple], law: Law | None = None) -> tupl
     stopping = [law.stops_below] if law and law.stops_below else stopping
 
     def values(columns: Columns) -> tuple[Array, ...]:
-        still = (_still(stops_below(columns), columns) for stops_below in stopping)
+        still = (still_energy(stops_below(columns), columns) for stops_below in stopping)
         return (*(value for couple in couples for value in couple.of(columns)), *still)
 
     return (*names, *(_STILL for _ in stopping)), values
 
 
-def _still(speed: Array, columns: Columns) -> Array:
-    """Energy that allows no angular velocity above `speed`, per unit mass, shape (cells,)."""
-    return np.asarray(0.5 * np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0] * speed**2)
-
-
-def resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
-    """The resistance by itself and the one per unit of the normal force."""
-    found: list[Any] = [nothing, nothing]
-    for couple in couples:
-        if not couple.about_normal:
-            found[couple.needs_normal_force] = couple.resistance
-    return found[0], found[1]
-
-
-def _resistance(law: Law) -> Any:
-    """Inline, (v², ω, u, constants) -> the law's resistance k."""
-    alone, coupled = law.resistance, law.coupled
-    if coupled is None:
-
-        @inline
-        def isotropic(
-            square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any  # noqa: ARG001
-        ) -> Any:  # fmt: skip
-            return alone(square, p)
-
-        return isotropic
-
-    @inline
-    def resistance(square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
-        n = u1 * w1 + u2 * w2 + u3 * w3
-        k, _ = coupled(square, n * n, p)
-        return k
-
-    return resistance
-
-
-def _drag(couples: Sequence[Couple], law: Law | None = None) -> Any:
-    """Inline, (k, ω, u, v², constants) -> (k', d): the couple per unit of the normal force is -k' d.
-
-    It is -k ω, and where `couples` have one about the normal, or the law, also that one.
-    """
-    about_normal = [couple.resistance for couple in couples if couple.about_normal]
-    coupled = law.coupled if law else None
-    if not about_normal and coupled is None:
-        return _isotropic
-    spinning = about_normal[0] if about_normal else nothing
-    of_slip = coupled or _no_couple
-
-    @inline
-    def drag(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, square: Any, p: Any) -> Any:
-        n = u1 * w1 + u2 * w2 + u3 * w3
-        _, of_law = of_slip(square, n * n, p)
-        m = (spinning(n * n, p) + of_law) * n
-        return 1.0, k * w1 + m * u1, k * w2 + m * u2, k * w3 + m * u3
-
-    return drag
-
-
-@inline
-def _no_couple(square: Any, spin_square: Any, p: Any) -> Any:  # noqa: ARG001
-    return 0.0, 0.0
-
-
-@inline
-def _isotropic(
-    k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, square: Any, p: Any  # noqa: ARG001
-) -> Any:  # fmt: skip
-    return k, w1, w2, w3
-
-
 def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     contact, general_energy = surface.contact, solid.energy_on(surface)
-    resistance, (plain, loaded), drag = _resistance(law), resistances(couples), _drag(couples, law)
+    resistance, (plain, loaded), drag = resistance_of(law), resistances(couples), drag_of(couples, law)
     # A product with 0.0 would remain: the compiler has to allow for infinity.  A branch on these does not.
-    damps, drags = plain is not nothing, loaded is not nothing or drag is not _isotropic
+    damps, drags = plain is not nothing, loaded is not nothing or drag is not isotropic_drag
     names, values = _couple_constants(couples, law)
 
     @inline
@@ -273,11 +204,11 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
         grip = strongest_grip(columns, surface)
         decay = law.strongest(columns) * grip + couples_decay(couples, columns, surface)
         if law.strongest_couple:
-            decay = decay + law.strongest_couple(columns) * _hardest_turn(columns, surface)
+            decay = decay + law.strongest_couple(columns) * hardest_turn(columns, surface)
         return np.asarray(decay)
 
     def more(columns: Columns) -> tuple[Array, ...]:
-        faint = () if law.linear_to is None else (_faint(law.linear_to(columns), columns, surface),)
+        faint = () if law.linear_to is None else (faint_energy(law.linear_to(columns), columns, surface),)
         return (*(columns[each] for each in law.parameters), *values(columns), *faint)
 
     fields = (*law.parameters, *names, *(() if law.linear_to is None else ("faint",)))
@@ -308,8 +239,8 @@ def _slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, 
 
 def _rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     contact, general_energy = surface.contact, solid.energy_on(surface)
-    (plain, loaded), drag = resistances(couples), _drag(couples)
-    damps, drags = plain is not nothing, loaded is not nothing or drag is not _isotropic
+    (plain, loaded), drag = resistances(couples), drag_of(couples)
+    damps, drags = plain is not nothing, loaded is not nothing or drag is not isotropic_drag
     names, values = _couple_constants(couples)
 
     @inline
@@ -390,22 +321,6 @@ def _offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
     return frozenset({COUNT, SPIN, ENERGY} | theory)
 
 
-def _faint(speed: Array, columns: Columns, surface: Surface) -> Array:
-    """Energy of a rattle whose slip velocity is below `speed`, per unit mass, shape (cells,).
-
-    With ω = n u + o the slip v_p = v_g - x_p × o - n x_p × u is at most sqrt(2 E G) + |n| ρ.  G is the largest
-    eigenvalue of 1 - [x_p] J⁻¹ [x_p], and ρ <= s sqrt(2 E / (g k)) the distance of the contact point from the
-    vertical through G, with the larger radius of curvature s and the stiffness k.  Spins up to sqrt(g/c) are allowed
-    for.
-    """
-    c, g = columns["c"], solid.gravity(columns)
-    inverse = np.linalg.eigvalsh(solid.matrix(solid.inverse(solid.inertia(columns))))[:, -1]
-    grip, arm = 1 + solid.height(columns) ** 2 * inverse, np.maximum(*surface.radii(columns))
-    stiffness = np.minimum(*solid.stiffness(columns, surface))
-    per_root = np.sqrt(2 * grip) + np.sqrt(g / c) * arm * np.sqrt(2 / (g * stiffness))
-    return np.asarray((speed / per_root) ** 2)
-
-
 def _seen(contact: Any, rhs: Any, y: Array, p: Any) -> dict[str, Array]:
     """The contact point and the normal force."""
     _, point, _, _ = contact(*y[:5], p)
@@ -421,93 +336,3 @@ def _with_and_without(law: Law) -> Any:
         return columns, {**columns, **free}
 
     return extremes
-
-
-def couples_decay(couples: Sequence[Couple], columns: Columns, surface: Surface) -> Array:
-    """Bound on the rate at which couples damp the angular velocity, shape (cells,)."""
-    rate, about_normal = np.zeros_like(columns["a"]), np.zeros_like(columns["a"])
-    for couple in couples:
-        strength = couple.strongest(columns)
-        if couple.about_normal:
-            about_normal = about_normal + strength * _hardest_turn(columns, surface)
-        else:
-            rate = rate + (strength * _hardest_press(columns, surface) if couple.needs_normal_force else strength)
-    return np.asarray(rate / np.linalg.eigvalsh(solid.matrix(solid.inertia(columns)))[:, 0] + about_normal)
-
-
-def _energy_start(columns: Columns, surface: Surface) -> Array:
-    """Energy above rest at the start, per unit mass, shape (cells,)."""
-    J = solid.inertia(columns)
-    y = starts.slipping(columns, surface) if "slip1" in columns else (*starts.rolling(columns, surface), 0.0, 0.0)
-    names, values = (*solid.shape_names(surface), *solid.INERTIA), (*solid.shape(columns, surface), *J)
-    spin, rattle, inertia = solid.energy_on(surface)(*y, SimpleNamespace(**dict(zip(names, values, strict=True))))
-    return np.asarray(rattle + 0.5 * inertia * spin**2)
-
-
-_AZIMUTHS, _SHARES = 12, 9
-
-
-def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Array, Array]]:
-    """Attitudes that a body may reach: normals u, shape (cells, 3), with bounds on the normal force R, shape (cells,).
-
-    A body tilts at most until the height of G takes up the whole energy at the start, E0.  If it tilts towards the
-    azimuth ψ at the rate φ', then R - g <= r'' φ'², where r is the height of G at the tilt φ, and
-
-        φ'² <= 2 (E0 - g (r - r0)) / (J_t + r'²),
-
-    where J_t is the least moment of inertia about the axis of tilting, with free spin.
-    """
-    shape, g, J = surface.of(columns), solid.gravity(columns), solid.matrix(solid.inertia(columns))
-    E0, r0 = _energy_start(columns, surface), solid.height(columns)
-    for psi in np.linspace(0, np.pi, _AZIMUTHS, endpoint=False):
-        cos, sin = np.cos(psi), np.sin(psi)
-        height = partial(surface.height, shape, cos, sin)
-
-        # The largest tilt that the energy allows, by bisection; heights grow with the tilt, at least at first.
-        low, high = np.zeros_like(E0), np.full_like(E0, 1.5)
-        for _ in range(40):
-            middle = (low + high) / 2
-            within = g * (height(middle) - r0) < E0
-            low, high = np.where(within, middle, low), np.where(within, high, middle)
-        axis = np.array([-sin, cos, 0.0])
-        for share in np.linspace(0, 1, _SHARES):
-            phi, d = high * share, 1e-4
-            r, ahead, behind = height(phi), height(phi + d), height(phi - d)
-            slope, bend = (ahead - behind) / (2 * d), (ahead - 2 * r + behind) / d**2
-            u = np.stack([cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi)], axis=-1)
-            tt, tu, uu = (np.einsum("...i,...ij,...j->...", p, J, q) for p, q in ((axis, axis), (axis, u), (u, u)))
-            square = 2 * np.maximum(E0 - g * (r - r0), 0) / (tt - tu**2 / uu + slope**2)
-            yield u, g + np.maximum(bend, 0) * square
-
-
-def _hardest_press(columns: Columns, surface: Surface) -> Array:
-    """Bound on the normal force over the trajectory, per unit mass, shape (cells,)."""
-    return np.asarray(np.max([R for _, R in _attitudes(columns, surface)], axis=0))
-
-
-def _hardest_turn(columns: Columns, surface: Surface) -> Array:
-    """Bound on R uᵀ J⁻¹ u over the trajectory, shape (cells,): the decay of the spin per unit of its resistance."""
-    inverse = solid.matrix(solid.inverse(solid.inertia(columns)))
-    return np.asarray(
-        np.max([R * np.einsum("...i,...ij,...j->...", u, inverse, u) for u, R in _attitudes(columns, surface)], axis=0)
-    )
-
-
-def strongest_grip(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
-    """Bound on the decay rate of the slip per unit of friction's resistance, shape (cells,).
-
-    Friction on a slip v changes it by -R k (1 - [x_p] J⁻¹ [x_p]) v, where [x] is the matrix of x ×.
-    """
-    shape = SimpleNamespace(**dict(zip(surface.constants, surface.of(columns), strict=True)))
-    inverse = solid.matrix(solid.inverse(solid.inertia(columns)))
-    worst = np.zeros_like(columns["a"])
-    for u, R in _attitudes(columns, surface):
-        _, *point = surface.elevation(*u.T, shape)
-        x_p = np.stack(point, axis=-1)
-        X = np.cross(np.eye(3), x_p[:, None, :])
-        G = X @ inverse @ np.swapaxes(X, 1, 2)
-        # One eigenvalue is zero, along x_p; the larger of the others follows from the traces of G and G².
-        trace, squares = np.trace(G, axis1=1, axis2=2), (G * G).sum(axis=(1, 2))
-        largest = 0.5 * (trace + np.sqrt(np.maximum(2 * squares - trace**2, 0)))
-        worst = np.maximum(worst, R * (1 + largest))
-    return worst

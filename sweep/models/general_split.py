@@ -21,9 +21,11 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models import general, solid, steady
+from sweep.models.bounds import couples_decay, strongest_grip
 from sweep.models.couples import Couple, nothing
 from sweep.models.laws import LAWS, Law
 from sweep.models.model import Array, Columns, Model, Ripple, named
+from sweep.models.resisting import resistances
 from sweep.models.slip_split import Geometry
 from sweep.models.solid import gyroscopic
 from sweep.models.split import Split
@@ -51,7 +53,7 @@ def split(model: Model) -> Split | None:
 @cache
 def _split(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface) -> Split:
     resistance, contact, general_energy = law.resistance, surface.contact, solid.energy_on(surface)
-    couple, _ = general.resistances(couples)
+    couple, _ = resistances(couples)
     damps = couple is not nothing
     fields = (*full.constants._fields, *ROCKING)
 
@@ -178,7 +180,7 @@ def _split(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface)
         slip_decay=lambda columns: full.fastest_decay(columns) + 2.2 * solid.spin_unit(columns),
         rise=lambda columns: _rise(columns, surface),
         resistance=lambda columns: law.strongest(columns) * np.sqrt(solid.gravity(columns) * columns["c"]),
-        damping=lambda columns: general.couples_decay(couples, columns, surface),
+        damping=lambda columns: couples_decay(couples, columns, surface),
         resolves_modes=False,
     )
 
@@ -243,7 +245,7 @@ def _rise(columns: Columns, surface: Surface) -> Array:
     h2 = solid.height(columns) ** 2
     i11, i22, _, i12, _, _ = solid.inverse(solid.inertia(columns))
     largest = 0.5 * (i11 + i22) + np.sqrt(0.25 * (i11 - i22) ** 2 + i12**2)
-    return np.asarray(general.strongest_grip(columns, surface) / (solid.gravity(columns) * (1 + h2 * largest)) - 1)
+    return np.asarray(strongest_grip(columns, surface) / (solid.gravity(columns) * (1 + h2 * largest)) - 1)
 
 
 @inline

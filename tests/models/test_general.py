@@ -11,8 +11,9 @@ from scipy.integrate import solve_ivp
 from support import STANDARD, columns, newton
 
 from sweep.models import find, linear, noslip, rocking, slip, solid, stability, steady
+from sweep.models.bounds import strongest_grip
 from sweep.models.couples import COUPLES as KINDS
-from sweep.models.general import strongest_grip, variant
+from sweep.models.general import variant
 from sweep.models.laws import LAWS, tanh_ratio
 from sweep.models.model import LINEAR, take
 from sweep.models.surfaces import ELLIPSOID, PARABOLOID, Surface
