@@ -133,9 +133,9 @@ def test_a_killed_worker_costs_only_its_tile(
     assert contents(tmp_path) == by_threads
     assert reporter.killed
     moves = [(start, end) for key, start, end, *_ in local.scheduler.transition_log if str(key).startswith("_work")]
-    # With the worker go results that had not been fetched yet: on a busy machine up to all that it was sent ahead.
+    # With the worker go results that had not been fetched yet: on a busy machine up to all that it was sent ahead, and
+    # none if it was idle just then.
     assert TILES <= moves.count(("processing", "memory")) <= TILES + AHEAD
-    assert moves.count(("processing", "released")) >= 1
 
 
 @pytest.mark.campaign
