@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 
@@ -44,7 +43,10 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     if announce is None:
         words = "code of a user, which is not run for a configuration that comes from a dataset"
         raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; allowed: {', '.join(TIERS)}")])
-    source.model = origin = origin or _read(source, name)
+    if origin is None:
+        path, text = source.read_beside("model", name, LIMIT)
+        origin = Origin.of_file(name, str(path), text)
+    source.model = origin
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
         words = f"{pinned!r}, but {brief(name)} has {origin.digest}; allowed: that, or no model_sha256"
@@ -53,19 +55,6 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     with explained(origin):
         outside.load(origin)
     return origin
-
-
-def _read(source: Document, name: str) -> Origin:
-    path = Path(source.file).parent / name
-    try:
-        return Origin.of_file(name, str(path), files.read(path, LIMIT))
-    except FileNotFoundError:
-        reason = f"no such file in {path.parent}"
-    except OSError as error:
-        reason = f"cannot be read: {error.strerror}"
-    except UnicodeDecodeError as error:
-        reason = f"not UTF-8 text: byte {error.start}"
-    raise ConfigError([source.fault(("model",), f"{brief(name)}: {reason}")])
 
 
 @contextmanager

@@ -11,7 +11,6 @@ import io
 from collections.abc import Iterator, Mapping
 from itertools import islice
 from math import isfinite, nan
-from pathlib import Path
 
 from sweep.config import files
 from sweep.config.document import Document, number
@@ -33,15 +32,9 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> dict[st
     ConfigError
         if the file cannot be read, or with a `Fault` for each cell that is wrong, up to some twenty.
     """
-    path = Path(source.file).parent / name
+    path, text = source.read_beside("cases", name, LIMIT)
     try:
-        return _columns(str(path), files.read(path, LIMIT), known)
-    except FileNotFoundError:
-        reason = f"no such file in {path.parent}"
-    except OSError as error:
-        reason = f"cannot be read: {error.strerror}"
-    except UnicodeDecodeError as error:
-        reason = f"not UTF-8 text: byte {error.start}"
+        return _columns(str(path), text, known)
     except csv.Error as error:
         reason = f"not a readable CSV file: {error}"
     raise ConfigError([source.fault(("cases",), f"{brief(name)}: {reason}")])

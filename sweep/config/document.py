@@ -17,7 +17,7 @@ from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from sweep.config import files
-from sweep.config.faults import ConfigError, Fault, Path
+from sweep.config.faults import ConfigError, Fault, Path, brief
 from sweep.models.origin import Origin
 
 LIMIT = 1 * files.MIB
@@ -49,6 +49,25 @@ class Document:
     """Name and columns of the table of cases, once it is read."""
     model: Origin | None = None
     """Where the model comes from that a user brings, once it is read."""
+
+    def read_beside(self, key: str, name: str, limit: int) -> tuple[FilePath, str]:
+        """Path and text of the file `name`, relative to this document's folder, that it names by `key`.
+
+        Raises
+        ------
+        ConfigError
+            if the file cannot be read, or is larger than `limit` bytes.
+        """
+        path = FilePath(self.file).parent / name
+        try:
+            return path, files.read(path, limit)
+        except FileNotFoundError:
+            reason = f"no such file in {path.parent}"
+        except OSError as error:
+            reason = f"cannot be read: {error.strerror}"
+        except UnicodeDecodeError as error:
+            reason = f"not UTF-8 text: byte {error.start}"
+        raise ConfigError([self.fault((key,), f"{brief(name)}: {reason}")])
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
         """A fault at `path`; it is placed at the nearest section above if the document lacks that path."""
