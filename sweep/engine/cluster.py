@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import signal
 import threading
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -21,6 +22,7 @@ from sweep.config import Config
 from sweep.engine.local import Done, run_group
 from sweep.engine.plan import kernels
 from sweep.grid import Tile
+from sweep.interrupt import point
 from sweep.kernels.build import build
 from sweep.results.identity import Identity
 from sweep.results.provenance import identify, sources
@@ -31,6 +33,9 @@ AHEAD = 3
 
 PATIENCE = "10s"
 """How long to wait for a scheduler to answer."""
+
+_POLL = 0.01
+"""Time in seconds between two looks at whether a tile has come back."""
 
 _LOST = "the dask scheduler is gone; finished tiles are kept, and the same command resumes the run"
 
@@ -75,7 +80,7 @@ class Cluster:
                 running.add(future)
 
         send_ahead()
-        for future in running:
+        for future in _arriving(running):
             try:
                 done: Done = future.result()
             except KilledWorker as error:
@@ -92,6 +97,15 @@ class Cluster:
             except CommClosedError:
                 raise StoreError(_LOST) from None
             yield done
+
+
+def _arriving(running: Any) -> Iterator[Any]:
+    """Futures in the order in which they are done."""
+    while not running.is_empty():
+        while not running.has_ready():
+            time.sleep(_POLL)
+            point()
+        yield next(running)
 
 
 Shared = tuple[Config, list[Tile], Identity]

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sweep.grid import Array
+from sweep.interrupt import point
 from sweep.jit import threads
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
@@ -61,6 +62,7 @@ def execute(
             blocks = _rescale(blocks, time.perf_counter() - chunk_began, chunk_seconds or CHUNK_SECONDS)
         if after_chunk:
             after_chunk()
+        point()
 
 
 def _rescale(blocks: int, seconds: float, wanted: float) -> int:

@@ -14,6 +14,7 @@ from sweep.engine.plan import plan, pool
 from sweep.engine.repeats import repeat_all
 from sweep.engine.sensitivity import runs_asked_for, sensitivity
 from sweep.grid import Array, Grid, Tile
+from sweep.interrupt import point
 from sweep.kernels.status import FAILURES, RUNNING, SETTLED
 from sweep.prediction import predict
 from sweep.results import dataset
@@ -75,6 +76,7 @@ def run_group(
     grid, cpu = Grid.of(config), this_cpu()
     if not config.simulated:
         for i in group:
+            point()
             yield Done(i, _evaluate(config, grid.part(tiles[i])), 0.0, cpu)
         return
     plans, tables = pool(plan(config, grid.part(tiles[i])) for i in group)

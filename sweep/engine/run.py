@@ -26,6 +26,7 @@ from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
+from sweep.interrupt import deferred
 from sweep.results import dataset
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
@@ -44,6 +45,7 @@ def tile_size(cells: int) -> int:
     return int(np.clip(cells // 32, 1024, 8192))
 
 
+@deferred()
 def run(
     config: ConfigLike,
     output: str | Path | None = None,

@@ -26,6 +26,7 @@ from contextlib import ExitStack, suppress
 
 import numpy as np
 
+from sweep.interrupt import point
 from sweep.jit import compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compile_approach, compiled_approach
 from sweep.kernels.kernel import Kernel
@@ -103,6 +104,7 @@ def _compile(jobs: list[Job]) -> None:
                 stack.callback(process.kill)  # if this is interrupted, and before it is waited for
                 running.append(process)
             time.sleep(_POLL)
+            point()
             running = [process for process in running if process.poll() is None]
 
 

@@ -14,7 +14,7 @@ from sweep.config import files
 from sweep.grid import Array
 from sweep.results.identity import Identity, require_same
 from sweep.results.store import Running, StoreError
-from sweep.results.writing import replacing, uninterrupted
+from sweep.results.writing import replacing
 
 
 class Checkpoint:
@@ -86,9 +86,8 @@ class Checkpoint:
 
     def _write(self, path: Path, arrays: Mapping[str, Array]) -> None:
         named: dict[str, Any] = {**arrays, "stamp": np.array(self._stamp(path, arrays))}
-        # An archive that Ctrl-C leaves half written complains when it is collected.
         with replacing(path) as temporary, temporary.open("wb") as stream:
-            uninterrupted(np.savez, stream, **named)
+            np.savez(stream, **named)
 
     def _read(self, path: Path) -> dict[str, Array] | None:
         """The arrays of a file, its checksums verified; None if it is missing or cannot be used."""

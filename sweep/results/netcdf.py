@@ -17,8 +17,9 @@ import numpy as np
 import xarray as xr
 
 from sweep.grid import Array
+from sweep.interrupt import deferred
 from sweep.results.store import StoreError
-from sweep.results.writing import probe, replacing, uninterrupted
+from sweep.results.writing import probe, replacing
 
 Chunked = tuple[xr.Variable, tuple[int, ...]]
 """An empty variable with its attributes, and the shape of the chunks in which it is stored."""
@@ -64,7 +65,8 @@ def _write_frame(frame: xr.Dataset, path: Path) -> None:
     encoding = {name: {"_FillValue": None} for name in set(frame.variables) - filled}
     # A Ctrl-C that came while xarray took its lock of HDF5 left that locked, and closing the file waited for it for
     # ever (1 in 60 runs interrupted while they wrote their dataset).
-    uninterrupted(frame.to_netcdf, path, format="NETCDF4", engine="netcdf4", encoding=encoding)
+    with deferred():
+        frame.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
 
 
 def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:

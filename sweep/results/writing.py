@@ -7,11 +7,9 @@ renamed over the old one.  A file that has its final name is complete.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from sweep.results.store import StoreError
 
@@ -40,12 +38,6 @@ def replacing(path: Path) -> Iterator[Path]:
         raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def uninterrupted(function: Callable[..., Any], *arguments: Any, **options: Any) -> None:
-    """Call a function in a thread of its own, where Ctrl-C is not raised; here it is, once the call has ended."""
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(function, *arguments, **options).result()
 
 
 def remove_unfinished(path: Path) -> None:

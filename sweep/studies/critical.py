@@ -14,6 +14,7 @@ from sweep.config.brought import explained
 from sweep.config.scenes import described_impossible
 from sweep.engine.reporter import Reporter
 from sweep.grid import Array, Grid
+from sweep.interrupt import deferred
 from sweep.jit import fingerprint
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
@@ -66,6 +67,7 @@ _REASON_OF = {
 }
 
 
+@deferred()
 def critical(
     config: Config,
     width: float = WIDTH,

@@ -23,6 +23,7 @@ from sweep.engine.plan import plan
 from sweep.engine.repeats import cells_of, repeat_all
 from sweep.engine.reporter import Progress, Reporter
 from sweep.grid import Array, Grid
+from sweep.interrupt import deferred
 from sweep.jit import threads
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
@@ -78,6 +79,7 @@ SERIES: dict[str, tuple[str, str]] = {
 }
 
 
+@deferred()
 def trajectory(
     config: ConfigLike,
     *,
