@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from support.runs import same_numbers
 
 import sweep
-from sweep.config import ConfigError, load_config, schema
+from sweep.config import ConfigError, load_config, schema, values
 from sweep.config.plain import plain
 from sweep.parameters import PARAMETERS, SECTIONS
 
@@ -265,7 +265,7 @@ def test_variables_of_the_same_cells_are_merged_without_loss() -> None:
 NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([10**400, 1, 2.0, 1e3, 60, -1, 1e13, 1e-15]))
 WORDS = st.one_of(st.text(max_size=5), st.sampled_from(["auto", "slip", "adams", "reversals", "a/b", "\ud800"]))
 LEAF = st.one_of(NUMBERS, WORDS, st.none(), st.booleans(), st.binary(max_size=2))
-FIELDS = {model: tuple(model.model_fields) for model in (schema.Schema, schema.Integrator, schema.Range)}
+FIELDS = {model: tuple(model.model_fields) for model in (schema.Schema, schema.Integrator, values.Range)}
 KEY = st.sampled_from((*PARAMETERS, "nu", *(key for keys in FIELDS.values() for key in keys)))
 VALUE = st.recursive(
     LEAF,

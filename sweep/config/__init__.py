@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import ValidationError
 
-from sweep.config import brought, cases, document, scenes, schema
+from sweep.config import brought, cases, document, fitting, scenes, schema
+from sweep.config.checked import FIRST_AXES, Config, tier_of
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.messages import describe
 from sweep.config.plain import plain
-from sweep.config.schema import Config, Integrator, Values
-from sweep.grid import BODY, Grid, distinct
-from sweep.kernels import measures, methods
-from sweep.kernels.differentiate import undifferentiable
+from sweep.config.schema import Integrator
+from sweep.config.values import Values
+from sweep.grid import Grid
+from sweep.kernels import methods
 from sweep.kernels.measures import MEASURES
 from sweep.models import outside
 from sweep.models.model import Model, Tier
@@ -134,8 +133,8 @@ def _resolve(checked: Any, source: document.Document, origin: Origin | None) -> 
     surface = ELLIPSOID.name if origin else checked.body.surface
     needed = scenes.without_default(units, surface)
     checked = _with_method(checked, model)
-    faults = list(_misfits(checked, model, given, columns, source, known))
-    order = sorted(model.parameters, key=lambda n: (_rank(n, schema.FIRST_AXES), _rank(n, tuple(given))))
+    faults = list(fitting.misfits(checked, model, given, columns, source, known))
+    order = sorted(model.parameters, key=lambda n: (_rank(n, FIRST_AXES), _rank(n, tuple(given))))
     parameters = {}
     for name in order:
         default = None if known[name] in needed else known[name].default
@@ -154,7 +153,7 @@ def _resolve(checked: Any, source: document.Document, origin: Origin | None) -> 
         model=checked.model,
         parameters=parameters,
         integrator=checked.integrator,
-        measure=_measures(checked.measure, model),
+        measure=fitting.measured(checked.measure, model),
         max_failed_fraction=checked.max_failed_fraction,
         verify=checked.verify or 0.0,
         refine=checked.refine,
@@ -168,7 +167,7 @@ def _resolve(checked: Any, source: document.Document, origin: Origin | None) -> 
     brought.try_out(config)
     if units == SI and config.of_rattlebacks and "t_end" not in checked.integrator.model_fields_set:
         config = config.with_time()
-    for path, check in _CHECKS:
+    for path, check in fitting.CHECKS:
         if reason := check(config):
             raise ConfigError([source.fault(path, reason)])
     if checked.verify is None and config.integrator.method == methods.AUTO and not config.refine:
@@ -186,7 +185,7 @@ def _model(
         raise ConfigError(faults)
     if not origin:
         law_name, surface = checked.friction.name, checked.body.surface
-        return schema.tier_of(checked.model, law_name, units, names, surface), law_name, units
+        return tier_of(checked.model, law_name, units, names, surface), law_name, units
     model = outside.find(origin, units, names)
     return (model, law.name, units) if law else (model, PAPERS_LAW, model.units)
 
@@ -209,51 +208,10 @@ def _table(name: str, source: document.Document, known: Mapping[str, Parameter])
     return source.table[1]
 
 
-def _too_large(config: Config) -> str:
-    cells = math.prod(map(len, config.axes.values()))
-    return f"{cells} cells; allowed: at most {schema.MAX_CELLS}" if cells > schema.MAX_CELLS else ""
-
-
-def _too_large_to_refine(config: Config) -> str:
-    cells = math.prod(map(len, config.axes.values()))
-    if not config.refine or cells <= schema.MAX_REFINED_CELLS:
-        return ""
-    return f"{cells} cells, all held in memory; allowed: at most {schema.MAX_REFINED_CELLS}, or refine: 0"
-
-
-def _unusable_step(config: Config) -> str:
-    """What is wrong with a step that the configuration fixes; "" if nothing is."""
-    step, model = config.integrator.step, config.tier
-    if step == "auto" or not isinstance(model, Model):
-        return ""
-    if config.integrator.t_end / step > schema.MAX_STEPS:
-        return f"{config.integrator.t_end / step:.2g} steps to t_end; allowed: at most {schema.MAX_STEPS:.0e}"
-    with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
-        names = BODY if config.of_rattlebacks else model.parameters
-        longest = min(
-            float(methods.longest_step(model, columns)[~model.impossible(columns)].min(initial=np.inf))
-            for columns in distinct(Grid.of(config), names)
-        )
-    if step <= longest:
-        return ""
-    return f"{step:g}; allowed: auto, or at most {longest:.3g}, a quarter of the rattle's period"
-
-
-# What is asked of a whole configuration, each only after the checks before it: the path at fault, and what is
-# wrong ("" if nothing is).
-_CHECKS: tuple[tuple[tuple[str, ...], Callable[[Config], str]], ...] = (
-    ((), _too_large),
-    (("refine",), _too_large_to_refine),
-    (("body",), scenes.impossible),
-    (("start", "x0"), scenes.misplaced),
-    (("integrator", "step"), _unusable_step),
-)
-
-
 def _with_method(checked: Any, model: Tier) -> Any:
     """The default method, filled in: `auto` where there is a choice and the step is not given."""
     integrator = checked.integrator
-    alone = any(MEASURES[name].follows_tangent for name in _names(checked.measure or ()))
+    alone = any(MEASURES[name].follows_tangent for name in fitting.names_of(checked.measure or ()))
     if "method" in integrator.model_fields_set and not (alone and integrator.method == methods.AUTO):
         return checked
     choice = not alone and isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
@@ -261,84 +219,5 @@ def _with_method(checked: Any, model: Tier) -> Any:
     return checked.model_copy(update={"integrator": integrator.model_copy(update={"method": method})})
 
 
-def _measures(asked: list[str] | None, model: Tier) -> tuple[str, ...]:
-    return measures.default(model) if asked is None else tuple(asked)
-
-
 def _rank(name: str, names: tuple[str, ...]) -> int:
     return names.index(name) if name in names else len(names)
-
-
-def _misfits(
-    checked: Any,
-    model: Tier,
-    given: dict[str, Any],
-    columns: dict[str, tuple[float, ...]] | None,
-    source: document.Document,
-    known: Mapping[str, Parameter],
-) -> Iterator[Fault]:
-    """Faults of values that are valid by themselves but do not fit together."""
-    for name in given:
-        path = known[name].place
-        # A number that the model does not use may stay, so that one file serves every model.
-        if name not in model.parameters and given[name].is_axis:
-            yield source.fault(
-                path, f"the {model.name} model has no {name}; allowed: {', '.join(model.parameters)}", at_key=True
-            )
-        elif columns is not None and name in columns:
-            yield source.fault(path, f"also a column of {checked.cases}; allowed: one of the two", at_key=True)
-        elif columns is not None and given[name].is_axis:
-            yield source.fault(path, "an axis with cases; allowed: a number, or a column of the table")
-        if name in model.positive and 0.0 in given[name].numbers:
-            yield source.fault(path, f"0; allowed with the {model.name} model: a number > 0")
-    for name, values in (columns or {}).items():
-        if name not in model.parameters:
-            yield source.fault(("cases",), f"column {name}: the {model.name} model has no {name}")
-        elif name in model.positive and 0.0 in values:
-            yield source.fault(("cases",), f"column {name}: 0; allowed with the {model.name} model: numbers > 0")
-    if isinstance(model, Model) and checked.integrator.method not in (*methods.allowed(model), methods.AUTO):
-        names = ", ".join((*methods.allowed(model), methods.AUTO))
-        yield source.fault(("integrator", "method"), f"cannot run the {model.name} model; allowed: {names}")
-    if checked.integrator.method == methods.AUTO and checked.integrator.step != "auto":
-        yield source.fault(("integrator", "step"), "a number with method: auto; allowed: auto")
-    if checked.verify and not isinstance(model, Model):
-        yield source.fault(("verify",), f"the {model.name} model takes no steps; allowed: 0")
-    if checked.refine:
-        yield from _unrefinable(checked, model, source)
-    yield from _unmeasurable(checked.measure or (), model, source)
-    for i, name in enumerate(_names(checked.measure or ())):
-        method = checked.integrator.method
-        if MEASURES[name].follows_tangent and not methods.METHODS[method].follows_tangents:
-            able = ", ".join(each for each, found in methods.METHODS.items() if found.follows_tangents)
-            yield source.fault(("measure", i), f"not measured with method: {method}; allowed: {able}")
-        elif MEASURES[name].follows_tangent and isinstance(model, Model) and (reason := undifferentiable(model)):
-            yield source.fault(("measure", i), f"not measured on the {model.name} model: {reason}; allowed: others")
-
-
-def _unmeasurable(specs: Sequence[str], model: Tier, source: document.Document) -> Iterator[Fault]:
-    """Faults of the measurements asked for."""
-    names, possible = _names(specs), measures.possible(model)
-    for i, name in enumerate(names):
-        if name not in possible:
-            yield source.fault(
-                ("measure", i), f"not measured on the {model.name} model; allowed: {', '.join(possible)}"
-            )
-        for needed in set(MEASURES[name].needs) - set(names):
-            yield source.fault(("measure", i), f"measured with the {needed}; allowed: {needed} beside it")
-
-
-def _names(specs: Iterable[str]) -> list[str]:
-    """The names of measurements given by their specs."""
-    return [spec.partition("=")[0] for spec in specs]
-
-
-def _unrefinable(checked: Any, model: Tier, source: document.Document) -> Iterator[Fault]:
-    """Faults of a refined run."""
-    if not isinstance(model, Model):
-        yield source.fault(("refine",), f"the {model.name} model is not simulated; allowed: 0")
-    if checked.cases is not None:
-        yield source.fault(("refine",), "with cases, which have no neighbours; allowed: 0, or axes")
-    if checked.verify:
-        yield source.fault(("verify",), "with refine; allowed: 0")
-    if "reversals" not in _measures(checked.measure, model):
-        yield source.fault(("measure",), "no reversals, on which refine depends; allowed: reversals among them")

@@ -11,9 +11,9 @@ from contextlib import contextmanager
 import numpy as np
 
 from sweep.config import files
+from sweep.config.checked import Config
 from sweep.config.document import Document
 from sweep.config.faults import ConfigError, Fault, brief
-from sweep.config.schema import Config
 from sweep.models import TIERS, inspection, outside
 from sweep.models.origin import ModelError, Origin
 

@@ -15,7 +15,7 @@ from math import isfinite, nan
 from sweep.config import files
 from sweep.config.document import Document, number
 from sweep.config.faults import ConfigError, Fault, brief, quote
-from sweep.config.schema import MAX_AXIS
+from sweep.config.values import MAX_AXIS
 from sweep.parameters import Parameter
 
 LIMIT = 32 * files.MIB

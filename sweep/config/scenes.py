@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from sweep.config.checked import Config
 from sweep.config.document import Document
 from sweep.config.faults import Fault
-from sweep.config.schema import Config
 from sweep.grid import BODY, Grid, distinct, off_the_body
 from sweep.models import bodies
 from sweep.models.general import BASES

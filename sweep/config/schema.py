@@ -2,161 +2,26 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-import re
 import sys
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from collections.abc import Mapping
+from functools import cache
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import BeforeValidator, Field, create_model
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError
-from ruamel.yaml import YAML
-from ruamel.yaml.compat import StringIO
 
-from sweep.config.document import Document, number
-from sweep.config.faults import ConfigError, Fault, Path, quote, suggestion
-from sweep.config.messages import Allowed, describe, refusal, wrong
-from sweep.config.plain import plain
-from sweep.kernels.kernel import STRETCH
+from sweep.config.faults import quote, suggestion
+from sweep.config.messages import Allowed, refusal, wrong
+from sweep.config.values import Strict, Whole, parse_values, whole
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
-from sweep.models import TIERS, laws, outside
-from sweep.models.general import BASES
-from sweep.models.model import Model, Tier
+from sweep.models import TIERS, outside
 from sweep.models.origin import Origin
-from sweep.models.scene import PAPER, PAPERS_LAW, SI, is_papers, variant
-from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES
-from sweep.parameters import ON_PARABOLOID, PARAMETERS, Parameter, sections
-from sweep.variables import in_si
-
-# Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
-FIRST_AXES = ("mu", "b", "n0")
-
-MAX_CELLS = 1_000_000_000
-MAX_REFINED_CELLS = 2**24
-"""Most cells of a refined run, which holds all its arrays in memory."""
-MAX_AXIS = 1_000_000
-"""Most values of one axis and most rows of a table of cases: they are held in memory as Python numbers."""
-MAX_STEPS = 1e15
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-def _whole(raw: Any) -> Any:
-    """1e3 as 1000."""
-    return int(raw) if isinstance(raw, float) and raw.is_integer() else raw
-
-
-Whole = Annotated[int, BeforeValidator(_whole)]
-"""A whole number, however it is written."""
-
-
-class Range(_Strict):
-    start: float
-    stop: float
-    num: Whole = Field(ge=1, le=MAX_AXIS)
-    spacing: Literal["linear", "log"] = "linear"
-
-    def values(self) -> list[float]:
-        if self.spacing == "linear":
-            return _divided(self.start, self.stop, self.num)
-        if np.sign(self.start) * np.sign(self.stop) <= 0:
-            raise wrong("a log range needs start and stop of one sign, both not zero", "spacing")
-        logs = _divided(math.log10(abs(self.start)), math.log10(abs(self.stop)), self.num)
-        inside = [math.copysign(10.0**log, self.start) for log in logs[1:-1]]
-        return [self.start, *inside, self.stop][: self.num]
-
-
-def _divided(start: float, stop: float, num: int) -> list[float]:
-    """Equally spaced numbers, each rounded once, so that a finer division has all numbers of a coarser one."""
-    if num == 1:
-        return [start]
-    (p, q), (r, s) = start.as_integer_ratio(), stop.as_integer_ratio()
-    whole, from_start, each = q * s * (num - 1), p * s * (num - 1), r * q - p * s
-    return [(from_start + i * each) / whole for i in range(num)]
-
-
-@dataclass(frozen=True)
-class Values:
-    """A parameter's checked value: one number, or an axis of distinct numbers."""
-
-    numbers: tuple[float, ...]
-    is_axis: bool
-    spec: float | list[float] | dict[str, Any]
-    """The value as it stands in the configuration."""
-
-
-_DEGREES = re.compile(r"\s*(\S+)\s+deg\s*")
-
-
-def _in_radians(raw: Any) -> Any:
-    """`raw` with "0.5 deg" as a number of radians, also in a list or a range."""
-    if isinstance(raw, list):
-        return [_in_radians(item) for item in raw]
-    if isinstance(raw, dict):
-        return {key: _in_radians(item) for key, item in raw.items()}
-    spelled = _DEGREES.fullmatch(raw) if isinstance(raw, str) else None
-    degrees = number(spelled[1]) if spelled else None
-    return raw if degrees is None else math.radians(degrees)
-
-
-def _parse_values(parameter: Parameter, raw: Any) -> Values:
-    if parameter.units == "radian":
-        raw = _in_radians(raw)
-    spec: Any = raw
-    if isinstance(raw, dict):
-        try:
-            span = Range.model_validate(raw)
-        except ValidationError as error:
-            # An unknown key first: it tells why another is missing.
-            path, message, _ = max(describe(error.errors(), Range), key=lambda found: found[2])
-            raise wrong(message, *path) from None
-        numbers, spec = span.values(), span.model_dump()
-    elif isinstance(raw, list):
-        if not raw:
-            raise wrong("an empty axis; allowed: one number or more")
-        for i, item in enumerate(raw):
-            _check_number(item, parameter, i)
-        numbers = spec = [float(item) for item in raw]
-    else:
-        _check_number(raw, parameter)
-        return Values((float(raw),), False, float(raw))
-    for value in numbers:
-        if not parameter.allows(value):
-            raise wrong(f"{value:g} is out of bounds; allowed: {parameter.allowed}")
-    if len(set(numbers)) < len(numbers):
-        raise wrong("an axis with equal values; allowed: distinct numbers")
-    return Values(tuple(numbers), True, spec)
-
-
-def numbers_of(parameter: Parameter, raw: Any) -> tuple[float, ...]:
-    """The numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter."""
-    try:
-        return _parse_values(parameter, plain(raw)).numbers
-    except PydanticCustomError as error:
-        context = error.context or {}
-        raise ConfigError([Fault("", None, None, (parameter.name, *context["at"]), context["reason"])]) from None
-
-
-def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
-    if isinstance(raw, bool) or not isinstance(raw, int | float):
-        raise wrong(
-            f"{quote(raw)} is not a number; allowed: {parameter.allowed}"
-            + ("" if at else ", a list of such, or {start, stop, num, spacing: linear|log}"),
-            *at,
-        )
-    if not (abs(raw) <= sys.float_info.max and parameter.allows(raw)):
-        raise wrong(f"{quote(raw)} is out of bounds; allowed: {parameter.allowed}", *at)
-
+from sweep.models.scene import PAPER, SI
+from sweep.models.surfaces import ELLIPSOID, SURFACES
+from sweep.parameters import PARAMETERS, Parameter, sections
 
 _STEP = Allowed("auto, or a finite number > 0 in sqrt(c/g)")
 _MEASURE = Allowed(f"a list of {', '.join(MEASURES)}")
@@ -191,7 +56,7 @@ def _measure(raw: Any, i: int) -> str:
     if kind.bounds is None:
         raise wrong(f"{name} has no setting; allowed: {name}", i)
     low, high = kind.bounds
-    setting = _whole(setting)
+    setting = whole(setting)
     if isinstance(setting, bool) or not isinstance(setting, int) or not low <= setting <= high:
         raise wrong(f"{quote(setting)}; allowed: a whole number from {low} to {high}", i, name)
     return kind(setting).spec  # type: ignore[call-arg]
@@ -210,8 +75,11 @@ T_END = 30_000.0
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
 
+MAX_REFINED_CELLS = 2**24
+"""Most cells of a refined run, which holds all its arrays in memory."""
 
-class Integrator(_Strict):
+
+class Integrator(Strict):
     method: Literal[(*METHODS, AUTO)] = Field(  # type: ignore[valid-type]
         default=AUTO, description="integration method; `auto` chooses the faster one for each cell"
     )
@@ -243,7 +111,7 @@ def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:
     """The fields of the physical parameters in a section, made from a table of parameters."""
     return {
         p.name: (
-            Annotated[Any, BeforeValidator(lambda raw, p=p: _parse_values(p, raw)), Field(description=p.long_name)],
+            Annotated[Any, BeforeValidator(lambda raw, p=p: parse_values(p, raw)), Field(description=p.long_name)],
             None,
         )
         for p in table.values()
@@ -251,7 +119,7 @@ def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:
     }
 
 
-class _Words(_Strict):
+class _Words(Strict):
     """What a section has beside physical parameters: of most, nothing."""
 
 
@@ -278,7 +146,7 @@ class Shape(_Words):
 _WORDS: dict[str, type[_Words]] = {"body": Shape, "friction": Law}
 
 
-class _Top(_Strict):
+class _Top(Strict):
     name: Annotated[str, Allowed("up to 100 of A-Z, a-z, 0-9, '.', '_', '-', the first a letter or digit")] = Field(
         default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
         description="name of the run and of its files; by default that of the configuration file",
@@ -344,155 +212,3 @@ SETTINGS |= {f"integrator.{name}": field for name, field in Integrator.model_fie
 PATHS: dict[str, str] = {p.path: p.long_name for p in PARAMETERS.values()}
 PATHS |= {path: str(field.description) for path, field in SETTINGS.items()}
 """The path of every value of a configuration, and what it means."""
-
-
-def tier_of(model: str, law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> Tier:
-    """The model of a configuration that names these parameters."""
-    if model not in BASES or is_papers(law, units, names, surface):
-        return TIERS[model]
-    return variant(model, law, units, names, surface)
-
-
-@dataclass(frozen=True)
-class Config:
-    """A checked configuration."""
-
-    name: str
-    model: str
-    parameters: dict[str, Values]
-    """The parameters of the model, in the order of the axes."""
-    integrator: Integrator
-    measure: tuple[str, ...]
-    """Specs of measurements, as `sweep.kernels.measures.chosen` takes them."""
-    max_failed_fraction: float
-    verify: float = 0.0
-    refine: int = 0
-    cases: dict[str, tuple[float, ...]] | None = None
-    """Columns of the table of cases, if there is one."""
-    cases_file: str | None = None
-    units: str = PAPER
-    law: str = PAPERS_LAW
-    """Name of the law of friction, as in `sweep.models.laws.LAWS`."""
-    surface: str = ELLIPSOID.name
-    """Name of the surface, as in `sweep.models.surfaces.SURFACES`."""
-    origin: Origin | None = None
-    """Where the model comes from, if a user brings it."""
-    source: Document | None = field(default=None, init=False, compare=False, repr=False)
-    """What it was made from, so that single values can be replaced; a copy with other values has none."""
-
-    def fault(self, path: Path, message: str) -> Fault:
-        """A fault at `path`, with the place where the user can correct it if that is known."""
-        return (self.source or Document("")).fault(path, message)
-
-    @property
-    def axes(self) -> dict[str, tuple[float, ...]]:
-        return {name: v.numbers for name, v in self.parameters.items() if v.is_axis}
-
-    @property
-    def tier(self) -> Tier:
-        """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
-        names = (*self.parameters, *(self.cases or ()))
-        if self.origin:
-            return outside.find(self.origin, self.units, names)
-        return tier_of(self.model, self.law, self.units, names, self.surface)
-
-    @property
-    def simulated(self) -> bool:
-        """Whether the model is simulated rather than a formula."""
-        return isinstance(self.tier, Model)
-
-    @property
-    def own_law(self) -> laws.Law | None:
-        """The law of friction that a user brings for a rattleback."""
-        return outside.law(self.origin) if self.origin else None
-
-    @property
-    def of_rattlebacks(self) -> bool:
-        """Whether its bodies are ellipsoids on a plane; a user's model may be of anything else."""
-        return not self.origin or self.own_law is not None
-
-    @property
-    def table(self) -> Mapping[str, Parameter]:
-        """The parameters that it may name."""
-        return outside.table(self.origin)
-
-    @property
-    def equations(self) -> Model:
-        """The model of a configuration that is simulated."""
-        assert isinstance(self.tier, Model)
-        return self.tier
-
-    def with_time(self) -> Config:
-        """The same with a `t_end` in seconds for bodies in SI, which have given none."""
-        columns = {name: value.numbers for name, value in self.parameters.items()} | (self.cases or {})
-        longest = min(T_END * math.sqrt(max(columns["c"]) / min(columns["gravity"])), LATEST)
-        # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
-        t_end = STRETCH * math.ceil(longest / STRETCH)
-        return replace(self, integrator=self.integrator.model_copy(update={"t_end": t_end}))
-
-    def described(self, name: str) -> dict[str, str]:
-        """The CF attributes of a physical parameter."""
-        parameter = self.table[name]
-        if name in (self.own_law or laws.LAWS[self.law]).pure:
-            return {"long_name": "coefficient of friction", "units": "1"}
-        units, long_name = parameter.units, parameter.long_name
-        if self.surface == PARABOLOID.name:
-            long_name = ON_PARABOLOID.get(name, long_name)
-        if self.units == SI:
-            units, long_name = in_si(units, long_name)
-        return {"long_name": long_name, "units": units}
-
-    def document(self) -> dict[str, Any]:
-        """The whole configuration, defaults included, as plain data."""
-        table = self.table
-        written = [table[name].section for name in self.axes if name not in FIRST_AXES]
-        # In the order of the axes, so that they keep it when the document is read again.
-        found: dict[str, dict[str, Any]] = {section: {} for section in (*written, *sections(table)) if section}
-        top: dict[str, Any] = {"model_sha256": self.origin.digest} if self.origin else {}
-        if self.units != PAPER and self.of_rattlebacks:
-            top["units"] = self.units
-        if self.law != PAPERS_LAW and not self.origin:
-            law, _, regularisation = self.law.partition("-")
-            found["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
-        if self.surface != ELLIPSOID.name:
-            found["body"] |= {"surface": self.surface}
-        for name, value in self.parameters.items():
-            found.get(table[name].section, top)[name] = value.spec
-        return {
-            "name": self.name,
-            "model": self.model,
-            **top,
-            **({"cases": self.cases_file} if self.cases_file else {}),
-            **{section: values for section, values in found.items() if values},
-            "integrator": self.integrator.model_dump(),
-            "measure": [_written(spec) for spec in self.measure],
-            "verify": self.verify,
-            "refine": self.refine,
-            "max_failed_fraction": self.max_failed_fraction,
-        }
-
-    def to_yaml(self) -> str:
-        return self._yaml
-
-    @cached_property
-    def _yaml(self) -> str:
-        stream = StringIO()
-        yaml = YAML(typ="safe", pure=True)
-        yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-        yaml.dump(self.document(), stream)
-        return stream.getvalue()
-
-    def fingerprint(self) -> str:
-        """Hash of everything that determines the numbers: not the name, nor how many failures are accepted."""
-        decisive = self.document()
-        # What the file of a model says, which its SHA-256 tells, not where it lies.
-        for key in ("name", "max_failed_fraction", "cases", *(["model"] if self.origin else [])):
-            decisive.pop(key, None)
-        text = json.dumps([decisive, list(self.axes), self.cases], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _written(spec: str) -> str | dict[str, int]:
-    """The spec of a measurement in the form in which a configuration gives it."""
-    name, _, setting = spec.partition("=")
-    return {name: int(setting)} if setting else name

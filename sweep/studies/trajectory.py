@@ -16,7 +16,7 @@ from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
 from sweep.config.brought import explained
 from sweep.config.faults import suggestion
 from sweep.config.scenes import misplaced, unfit
-from sweep.config.schema import numbers_of
+from sweep.config.values import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS
 from sweep.engine.plan import plan

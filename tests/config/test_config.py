@@ -14,7 +14,7 @@ from support import ROOT, SMALL
 
 from sweep import ConfigError, load_config
 from sweep.cli import main
-from sweep.config.schema import Range
+from sweep.config.values import Range
 from sweep.grid import Grid
 
 Write = Callable[..., Path]

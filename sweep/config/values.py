@@ -1,0 +1,133 @@
+"""The value of a physical parameter: a number, or an axis given as a list or a range."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
+
+from sweep.config.document import number
+from sweep.config.faults import ConfigError, Fault, quote
+from sweep.config.messages import describe, wrong
+from sweep.config.plain import plain
+from sweep.parameters import Parameter
+
+MAX_AXIS = 1_000_000
+"""Most values of one axis and most rows of a table of cases: they are held in memory as Python numbers."""
+
+
+class Strict(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def whole(raw: Any) -> Any:
+    """1e3 as 1000."""
+    return int(raw) if isinstance(raw, float) and raw.is_integer() else raw
+
+
+Whole = Annotated[int, BeforeValidator(whole)]
+"""A whole number, however it is written."""
+
+
+class Range(Strict):
+    start: float
+    stop: float
+    num: Whole = Field(ge=1, le=MAX_AXIS)
+    spacing: Literal["linear", "log"] = "linear"
+
+    def values(self) -> list[float]:
+        if self.spacing == "linear":
+            return _divided(self.start, self.stop, self.num)
+        if np.sign(self.start) * np.sign(self.stop) <= 0:
+            raise wrong("a log range needs start and stop of one sign, both not zero", "spacing")
+        logs = _divided(math.log10(abs(self.start)), math.log10(abs(self.stop)), self.num)
+        inside = [math.copysign(10.0**log, self.start) for log in logs[1:-1]]
+        return [self.start, *inside, self.stop][: self.num]
+
+
+def _divided(start: float, stop: float, num: int) -> list[float]:
+    """Equally spaced numbers, each rounded once, so that a finer division has all numbers of a coarser one."""
+    if num == 1:
+        return [start]
+    (p, q), (r, s) = start.as_integer_ratio(), stop.as_integer_ratio()
+    whole, from_start, each = q * s * (num - 1), p * s * (num - 1), r * q - p * s
+    return [(from_start + i * each) / whole for i in range(num)]
+
+
+@dataclass(frozen=True)
+class Values:
+    """A parameter's checked value: one number, or an axis of distinct numbers."""
+
+    numbers: tuple[float, ...]
+    is_axis: bool
+    spec: float | list[float] | dict[str, Any]
+    """The value as it stands in the configuration."""
+
+
+_DEGREES = re.compile(r"\s*(\S+)\s+deg\s*")
+
+
+def _in_radians(raw: Any) -> Any:
+    """`raw` with "0.5 deg" as a number of radians, also in a list or a range."""
+    if isinstance(raw, list):
+        return [_in_radians(item) for item in raw]
+    if isinstance(raw, dict):
+        return {key: _in_radians(item) for key, item in raw.items()}
+    spelled = _DEGREES.fullmatch(raw) if isinstance(raw, str) else None
+    degrees = number(spelled[1]) if spelled else None
+    return raw if degrees is None else math.radians(degrees)
+
+
+def parse_values(parameter: Parameter, raw: Any) -> Values:
+    if parameter.units == "radian":
+        raw = _in_radians(raw)
+    spec: Any = raw
+    if isinstance(raw, dict):
+        try:
+            span = Range.model_validate(raw)
+        except ValidationError as error:
+            # An unknown key first: it tells why another is missing.
+            path, message, _ = max(describe(error.errors(), Range), key=lambda found: found[2])
+            raise wrong(message, *path) from None
+        numbers, spec = span.values(), span.model_dump()
+    elif isinstance(raw, list):
+        if not raw:
+            raise wrong("an empty axis; allowed: one number or more")
+        for i, item in enumerate(raw):
+            _check_number(item, parameter, i)
+        numbers = spec = [float(item) for item in raw]
+    else:
+        _check_number(raw, parameter)
+        return Values((float(raw),), False, float(raw))
+    for value in numbers:
+        if not parameter.allows(value):
+            raise wrong(f"{value:g} is out of bounds; allowed: {parameter.allowed}")
+    if len(set(numbers)) < len(numbers):
+        raise wrong("an axis with equal values; allowed: distinct numbers")
+    return Values(tuple(numbers), True, spec)
+
+
+def numbers_of(parameter: Parameter, raw: Any) -> tuple[float, ...]:
+    """The numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter."""
+    try:
+        return parse_values(parameter, plain(raw)).numbers
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise ConfigError([Fault("", None, None, (parameter.name, *context["at"]), context["reason"])]) from None
+
+
+def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
+    if isinstance(raw, bool) or not isinstance(raw, int | float):
+        raise wrong(
+            f"{quote(raw)} is not a number; allowed: {parameter.allowed}"
+            + ("" if at else ", a list of such, or {start, stop, num, spacing: linear|log}"),
+            *at,
+        )
+    if not (abs(raw) <= sys.float_info.max and parameter.allows(raw)):
+        raise wrong(f"{quote(raw)} is out of bounds; allowed: {parameter.allowed}", *at)
