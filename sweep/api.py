@@ -141,8 +141,8 @@ def trajectory(
     Parameters
     ----------
     config, progress, reporter : as for `run`
-    every : time between samples, in sqrt(c/g), rounded to whole steps; by default nearly twenty per period of the
-        fastest motion
+    every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, rounded to whole steps; by default nearly
+        twenty per period of the fastest motion
     values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``, of which each combination is one trajectory;
         an axis of `config` that is not named takes its first value.  Anything else replaces a value of `config`, such
         as ``t_end=300``

@@ -57,10 +57,10 @@ PARAMETERS: dict[str, Parameter] = {
     p.name: p
     for p in (
         Parameter(
-            "a", "body", "1", "semi-axis of the ellipsoid along x (long axis), in c", 10.0, above=0, below=1e6
+            "a", "body", "1", "semi-axis of the ellipsoid at delta from x (long axis), in c", 10.0, above=0, below=1e6
         ),
         Parameter(
-            "b", "body", "1", "semi-axis of the ellipsoid along y (short axis), in c", 3.0, above=0, below=1e6
+            "b", "body", "1", "semi-axis of the ellipsoid at delta from y (short axis), in c", 3.0, above=0, below=1e6
         ),
         Parameter(
             "c", "body", "1", "semi-axis of the ellipsoid along z, the unit of length", 1.0, above=0, below=1e6
@@ -120,12 +120,14 @@ PARAMETERS: dict[str, Parameter] = {
         ),
         Parameter("x0", "start", "1", "start contact point along x, in c", 0.01),
         Parameter("y0", "start", "1", "start contact point along y, in c", 0.01),
-        Parameter("roll", "start", "radian", "start angle about x", 0.0, above=-pi / 2, below=pi / 2),
-        Parameter("pitch", "start", "radian", "start angle about y, after roll", 0.0, above=-pi / 2, below=pi / 2),
+        Parameter("roll", "start", "radian", "start angle about the axis of a", 0.0, above=-pi / 2, below=pi / 2),
+        Parameter(
+            "pitch", "start", "radian", "start angle about the axis of b, after roll", 0.0, above=-pi / 2, below=pi / 2
+        ),
         *(
             Parameter(f"omega{i}", "start", "1", f"start angular velocity about {axis}, in sqrt(g/c)", 0.0,
                       above=-1e3, below=1e3)
-            for i, axis in ((1, "x"), (2, "y"), (3, "z"))
+            for i, axis in ((1, "the axis of a"), (2, "the axis of b"), (3, "z"))
         ),
         Parameter("slip1", "start", "1", "start slip along the ground, at heading zero along x, in sqrt(g c)", 0.0,
                   above=-1e6, below=1e6),

@@ -23,7 +23,7 @@ from sweep.models.scene import PAPER, SI
 from sweep.models.surfaces import ELLIPSOID, SURFACES
 from sweep.parameters import PARAMETERS, Parameter, sections
 
-_STEP = Allowed("auto, or a finite number > 0 in sqrt(c/g)")
+_STEP = Allowed("auto, or a finite number > 0")
 _MEASURE = Allowed(f"a list of {', '.join(MEASURES)}")
 
 
@@ -86,7 +86,7 @@ class Integrator(Strict):
     """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time.  With a number
     for `step`, and for a model that only one method can integrate, that is the default."""
     step: Annotated[float | Literal["auto"], BeforeValidator(_step), _STEP] = Field(
-        default="auto", description="fixed step in sqrt(c/g), or `auto`"
+        default="auto", description="fixed step in sqrt(c/g) or, with `units: SI`, in s; or `auto`"
     )
     tolerance: float = Field(
         default=TOLERANCE, ge=1e-14, lt=1,

@@ -20,7 +20,7 @@ from sweep.models.model import REVERSAL_TIME, Model, Ripple
 from sweep.models.resisting import drag_of, isotropic_drag, resistances
 from sweep.models.solid import gyroscopic
 from sweep.models.surfaces import Surface
-from sweep.models.variant import STILL, couple_constants, offers, record, seen
+from sweep.models.variant import STILL, couple_constants, offers, record, seen, turned
 
 
 def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
@@ -97,6 +97,7 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         ripple=Ripple(steady.NAMES, lambda columns: steady.form(columns, surface), steady.rolling),
         still=STILL if STILL in names else "",
         observe=lambda y, p: seen(contact, rhs, y, p),
+        turned=turned,
         spin_unit=solid.spin_unit,
         impossible=lambda columns: bodies.impossible(columns, surface),
     )

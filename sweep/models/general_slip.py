@@ -32,7 +32,7 @@ from sweep.models.model import REVERSAL_TIME, Array, Columns, Model, Ripple
 from sweep.models.resisting import drag_of, isotropic_drag, resistance_of, resistances
 from sweep.models.solid import gyroscopic
 from sweep.models.surfaces import Surface
-from sweep.models.variant import STILL, couple_constants, offers, record, seen
+from sweep.models.variant import STILL, couple_constants, offers, record, seen, turned
 
 
 def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
@@ -126,6 +126,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
         ripple=Ripple(steady.NAMES, lambda columns: steady.form(columns, surface), steady.slipping),
         tilt=slip.MODEL.tilt,
         observe=observe,
+        turned=turned,
         spin_unit=solid.spin_unit,
         impossible=lambda columns: bodies.impossible(columns, surface),
         faint="" if law.linear_to is None else "faint",

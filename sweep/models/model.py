@@ -185,6 +185,9 @@ class Model(Tier):
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
     shows beside spin and energy, by names that `sweep.studies.trajectory` or `series` explains."""
+    turned: Callable[[Columns], Array] = nothing
+    """(columns) -> angle from the axes of the states to x and y, along which a trajectory shows vectors, of shape
+    (cells,)."""
     fastest_motion: Callable[[Columns], Array] | None = None
     """(columns) -> bound on the rate of the fastest motion that steps have to follow, in sqrt(g/c), shape (cells,); by
     default the largest eigenvalue about upright spin."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from sweep.models import solid
 from sweep.models.bounds import still_energy
 from sweep.models.couples import Couple
 from sweep.models.laws import Law
-from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named
+from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, nothing
 from sweep.models.surfaces import Surface
 
 STILL = "still"
@@ -46,6 +48,11 @@ def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
     """A couple that is not linear has no Jacobian that is quadratic in the spin, which the linear theory needs."""
     theory = {LINEAR} if dissipates and all(couple.linear for couple in couples) else set()
     return frozenset({COUNT, SPIN, ENERGY} | theory)
+
+
+def turned(columns: Columns) -> Array:
+    """`Model.turned`: x and y are the axes of inertia of a body given by δ, and those of the surface otherwise."""
+    return np.asarray(columns.get("delta", nothing(columns)))
 
 
 def seen(contact: Any, rhs: Any, y: Array, p: Any) -> dict[str, Array]:

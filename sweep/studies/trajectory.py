@@ -63,8 +63,8 @@ SERIES: dict[str, tuple[str, str]] = {
     "ripple_free_spin": ("1", "spin without the ripple of the rattle, in sqrt(g/c)"),
     "contact_x": ("1", "contact point along x, in c"),
     "contact_y": ("1", "contact point along y, in c"),
-    "slip_1": ("1", "slip velocity v_p along x, in sqrt(g c)"),
-    "slip_2": ("1", "slip velocity v_p along y, in sqrt(g c)"),
+    "slip_1": ("1", "slip velocity v_p along the body's x, in sqrt(g c)"),
+    "slip_2": ("1", "slip velocity v_p along the body's y, in sqrt(g c)"),
     "slip_rate_1": ("1", "time derivative of the slip velocity along x, in g"),
     "slip_rate_2": ("1", "time derivative of the slip velocity along y, in g"),
     "v0_rate_1": ("1", "time derivative of v_0 = x_p × omega along x, in g"),
@@ -77,6 +77,8 @@ SERIES: dict[str, tuple[str, str]] = {
     "energy": ("1", "energy above rest, in m g c"),
     "dissipated": ("1", "work done against friction, in m g c"),
 }
+
+_VECTORS = (("contact_x", "contact_y"), ("slip_1", "slip_2"))
 
 
 @deferred()
@@ -95,8 +97,8 @@ def trajectory(
     Parameters
     ----------
     config : as `sweep.config.load_config` takes it
-    every : time between samples, in sqrt(c/g), rounded to whole steps if all trajectories have the same; by default
-        nearly twenty per period of the fastest motion
+    every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, rounded to whole steps if all trajectories
+        have the same; by default nearly twenty per period of the fastest motion
     reporter : receives progress, counted in time, and messages; by default there are none
     at : a number, or several as an axis of a configuration has them, by parameter; each combination is one
         trajectory.  An axis of `config` that is not named takes its first value
@@ -136,7 +138,8 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
         marks = _run(part.kernel, cells_of([job], part.method, part.kernel, part.images).start(halvings), settles)
     labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
     interval = np.full(job.grid.size, every) if every else _intervals(part.kernel.model, job.grid.columns())
-    series = [_series(part.kernel, *found) for found in _sample(part.kernel, marks, part.images, interval)]
+    sampled, angles = _sample(part.kernel, marks, part.images, interval), part.kernel.model.turned(job.grid.columns())
+    series = [_series(part.kernel, *found, angle) for found, angle in zip(sampled, angles, strict=True)]
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(job.grid.size), {"units": "1", "long_name": "number of the trajectory"})
     return flat.assign_coords(trajectory=index).assign(_side_by_side(series, part.kernel.model, chosen.units))
@@ -303,12 +306,17 @@ def _advance(kernel: Kernel, marks: Marks, which: Array, before: Array, steps: A
     return samples
 
 
-def _series(kernel: Kernel, times: Array, images: Array) -> dict[str, Array]:
-    """The series of a trajectory, each of shape (samples,), from its images at `times`."""
+def _series(kernel: Kernel, times: Array, images: Array, angle: float) -> dict[str, Array]:
+    """The series of a trajectory, each of shape (samples,), from its images at `times`; `angle` is `Model.turned`."""
     model = kernel.model
     states, constants = kernel.unpack(images)
     spin, rattle, inertia = model.energy(states, constants)
     series = {"time": times, "spin": spin, **model.observe(states, constants)}
+    for x, y in _VECTORS if angle else ():
+        if x in series:
+            along, across = series[x], series[y]
+            series[x] = along * np.cos(angle) + across * np.sin(angle)
+            series[y] = across * np.cos(angle) - along * np.sin(angle)
     if kernel.follows_ripple:
         series["ripple_free_spin"] = kernel.steady_spin(images)
     if "energy_error" in kernel.measure:

@@ -34,7 +34,9 @@ MU, SPEED = 60.0, 5e-3
 COULOMB = {"mu": MU * SPEED, "speed": SPEED}
 STRIBECK = {"mu": 0.3, "mu_static": 0.4, "speed": 0.02, "speed_stick": SPEED, "mu_viscous": 1.0}
 SIGMA = {"sigma": 1e-3}
+CONTENSOU = COULOMB | {"radius_contact": 0.05}
 ROLLING = {"mu_rolling": 1e-3, "radius": 0.1, "speed_rolling": 0.5}
+SPINNING = {"mu_spinning": 1e-3, "radius_spinning": 0.1, "speed_spinning": 0.02}
 
 SCENES: dict[str, dict[str, float]] = {
     "slip": {"mu": MU},
@@ -43,9 +45,11 @@ SCENES: dict[str, dict[str, float]] = {
     "slip+coulomb-tanh": COULOMB,
     "slip+coulomb-cubic": COULOMB,
     "slip+stribeck": STRIBECK,
+    "slip+contensou": CONTENSOU,
     "slip+none": {},
     "slip+viscous+sigma": {"mu": MU} | SIGMA,
     "slip+viscous+rolling": {"mu": MU} | ROLLING,
+    "slip+viscous+spinning": {"mu": MU} | SPINNING,
     "slip+viscous+sigma+rolling": {"mu": MU} | SIGMA | ROLLING,
     "noslip": {},
     "noslip+solid": {},
