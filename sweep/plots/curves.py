@@ -17,8 +17,9 @@ from sweep.plots import labels, legends, theory
 from sweep.plots.axes import set_scale
 from sweep.plots.figure import Picture
 from sweep.plots.maps import arrangement
-from sweep.plots.marks import COMPARISONS, PREDICTIONS, blank, legend, marks
+from sweep.plots.marks import blank, legend, marks
 from sweep.plots.panels import Panels, heading, title
+from sweep.plots.quantities import COMPARISONS, PREDICTIONS
 from sweep.plots.scales import Limits
 
 _STYLES: dict[str, dict[str, Any]] = {

@@ -49,7 +49,7 @@ _VARIABLE_WORDS = {
     "reversals": "spin reversals, simulated",
     "reversals_predicted": "spin reversals, predicted (Takano 2011)",
     "difference": "simulated − predicted",
-    "ratio": "simulated / predicted",
+    "ratio": "first reversal, simulated / predicted",
     "regime": "regime of motion",
     "lyapunov": "largest Lyapunov exponent",
     "cycle_variation": "variation of the cycles",

@@ -17,7 +17,7 @@ import xarray as xr
 from sweep.grid import Array
 from sweep.models.analytic import best_b
 from sweep.plots import labels
-from sweep.plots.marks import PREDICTIONS, field
+from sweep.plots.quantities import PREDICTIONS, field, subject
 
 MAX_PANELS = 8
 """Panels that a figure may have."""
@@ -146,18 +146,12 @@ def _midpoints(values: Array) -> Array:
 
 
 def _variables(dataset: xr.Dataset, variable: str | None) -> list[str]:
-    """The variables to draw: by default the reversals; those with a prediction beside it, and how the two compare."""
-    if variable is None:
-        variable = next((name for name in ("reversals", "reversals_predicted") if name in dataset), "spin_final")
-        if variable in PREDICTIONS:
-            return _beside_prediction(dataset, variable)
-    field(dataset, variable)  # raises if there is none
-    return _beside_prediction(dataset, variable) if variable == "t_first_reversal" else [variable]
-
-
-def _beside_prediction(dataset: xr.Dataset, variable: str) -> list[str]:
-    predicted, comparison = PREDICTIONS[variable]
-    return [variable, predicted, comparison] if predicted in dataset else [variable]
+    """The variables to draw: by default what the dataset is about; a prediction beside it, and how the two compare."""
+    chosen = variable or subject(dataset)
+    field(dataset, chosen)  # raises if there is none
+    predicted, comparison = PREDICTIONS.get(chosen, ("", ""))
+    alone = predicted not in dataset or variable == "reversals"
+    return [chosen] if alone else [chosen, predicted, comparison]
 
 
 def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:

@@ -102,7 +102,7 @@ def test_a_changed_table_is_named(write: Write, tmp_path: Path) -> None:
     assert invoke("run", file, "--output", tmp_path / "o").exit_code == 0
     (tmp_path / "t.csv").write_text("mu\n61\n")
     result = invoke("run", file, "--output", tmp_path / "o")
-    assert (result.exit_code, "the table of cases differs" in result.stderr) == (2, True)
+    assert (result.exit_code, "the table of cases" in result.stderr) == (2, True)
 
 
 def test_overrides_may_be_numpy_values(write: Write) -> None:

@@ -10,7 +10,8 @@ from sweep.kernels.status import DIVERGED, LIFT_OFF, SETTLED, TIME_LIMIT
 from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 from sweep.plots.labels import STATUS_WORDS
-from sweep.plots.marks import WORDS, blank, field, in_words, legend, marks
+from sweep.plots.marks import WORDS, blank, in_words, legend, marks
+from sweep.plots.quantities import field
 from sweep.results.dataset import STATUSES, VARIABLES, described
 
 STATUS = [SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, 0, SETTLED]
