@@ -109,7 +109,8 @@ def save_html(
     document.add_root(Column(drawn.figure, sizing_mode="stretch_width", name="map"))
     document.add_root(Div(text=legend(part, colours, lines), sizing_mode="stretch_width", name="legend"))
     dress(document, source, live=False)
-    fixed = [labels.value(d, source.axes[d].values[i]) for d, i in shown.at.items() if d in _rest(source, shown)]
+    rest = _rest(source, shown)
+    fixed = [labels.measured(source.dataset, d, source.axes[d].values[i]) for d, i in shown.at.items() if d in rest]
     document.template_variables["constants"] = ", ".join([*fixed, document.template_variables["constants"]])
     with replacing(path) as temporary:
         temporary.write_text(_html(document), encoding="utf-8")

@@ -194,9 +194,9 @@ def label_axes(axes: Axes, panels: Panels, *, left: bool = True, lowest: bool = 
 
 def draw_bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
     """Draw the bar of a scale, with what it shows."""
-    bar = Colorbar(axes, scale.mappable())
+    bar = Colorbar(axes, scale.mappable(), extend=scale.arrows)
     words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name.removesuffix("_predicted"))
-    bar.set_label(words, fontsize=8)
+    bar.set_label(f"{words}\n", fontsize=8)  # an empty line, or it would seem to belong to the next map
     axes.tick_params(labelsize=7)
     scale.label(bar)
 
@@ -211,6 +211,9 @@ def _legend(figure: Figure, panels: Panels, lines: dict[str, Artist]) -> None:
         for (value, count), colour in zip(present.items(), colours, strict=True):
             words = f"{meanings.get(value, value)} ({count} of {dataset[name].size})"
             handles.append(Patch(facecolor=colour, edgecolor="0.3", label=words))
-    handles += [cells.handle(kind, words) for kind, words in legend(dataset, name).items()]
+    kinds = legend(dataset, name)
+    if "no_value" in (compared := legend(dataset, panels.names[-1])):
+        kinds["no_value"] = compared["no_value"]
+    handles += [cells.handle(kind, words) for kind, words in kinds.items()]
     handles += lines.values()
     legends.below(figure, handles)

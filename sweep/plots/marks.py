@@ -38,6 +38,7 @@ _GROWING = {"reversals", "raw_reversals", "reversals_low", "reversals_high", "t_
 _PER_VARIABLE = {
     ("t_last_reversal", "no_value"): "no reversal",
     ("t_first_reversal", "no_value"): "no reversal",
+    ("t_first_reversal_predicted", "no_value"): "none predicted",
     ("ratio", "no_value"): "no reversal, or none predicted",
     ("reversal_times", "no_value"): "no such reversal",
     ("spin_final", "time_limit"): "not settled: ended at the time limit",

@@ -101,7 +101,7 @@ def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:
 
 def title(dataset: xr.Dataset, panel: dict[str, int]) -> str:
     """What sets a panel apart from the others."""
-    return ", ".join(labels.value(d, float(dataset[d][i])) for d, i in panel.items())
+    return ", ".join(labels.measured(dataset, d, float(dataset[d][i])) for d, i in panel.items())
 
 
 def heading(dataset: xr.Dataset, width: float) -> str:
@@ -112,7 +112,8 @@ def heading(dataset: xr.Dataset, width: float) -> str:
 def in_lines(constants: str, width: float) -> str:
     """Constants in lines that break between them, for a figure of so many inches."""
     space = "\N{NO-BREAK SPACE}"
-    return fill(constants.replace(" = ", f"{space}={space}"), min(_HEADING, int(_LETTERS * width))).replace(space, " ")
+    breakable = constants.replace(" ", space).replace(f",{space}", ", ")
+    return fill(breakable, min(_HEADING, int(_LETTERS * width)), break_on_hyphens=False).replace(space, " ")
 
 
 def best_shape(dataset: xr.Dataset) -> float | None:
