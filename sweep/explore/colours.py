@@ -85,8 +85,9 @@ def _ratios(shown: Array) -> Scale:
     low, high = float(norm.vmin or 1), float(norm.vmax or 1)
     ticks = [float(t) for t in np.geomspace(low, high, 5)]
     least, most = float(shown.min()), float(shown.max())
-    outside = least < low * (1 - 1e-9) or most > high * (1 + 1e-9)
-    beyond = f"the last colours also stand for ratios from {least:.2g} to {most:.2g}" if outside else ""
+    ends = {f"down to {least:.2g}": least < low * (1 - 1e-9), f"up to {most:.2g}": most > high * (1 + 1e-9)}
+    outside = " and ".join(words for words, there in ends.items() if there)
+    beyond = f"the last colours also stand for ratios {outside}" if outside else ""
     words = {t: f"{t:.2g}" for t in ticks}
     return Scale(interp_palette(PuOr11, 255), low, high, logarithmic=True, ticks=ticks, words=words, beyond=beyond)
 
