@@ -77,6 +77,15 @@ def test_what_is_measured_first_is_shown_first(measured: str, whole: xr.Dataset)
     assert beside.get_suptitle().startswith(labels.words(field(dataset, variable).to_dataset(name=variable), variable))
 
 
+def test_several_numbers_a_cell_are_no_picture(whole: xr.Dataset) -> None:
+    times = ("n0", "delta", "reversal"), np.ones((*SIZE, 12))
+    assert subject(whole.assign(reversal_times=times).assign_attrs(measured="reversal_times=12")) == "reversals"
+
+
+def test_reversals_that_are_named_are_drawn_alone(whole: xr.Dataset) -> None:
+    assert titles(sweep.plot(whole, "reversals")) == ["spin reversals, simulated"]
+
+
 def test_without_the_cycles_an_exponent_is_shown_itself(whole: xr.Dataset) -> None:
     dataset = whole.drop_vars("cycle_variation").assign_attrs(measured="lyapunov reversals")
     assert subject(dataset) == "lyapunov"
@@ -104,7 +113,7 @@ def test_a_run_tells_what_it_measured(small: xr.Dataset) -> None:
 def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
     source = Source(whole)
     assert set(DERIVED) == set(derivable(whole)) < set(source.variables)
-    assert source.variables[:3] == ["reversals", "reversals_predicted", "difference"]
+    assert source.variables[:5] == ["reversals", "reversals_predicted", "difference", "ratio", "regime"]
     for name in source.variables:
         picture.draw(whole, name)
         part = source.slice(name, "delta", "n0", {})
@@ -144,7 +153,9 @@ def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None
     whole["t_first_reversal_predicted"][:, :2] = np.nan
     (legend,) = picture.draw(whole, "t_first_reversal").legends
     assert "no reversal, or none predicted (12 of 42)" in [text.get_text() for text in legend.get_texts()]
-    (legend,) = picture.draw(whole.isel(delta=3), "t_first_reversal").legends
-    assert "no reversal (1 of 6)" in [text.get_text() for text in legend.get_texts()]
+    whole["t_first_reversal_predicted"][3:5, 3] = np.nan
+    figure = picture.draw(whole.isel(delta=3), "t_first_reversal")
+    (missing,) = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
+    assert (missing.get_label(), len(missing.get_xdata())) == ("no reversal (1 of 6)", 1)
     none = picture.draw(whole.isel(delta=1), "t_first_reversal")
     assert [text.get_text() for text in none.legends[0].get_texts()] == ["time of the first reversal"]
