@@ -269,7 +269,7 @@ def bench(output: Path) -> None:
 @main.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_PATH)
 @click.option(
-    "--var", "variable", help="Variable to draw [default: reversals, simulated and predicted, and their difference]."
+    "--var", "variable", help="Variable to draw [default: what `measure` named first, or else the reversals]."
 )
 @click.option("--x", help="Axis drawn across.")
 @click.option("--y", help="Axis drawn upwards.")

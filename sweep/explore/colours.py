@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from bokeh.palettes import PuOr11, Viridis256, interp_palette
 
-from sweep.explore.slices import DIFFERENCE, Slice
+from sweep.explore.slices import Slice
 from sweep.grid import Array
-from sweep.plots import labels
+from sweep.plots import labels, scales
 
 CURVES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00")
 _FLAGS = ("#bbbbbb", "#0072b2", "#e69f00", "#d55e00", "#cc79a7", "#000000", "#009e73", "#56b4e9", "#f0e442")
@@ -46,13 +46,15 @@ class Scale:
 def scale(part: Slice) -> Scale:
     """The scale of a slice, from the cells that have a value."""
     shown = part.shown
-    flags = labels.flag_words(part.dataset, part.name) if part.name in part.dataset else {}
+    flags = labels.flag_words(part.dataset, part.name)
     if flags:
         return _flags(flags)
     if not shown.size:
         return Scale(Viridis256, 0, 1)
     whole = shown.dtype.kind in "iu"
-    if part.name == DIFFERENCE or (shown.min() < 0 < shown.max()):
+    if part.name == "ratio":
+        return _ratios(shown)
+    if part.name == "difference" or (shown.min() < 0 < shown.max()):
         return _diverging(shown, whole)
     return _counts(shown) if whole else _numbers(shown)
 
@@ -75,6 +77,19 @@ def _diverging(shown: Array, whole: bool) -> Scale:
     beyond = f"the last colours also stand for differences up to {most:g}" if most > top else ""
     words = {t: f"{t:+g}" if t else "0" for t in ticks}
     return Scale(palette, -top - 0.5, top + 0.5, ticks=ticks, words=words, beyond=beyond)
+
+
+def _ratios(shown: Array) -> Scale:
+    """As pictures have it."""
+    norm = scales.ratios(shown).norm
+    low, high = float(norm.vmin or 1), float(norm.vmax or 1)
+    ticks = [float(t) for t in np.geomspace(low, high, 5)]
+    least, most = float(shown.min()), float(shown.max())
+    ends = {f"down to {least:.2g}": least < low * (1 - 1e-9), f"up to {most:.2g}": most > high * (1 + 1e-9)}
+    outside = " and ".join(words for words, there in ends.items() if there)
+    beyond = f"the last colours also stand for ratios {outside}" if outside else ""
+    words = {t: f"{t:.2g}" for t in ticks}
+    return Scale(interp_palette(PuOr11, 255), low, high, logarithmic=True, ticks=ticks, words=words, beyond=beyond)
 
 
 def _counts(shown: Array) -> Scale:

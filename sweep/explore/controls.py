@@ -112,7 +112,7 @@ class MapControls:
         self._count.active = self._counts.index(state.show) if state.show in self._counts else None
         self._other.value = "" if state.show in self._counts else state.show
         self._x.value, self._y.value = state.x, state.y
-        along = set(map(str, self._source.field(state.show).dims)) | set(self._source.dims)
+        along = self._source.dims_of(state.show) | set(self._source.dims)
         for name, control in self._rest.items():
             self._groups[name].visible = name in along - {state.x, state.y}
             if isinstance(control, RadioButtonGroup):

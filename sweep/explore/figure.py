@@ -25,14 +25,14 @@ from bokeh.plotting import figure
 
 from sweep.explore.colours import Scale, scale
 from sweep.explore.lines import Lines
-from sweep.explore.slices import DIFFERENCE, Axis, Slice, Source, plain
+from sweep.explore.slices import Axis, Slice, Source, plain
 from sweep.grid import Array
 from sweep.plots import labels, marks
 
 HEIGHT = 480
 """Of the map, in pixels."""
 
-_SHORT = {"reversals": "simulated", "reversals_predicted": "predicted", DIFFERENCE: "difference", "status": "end"}
+_SHORT = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference", "status": "end"}
 """What these are called under the pointer, where the table must not hide the map."""
 
 _TICKS = 12
@@ -109,12 +109,13 @@ class Map:
             parts = drawn.get(name, [])
             source.data = {"xs": [x for x, _ in parts], "ys": [y for _, y in parts]}
         self.figure.title.text = self._source.label(part.name)
-        unit = labels.unit(self._source.dataset, part.name) if part.name in part.dataset else ""
-        ticker = BasicTicker() if colours.ticks is None else FixedTicker(ticks=colours.ticks, minor_ticks=[])
+        unit = labels.unit(part.dataset, part.name)
+        chosen_by_bokeh: Any = "auto" if colours.logarithmic else BasicTicker()
+        ticker = FixedTicker(ticks=colours.ticks, minor_ticks=[]) if colours.ticks else chosen_by_bokeh
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [
             ColorBar(
-                color_mapper=mapper, ticker="auto" if colours.logarithmic else ticker, title=unit or None,
+                color_mapper=mapper, ticker=ticker, title=unit or None,
                 major_label_overrides=colours.words, **_BAR,
             )
         ]  # fmt: skip
@@ -198,7 +199,7 @@ def _tip(source: Source, part: Slice, columns: list[str]) -> tuple[str, dict[str
             formatters[variable] = CustomJSHover(args={"values": axis.values}, code=code)
     for name in columns:
         rows.append((_SHORT.get(name) or source.words(name), f"@{{{name}}}{{custom}}"))
-        flags = {} if name == DIFFERENCE else labels.flag_words(source.dataset, name)
+        flags = labels.flag_words(part.dataset, name)
         code = "return words[value] ?? (Number.isFinite(value) ? Number(value.toPrecision(6)).toString() : 'none')"
         formatters[f"@{{{name}}}"] = CustomJSHover(args={"words": {str(k): w for k, w in flags.items()}}, code=code)
     table = "".join(

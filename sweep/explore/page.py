@@ -17,7 +17,7 @@ from sweep.explore import figure, state
 from sweep.explore.colours import Scale
 from sweep.explore.controls import escaped
 from sweep.explore.lines import Lines, critical_lines
-from sweep.explore.slices import DIFFERENCE, Slice, Source
+from sweep.explore.slices import Slice, Source
 from sweep.plots import labels
 from sweep.results.writing import replacing
 
@@ -85,7 +85,7 @@ def save_html(
 
     Parameters
     ----------
-    variable : by default the simulated reversals
+    variable : by default what the dataset is about
     x, y : axes; by default the two longest
     at : values on the other axes; by default the first
 
@@ -109,28 +109,25 @@ def save_html(
     document.add_root(Column(drawn.figure, sizing_mode="stretch_width", name="map"))
     document.add_root(Div(text=legend(part, colours, lines), sizing_mode="stretch_width", name="legend"))
     dress(document, source, live=False)
-    fixed = [labels.value(d, source.axes[d].values[i]) for d, i in shown.at.items() if d in _rest(source, shown)]
+    rest = _rest(source, shown)
+    fixed = [labels.measured(source.dataset, d, source.axes[d].values[i]) for d, i in shown.at.items() if d in rest]
     document.template_variables["constants"] = ", ".join([*fixed, document.template_variables["constants"]])
     with replacing(path) as temporary:
         temporary.write_text(_html(document), encoding="utf-8")
 
 
 def _rest(source: Source, shown: state.State) -> set[str]:
-    dims = {*map(str, source.field(shown.show).dims), *source.dims}
-    return dims - {shown.x, shown.y}
+    return {*source.dims_of(shown.show), *source.dims} - {shown.x, shown.y}
 
 
 def _all_values(source: Source, shown: state.State) -> tuple[Slice, dict[str, Any]]:
     """The slice, and the tables of all its variables; of a large map only the counts and how they came about."""
-    plain = [n for n in source.variables if n == DIFFERENCE or set(source.dataset[n].dims) <= set(source.dims)]
+    plain = [n for n in source.variables if source.dims_of(n) <= set(source.dims)]
     cells = len(source.axes[shown.x].values) * (len(source.axes[shown.y].values) if shown.y else 1)
     if cells * len(plain) > _MOST_VALUES:
-        plain = [n for n in plain if n in (shown.show, "reversals", "reversals_predicted", DIFFERENCE, "status")]
+        plain = [n for n in plain if n in (shown.show, "reversals", "reversals_predicted", "difference", "status")]
     part = source.slice(shown.show, shown.x, shown.y, shown.at, tuple(plain))
-    columns = {n: part.dataset[n].values for n in plain if n != DIFFERENCE}
-    if DIFFERENCE in plain:
-        columns[DIFFERENCE] = columns["reversals"].astype("int32") - columns["reversals_predicted"]
-    return part, columns
+    return part, {n: part.dataset[n].values for n in plain}
 
 
 def _html(document: Document) -> str:

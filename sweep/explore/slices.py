@@ -13,14 +13,12 @@ import numpy as np
 import xarray as xr
 
 from sweep.grid import Array
-from sweep.plots import labels, marks
+from sweep.plots import labels, marks, quantities
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
 
 IN_MEMORY = 2_000_000
 """Cells up to which a dataset is read as a whole; of a larger one, each slice is read when it is shown."""
-
-DIFFERENCE = "difference"
 
 _HOW = {"linear": "eigenvalues", "simulated": "simulation", "reason": "whether found"}
 """How a critical spin was found, by what follows its name."""
@@ -74,7 +72,7 @@ class Slice:
     x: Axis
     y: Axis
     dataset: xr.Dataset
-    """All variables that tell about these cells and were asked for, over (y, x)."""
+    """All variables that tell about these cells and were asked for, and what is derived from them, over (y, x)."""
     values: Array
     """Shape (y, x)."""
     kinds: Array
@@ -131,33 +129,32 @@ class Source:
 
     @cached_property
     def variables(self) -> list[str]:
-        """Whatever has a number per cell: the counts and their difference first."""
-        found = [str(n) for n, v in self.dataset.data_vars.items() if v.dims and set(v.dims) <= set(self.axes)]
-        found = [n for n in found if self.dataset[n].dtype.kind in "fiub"]
-        head: list[str] = [n for n in ("reversals", "reversals_predicted") if n in found]
-        if len(head) == 2:
-            head.append(DIFFERENCE)
-        first = [n for n in ("status", "t_stop", "t_last_reversal") if n in found]
-        return [*head, *first, *(n for n in found if n not in (*head, *first))]
+        """Whatever has a number per cell: the counts and what is derived first."""
+        found = [str(n) for n, v in self._cell.data_vars.items() if v.dims and set(v.dims) <= set(self.axes)]
+        found = [n for n in found if self._cell[n].dtype.kind in "fiub"]
+        first = ("reversals", "reversals_predicted", *quantities.DERIVED, "status", "t_stop", "t_last_reversal")
+        return [*(n for n in first if n in found), *(n for n in found if n not in first)]
 
-    def field(self, name: str) -> xr.DataArray:
-        return marks.field(self.dataset, name)
+    @cached_property
+    def _cell(self) -> xr.Dataset:
+        """One cell with all that is derived, which tells of the variables what no number does."""
+        return quantities.with_derived(self.dataset.isel({d: slice(1) for d in self.axes}).load())
+
+    def dims_of(self, name: str) -> set[str]:
+        """The dimensions of a variable."""
+        return set(map(str, self._cell[name].dims))
 
     def words(self, name: str) -> str:
         """What a variable or an axis is."""
-        if name == DIFFERENCE:
-            return "simulated − predicted"
         if name.startswith("n_c") and name.count("_") > 1:
             _, _, _, *how = name.split("_")
             words = ", ".join([_HOW.get(h, h) for h in how] or ["formula"])
             return f"{critical_symbol(name)}, {words}"
-        return labels.words(self.dataset, name)
+        return labels.words(self._cell, name)
 
     def label(self, name: str) -> str:
         """The same with the unit."""
-        if name == DIFFERENCE or name not in self.dataset.variables:
-            return self.words(name)
-        return labels.label(self.dataset, name)
+        return labels.label(self._cell, name) if name in self._cell.variables else self.words(name)
 
     def slice(self, name: str, x: str, y: str, at: Mapping[str, int], more: tuple[str, ...] = ()) -> Slice:
         """Read the slice of a variable over the axes `x` and `y`, at an index of each other axis.
@@ -167,10 +164,11 @@ class Source:
         y : empty for a dataset of one axis
         more : variables wanted beside it
         """
-        parts = ("reversals", "reversals_predicted") if name == DIFFERENCE else (name,)
-        wanted = dict.fromkeys(n for n in (*parts, *_NEEDED_BY_MARKS, *more) if n in self.dataset)
+        wanted = dict.fromkeys((name, *_NEEDED_BY_MARKS, *more))
+        parts = {p for n in wanted for p in (quantities.DERIVED[n].needs if n in quantities.DERIVED else (n,))}
         fixed = {d: at.get(d, 0) for d in self.axes if d not in (x, y)}
-        part = self.dataset[list(wanted)].isel(fixed, missing_dims="ignore").load()
+        part = self.dataset[[n for n in self.dataset.data_vars if n in parts]].isel(fixed, missing_dims="ignore").load()
+        part = quantities.with_derived(part)
         across = (y, x) if y else (x,)
         template = xr.DataArray(np.zeros([len(self.axes[d].values) for d in across], bool), dims=across)
 
@@ -182,11 +180,9 @@ class Source:
         kinds = np.zeros(np.atleast_2d(template.values).shape, "uint8")
         for k, where in enumerate(found.values()):
             kinds |= table(where).astype("uint8") << np.uint8(k)
-        flat = xr.Dataset({n: ((y or "row", x), table(part[n])) for n in wanted})
-        for n in wanted:
-            flat[n].attrs = part[n].attrs
+        flat = xr.Dataset({n: ((y or "row", x), table(v), v.attrs) for n, v in part.data_vars.items()})
         return Slice(
-            name, self.axes[x], self.axes[y] if y else Axis("", np.zeros(1)), flat, table(marks.field(part, name)),
+            name, self.axes[x], self.axes[y] if y else Axis("", np.zeros(1)), flat, flat[name].values,
             kinds, marks.legend(part, name, found),
         )  # fmt: skip
 
@@ -201,7 +197,7 @@ class Source:
 
     def describe(self, index: Mapping[str, int]) -> dict[str, str]:
         """All that the dataset tells of the cell at `index`: each variable in words, and its value with its unit."""
-        cell = self.dataset.isel({d: index.get(d, 0) for d in self.dims}).load()
+        cell = quantities.with_derived(self.dataset.isel({d: index.get(d, 0) for d in self.dims}).load())
         told = {self.words(n): self._value(cell, n) for n in self.variables}
         kinds = marks.marks(cell, self.variables[0])
         if said := [marks.WORDS[kind] for kind, where in kinds.items() if bool(np.any(where)) and kind != "no_value"]:
@@ -209,14 +205,14 @@ class Source:
         return told
 
     def _value(self, cell: xr.Dataset, name: str) -> str:
-        values = np.ravel(marks.field(cell, name).values)
-        if name == DIFFERENCE:
+        values = np.ravel(cell[name].values)
+        if name == "difference":
             return f"{values[0]:+d}" if values[0] else "0"
-        flags = labels.flag_words(self.dataset, name)
+        flags = labels.flag_words(cell, name)
         if flags:
             return ", ".join(flags.get(int(v), str(v)) for v in values)
         finite = [f"{v:.6g}" for v in values if np.isfinite(v)]
-        return f"{', '.join(finite)} {labels.unit(self.dataset, name)}".strip() if finite else "none"
+        return f"{', '.join(finite)} {labels.unit(cell, name)}".strip() if finite else "none"
 
 
 def critical_symbol(name: str) -> str:

@@ -10,6 +10,7 @@ from urllib.parse import urlencode
 from sweep.config.faults import brief
 from sweep.explore.slices import Source
 from sweep.parameters import PARAMETERS
+from sweep.plots.quantities import subject
 
 MAX_CELLS = 6
 """Curves over each other; as many as there are colours that everybody can tell apart."""
@@ -26,7 +27,7 @@ class State:
     y: str
     """Empty for a dataset of one axis."""
     show: str
-    """A variable, or `difference`."""
+    """One of the source's variables."""
     at: Mapping[str, int] = field(default_factory=dict)
     """The index on each axis that is not drawn."""
     cells: tuple[Cell, ...] = ()
@@ -41,10 +42,12 @@ class State:
 
 
 def first(source: Source) -> State:
-    """What is shown when the address asks for nothing: the two longest axes, in the dataset's order."""
+    """What is shown when the address asks for nothing, over the two longest axes, in the dataset's order."""
     longest = sorted(source.dims, key=lambda d: -len(source.axes[d].values))[:2]
     x, *rest = [d for d in source.dims if d in longest]
-    return State(x, rest[0] if rest else "", source.variables[0], dict.fromkeys(source.axes, 0))
+    about = subject(source.dataset)
+    show = about if about in source.variables else source.variables[0]
+    return State(x, rest[0] if rest else "", show, dict.fromkeys(source.axes, 0))
 
 
 def write(state: State, source: Source, base: Cell) -> str:

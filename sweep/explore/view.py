@@ -207,7 +207,7 @@ class View:
 
     def _draw_curves(self) -> None:
         names = [
-            f"{k + 1}: {name}" + (f", {len(curve.reversals)} reversals" if curve else "")
+            f"{k + 1}: {name}" + (f", {labels.reversals(len(curve.reversals))}" if curve else "")
             for k, (name, curve) in enumerate(zip(self._names(), self._drawn.curves, strict=True))
         ]
         self._hint.visible = not any(self._drawn.curves)

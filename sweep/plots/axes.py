@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sweep.grid import Array
+from sweep.plots import labels
 from sweep.plots.panels import is_logarithmic
 
 
@@ -19,5 +20,5 @@ def set_scale(axes: Axes, which: Literal["x", "y"], values: Array) -> None:
     axis = axes.xaxis if which == "x" else axes.yaxis
     between = (1, 2, 5) if values[-1] < 1000 * values[0] else (1,)
     axis.set_major_locator(LogLocator(subs=between))
-    axis.set_major_formatter("{x:g}")
+    axis.set_major_formatter(lambda at, _: labels.number(at))
     axis.set_minor_formatter(NullFormatter())

@@ -48,13 +48,13 @@ def draw(dataset: xr.Dataset) -> Figure:
                         axes.plot(at[order], values[order], color=colour, linewidth=1, gid=variable, **style)
         axes.axhline(0, color="black", linewidth=0.5)
         axes.set_title(title(dataset, panel), fontsize=9)
-        axes.set_ylabel("spin n (√(g/c))", fontsize=9)
+        axes.set_ylabel(f"spin n ({labels.unit(dataset, 'n_c1_plus_simulated')})", fontsize=9)
         axes.tick_params(labelsize=8, labelbottom=k + columns >= len(panels))
         if x and k + columns >= len(panels):
             axes.set_xlabel(labels.label(dataset, x), fontsize=9)
     for axes in grid[len(panels) :]:
         axes.remove()
-    legends.below(figure, [*_names(), *_sources()])
+    legends.below(figure, [*_names(), *_sources(dataset)])
     return figure
 
 
@@ -63,5 +63,6 @@ def _names() -> list[Line2D]:
     return [Line2D([], [], color=colour, linewidth=4, label=words[name]) for name, colour in _COLOURS.items()]
 
 
-def _sources() -> list[Line2D]:
-    return [Line2D([], [], color="0.3", linewidth=1, label=words, **style) for words, style in _SOURCES.values()]
+def _sources(dataset: xr.Dataset) -> list[Line2D]:
+    present = [drawn for suffix, drawn in _SOURCES.items() if f"n_c1_plus{suffix}" in dataset]
+    return [Line2D([], [], color="0.3", linewidth=1, label=words, **style) for words, style in present]

@@ -17,8 +17,9 @@ from sweep.plots import labels, legends, theory
 from sweep.plots.axes import set_scale
 from sweep.plots.figure import Picture
 from sweep.plots.maps import arrangement
-from sweep.plots.marks import COMPARISONS, PREDICTIONS, blank, legend, marks
+from sweep.plots.marks import blank, legend, marks
 from sweep.plots.panels import Panels, heading, title
+from sweep.plots.quantities import COMPARISONS, PREDICTIONS
 from sweep.plots.scales import Limits
 
 _STYLES: dict[str, dict[str, Any]] = {
@@ -38,6 +39,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 def draw(panels: Panels, limits: Limits | None = None) -> Figure:
     """The variables over the one long axis, in a panel for each value of the others."""
     dataset, names = panels.dataset, [name for name in panels.names if name not in COMPARISONS] or panels.names
+    names = names[:1] + [name for name in names[1:] if dataset[name].notnull().any()]
     rows, columns = arrangement(len(panels.each), 2)
     width = min(7.0, 14 / columns)
     figure = Picture(figsize=(width * columns, 1.9 + 2.6 * rows), dpi=110, layout="constrained")
@@ -75,6 +77,8 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str | None) -> d
         values = np.where(empty, np.nan, np.atleast_1d(chosen[name].values).astype(float))
         style = {"marker": "x", "color": "C0"} | _STYLES.get(name, {})
         entries[name] = _points(axes, at, values, style, labels.words(chosen, name))
+        if name != names[0]:
+            continue
         for kind, where in kinds.items():
             if (some := np.atleast_1d(where.values)).any():
                 height = np.zeros(some.sum()) if empty[some].all() else values[some]

@@ -10,9 +10,12 @@ from sweep.kernels import status
 from sweep.models.surfaces import PARABOLOID
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
-from sweep.results.kind import is_of_own_body
+from sweep.results.kind import is_of_own_body, parameters
 
-SYMBOLS = {"mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀"}
+SYMBOLS = {
+    "mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀", "sigma": "σ",
+    "omega1": "ω₁", "omega2": "ω₂", "omega3": "ω₃",
+}  # fmt: skip
 
 STATUS_WORDS = {
     0: "not run",
@@ -35,6 +38,10 @@ _PARAMETER_WORDS = {
     "n0": "start spin n₀",
     "x0": "start contact point x₀",
     "y0": "start contact point y₀",
+    "sigma": "couple σ per angular velocity",
+    "omega1": "start angular velocity ω₁ about x",
+    "omega2": "start angular velocity ω₂ about y",
+    "omega3": "start angular velocity ω₃ about z",
     "case": "case",
     "trajectory": "trajectory",
 }
@@ -49,7 +56,7 @@ _VARIABLE_WORDS = {
     "reversals": "spin reversals, simulated",
     "reversals_predicted": "spin reversals, predicted (Takano 2011)",
     "difference": "simulated − predicted",
-    "ratio": "simulated / predicted",
+    "ratio": "first reversal, simulated / predicted",
     "regime": "regime of motion",
     "lyapunov": "largest Lyapunov exponent",
     "cycle_variation": "variation of the cycles",
@@ -75,6 +82,8 @@ _FLAG_WORDS = {"noise_limited": {0: "no", 1: "yes"}, "window_dependent": {0: "no
 _FLAG_WORDS["sensitive"] = _FLAG_WORDS["window_dependent"]
 
 # The scale of a dimensionless quantity at the end of its `long_name`, made of g, c and m: ", in 1/sqrt(g c)".
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 _SCALE = re.compile(r", in ((?:1/)?(?:sqrt\([gc/ ]+\)|[gcm](?: [gcm])*))(?=;|$)")
 
 
@@ -84,13 +93,13 @@ def symbol(name: str) -> str:
 
 
 def unit(dataset: xr.Dataset, name: str) -> str:
-    """The unit of a variable or coordinate as figures print it, such as √(g/c); empty for a plain number.
+    """The unit of a variable or coordinate as figures print it, such as √(g/c) or m²/s; empty for a plain number.
 
     A dimensionless quantity tells its scale at the end of its `long_name`: "…, in sqrt(g/c)".
     """
     units = str(dataset[name].attrs.get("units", "1"))
     if units != "1":
-        return {"radian": "rad"}.get(units, units)
+        return _fraction(units)
     scale = _SCALE.search(_long_name(dataset, name))
     return scale[1].replace("sqrt", "√") if scale else ""
 
@@ -119,15 +128,53 @@ def flag_words(dataset: xr.Dataset, name: str) -> dict[int, str]:
     return {value: known.get(value, meanings.get(value, str(value)).replace("_", " ")) for value in values}
 
 
+def number(at: float) -> str:
+    """A number as figures print it, such as −2×10⁻⁵."""
+    digits, _, power = f"{at:g}".partition("e")
+    digits = digits.replace("-", "−")
+    if not power:
+        return digits
+    ten = f"10{str(int(power)).translate(_SUPERSCRIPT)}"
+    return f"{digits.removesuffix('1')}{ten}" if digits in ("1", "−1") else f"{digits}×{ten}"
+
+
 def value(name: str, at: float) -> str:
     """A parameter with its value, such as "μ = 60"."""
-    return f"{symbol(name)} = {at:g}"
+    return f"{symbol(name)} = {number(at)}"
+
+
+def reversals(count: int) -> str:
+    """Such as "3 reversals"."""
+    return f"{count} reversal{'' if count == 1 else 's'}"
+
+
+def measured(dataset: xr.Dataset, name: str, at: float) -> str:
+    """A parameter with its value and its unit, unless that is one of the paper's."""
+    unitless = dataset[name].attrs.get("units", "1") == "1"
+    return value(name, at) if unitless else f"{value(name, at)} {unit(dataset, name)}"
 
 
 def constants(dataset: xr.Dataset) -> str:
-    """The parameters that are the same in the whole dataset, with their values."""
+    """The parameters that are the same in the whole dataset, with their values.
+
+    Those of a rattleback that are zero unless they are named are left out where they are zero.
+    """
     found = {str(name): float(v) for name, v in dataset.coords.items() if v.ndim == 0 and v.dtype.kind in "fi"}
-    return ", ".join(value(name, at) for name, at in found.items())
+    if not is_of_own_body(dataset):
+        found = {name: at for name, at in found.items() if at or name not in PARAMETERS or PARAMETERS[name].default}
+    ordered = [name for name in parameters(dataset) if name in found]
+    return ", ".join(measured(dataset, name, found[name]) for name in dict.fromkeys([*ordered, *found]))
+
+
+def _fraction(units: str) -> str:
+    """A CF unit such as "kg m2 s-1" as a fraction: kg m²/s."""
+    parts = [re.fullmatch(r"([A-Za-z]+)(-?)(\d*)", part) for part in units.replace("radian", "rad").split()]
+    if not all(parts):
+        return units
+    over, under = ([f"{p[1]}{p[3].translate(_SUPERSCRIPT)}" for p in parts if p and p[2] == sign] for sign in ("", "-"))
+    under = [part.removesuffix("¹") for part in under]
+    below = f"({' '.join(under)})" if len(under) > 1 else "".join(under)
+    return f"{' '.join(over) or 1}/{below}" if below else " ".join(over)
 
 
 def _long_name(dataset: xr.Dataset, name: str) -> str:

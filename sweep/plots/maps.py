@@ -16,8 +16,9 @@ from sweep.grid import Array
 from sweep.plots import cells, labels, legends, scales, theory
 from sweep.plots.axes import set_scale
 from sweep.plots.figure import Picture
-from sweep.plots.marks import COMPARISONS, blank, legend, marks
+from sweep.plots.marks import blank, legend, marks
 from sweep.plots.panels import Panels, edges, heading, title
+from sweep.plots.quantities import COMPARISONS
 from sweep.plots.scales import Limits, Scale
 
 _MAX_VALUES = 1000
@@ -40,6 +41,7 @@ _TITLES = {
     "reversals_predicted": "predicted (Takano 2011)",
     "t_first_reversal": "simulated",
     "t_first_reversal_predicted": "predicted (Garcia and Hubbard 1988)",
+    "ratio": "simulated / predicted",
 }
 _SMALL_TITLES = dict.fromkeys(("reversals", "t_first_reversal"), "simulated")
 _SMALL_TITLES |= dict.fromkeys(("reversals_predicted", "t_first_reversal_predicted"), "predicted")
@@ -133,12 +135,17 @@ def _scale(chosen: xr.Dataset, panels: Panels, name: str, limits: Limits | None,
     if "flag_values" in chosen[name].attrs:
         return scales.flags(list(_flags_present(panels.dataset, name)), cmap)
     own = (limits, cmap) if panels.names == [name] else (None, None)
-    if name == "difference":
-        return scales.differences(_values(chosen, name), *own)
-    if name == "ratio":
-        return scales.ratios(_values(chosen, name), *own)
+    if name in COMPARISONS:
+        return _of_numbers(name, _values(chosen, name), *own)
     together = np.concatenate([_values(chosen, other) for other in panels.names if other not in COMPARISONS])
-    return (scales.counts if chosen[name].dtype.kind == "i" else scales.continuous)(together, limits, cmap)
+    return _of_numbers(name, together, limits, cmap)
+
+
+def _of_numbers(name: str, values: Array, limits: Limits | None, cmap: str | None) -> Scale:
+    """The scale of a variable without flags."""
+    compared = {"difference": scales.differences, "ratio": scales.ratios}
+    other = scales.counts if values.dtype.kind == "i" else scales.continuous
+    return compared.get(name, other)(values, limits, cmap)
 
 
 def shared_scale(each: list[Panels], limits: Limits | None, cmap: str | None) -> Scale:
@@ -148,9 +155,7 @@ def shared_scale(each: list[Panels], limits: Limits | None, cmap: str | None) ->
     if flagged:
         return scales.flags(sorted({value for dataset in flagged for value in _flags_present(dataset, name)}), cmap)
     values = np.concatenate([_values(panels.dataset, name) for panels in each])
-    if name == "difference":
-        return scales.differences(values, limits, cmap)
-    return (scales.counts if values.dtype.kind == "i" else scales.continuous)(values, limits, cmap)
+    return _of_numbers(name, values, limits, cmap)
 
 
 def _values(chosen: xr.Dataset, name: str) -> Array:
@@ -189,9 +194,9 @@ def label_axes(axes: Axes, panels: Panels, *, left: bool = True, lowest: bool = 
 
 def draw_bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
     """Draw the bar of a scale, with what it shows."""
-    bar = Colorbar(axes, scale.mappable())
+    bar = Colorbar(axes, scale.mappable(), extend=scale.arrows)
     words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name.removesuffix("_predicted"))
-    bar.set_label(words, fontsize=8)
+    bar.set_label(f"{words}\n", fontsize=8)  # an empty line, or it would seem to belong to the next map
     axes.tick_params(labelsize=7)
     scale.label(bar)
 
@@ -206,6 +211,9 @@ def _legend(figure: Figure, panels: Panels, lines: dict[str, Artist]) -> None:
         for (value, count), colour in zip(present.items(), colours, strict=True):
             words = f"{meanings.get(value, value)} ({count} of {dataset[name].size})"
             handles.append(Patch(facecolor=colour, edgecolor="0.3", label=words))
-    handles += [cells.handle(kind, words) for kind, words in legend(dataset, name).items()]
+    kinds = legend(dataset, name)
+    if "no_value" in (compared := legend(dataset, panels.names[-1])):
+        kinds["no_value"] = compared["no_value"]
+    handles += [cells.handle(kind, words) for kind, words in kinds.items()]
     handles += lines.values()
     legends.below(figure, handles)

@@ -13,8 +13,8 @@ import xarray as xr
 
 from sweep.grid import Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT
-from sweep.plots import regimes
 from sweep.plots.labels import STATUS_WORDS, flag_words
+from sweep.plots.quantities import DERIVED, field
 from sweep.results.dataset import VARIABLES
 
 WORDS = {
@@ -38,6 +38,7 @@ _GROWING = {"reversals", "raw_reversals", "reversals_low", "reversals_high", "t_
 _PER_VARIABLE = {
     ("t_last_reversal", "no_value"): "no reversal",
     ("t_first_reversal", "no_value"): "no reversal",
+    ("t_first_reversal_predicted", "no_value"): "none predicted",
     ("ratio", "no_value"): "no reversal, or none predicted",
     ("reversal_times", "no_value"): "no such reversal",
     ("spin_final", "time_limit"): "not settled: ended at the time limit",
@@ -46,45 +47,12 @@ _PER_VARIABLE = {
 }
 
 
-PREDICTIONS = {
-    "reversals": ("reversals_predicted", "difference"),
-    "t_first_reversal": ("t_first_reversal_predicted", "ratio"),
-}
-"""What is drawn beside a simulated variable: the predicted one, and how the two compare."""
-
-COMPARISONS = tuple(comparison for _, comparison in PREDICTIONS.values())
-
-
-def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """A variable; `difference`: how many more reversals are simulated than predicted; `ratio`: how many times as late
-    the first reversal is simulated as predicted; or `regime` (`sweep.plots.regimes`).
-
-    Raises
-    ------
-    ValueError
-        if there is no such variable.
-    """
-    if name == "difference" and {"reversals", "reversals_predicted"} <= set(dataset.data_vars):
-        found = dataset["reversals"].astype("int32") - dataset["reversals_predicted"]
-        long_name = "spin reversals simulated less those predicted by Takano (2011)"
-        return found.rename(name).assign_attrs(long_name=long_name, units="1")
-    if name == "ratio" and {"t_first_reversal", "t_first_reversal_predicted"} <= set(dataset.data_vars):
-        found = dataset["t_first_reversal"] / dataset["t_first_reversal_predicted"]
-        long_name = "time of the first spin reversal, simulated, divided by that of Garcia and Hubbard (1988)"
-        return found.rename(name).assign_attrs(long_name=long_name, units="1")
-    if name == "regime" and set(regimes.NEEDS) <= set(dataset.data_vars):
-        return regimes.regimes(dataset)
-    if name not in dataset.data_vars:
-        raise ValueError(f"no variable {name}; allowed: {', '.join(map(str, dataset.data_vars))}")
-    return dataset[name]
-
-
 def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     """For each kind in `WORDS`, where the cells are of that kind.
 
     Parameters
     ----------
-    name : as `field` takes it
+    name : as `sweep.plots.quantities.field` takes it
 
     Returns
     -------
@@ -162,4 +130,4 @@ def meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
 
 
 def _is_simulated(name: str) -> bool:
-    return name in (*COMPARISONS, "regime", "t_stop") or (name in VARIABLES and VARIABLES[name].of_sound_runs)
+    return name in DERIVED or name == "t_stop" or (name in VARIABLES and VARIABLES[name].of_sound_runs)

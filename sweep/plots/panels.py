@@ -17,7 +17,7 @@ import xarray as xr
 from sweep.grid import Array
 from sweep.models.analytic import best_b
 from sweep.plots import labels
-from sweep.plots.marks import PREDICTIONS, field
+from sweep.plots.quantities import PREDICTIONS, field, subject
 
 MAX_PANELS = 8
 """Panels that a figure may have."""
@@ -101,7 +101,7 @@ def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:
 
 def title(dataset: xr.Dataset, panel: dict[str, int]) -> str:
     """What sets a panel apart from the others."""
-    return ", ".join(labels.value(d, float(dataset[d][i])) for d, i in panel.items())
+    return ", ".join(labels.measured(dataset, d, float(dataset[d][i])) for d, i in panel.items())
 
 
 def heading(dataset: xr.Dataset, width: float) -> str:
@@ -112,7 +112,8 @@ def heading(dataset: xr.Dataset, width: float) -> str:
 def in_lines(constants: str, width: float) -> str:
     """Constants in lines that break between them, for a figure of so many inches."""
     space = "\N{NO-BREAK SPACE}"
-    return fill(constants.replace(" = ", f"{space}={space}"), min(_HEADING, int(_LETTERS * width))).replace(space, " ")
+    breakable = constants.replace(" ", space).replace(f",{space}", ", ")
+    return fill(breakable, min(_HEADING, int(_LETTERS * width)), break_on_hyphens=False).replace(space, " ")
 
 
 def best_shape(dataset: xr.Dataset) -> float | None:
@@ -146,18 +147,12 @@ def _midpoints(values: Array) -> Array:
 
 
 def _variables(dataset: xr.Dataset, variable: str | None) -> list[str]:
-    """The variables to draw: by default the reversals; those with a prediction beside it, and how the two compare."""
-    if variable is None:
-        variable = next((name for name in ("reversals", "reversals_predicted") if name in dataset), "spin_final")
-        if variable in PREDICTIONS:
-            return _beside_prediction(dataset, variable)
-    field(dataset, variable)  # raises if there is none
-    return _beside_prediction(dataset, variable) if variable == "t_first_reversal" else [variable]
-
-
-def _beside_prediction(dataset: xr.Dataset, variable: str) -> list[str]:
-    predicted, comparison = PREDICTIONS[variable]
-    return [variable, predicted, comparison] if predicted in dataset else [variable]
+    """The variables to draw: by default what the dataset is about; a prediction beside it, and how the two compare."""
+    chosen = variable or subject(dataset)
+    field(dataset, chosen)  # raises if there is none
+    predicted, comparison = PREDICTIONS.get(chosen, ("", ""))
+    alone = predicted not in dataset or variable == "reversals"
+    return [chosen] if alone else [chosen, predicted, comparison]
 
 
 def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:

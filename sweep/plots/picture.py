@@ -11,6 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sweep.plots import beside, critical, curves, maps, panels, scales, trajectories
+from sweep.plots.quantities import subject
 from sweep.plots.scales import Limits
 from sweep.results.kind import CRITICAL, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
@@ -46,9 +47,9 @@ def plot(
     ----------
     dataset : a dataset, or the path of its file.  Of several, maps of one variable are drawn side by side, with one
         scale
-    variable : by default the reversals, simulated and predicted, and `difference`, which may also be named; of
-        `t_first_reversal` the prediction and the `ratio` are drawn beside it; `regime` is told from the measurements
-        `reversals`, `cycles` and `lyapunov`
+    variable : of the dataset, or one of `sweep.plots.quantities.DERIVED`; by default what the run's `measure` names
+        first, or else the reversals.  Beside these and beside `t_first_reversal` stand their prediction and how the
+        two compare: the `difference` or the `ratio`
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
         the values of the other axes gets a panel, up to eight
     sel : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
@@ -113,7 +114,8 @@ def _beside(
     """The figure of several datasets."""
     if not datasets or any(kind(each) in (CRITICAL, TRAJECTORY) for each in datasets):
         raise ValueError("several datasets; allowed: side by side, those of runs")
-    return beside.draw([panels.choose(each, variable, **axes) for each in datasets], limits, cmap)
+    common = variable or subject(datasets[0])
+    return beside.draw([panels.choose(each, common, **axes) for each in datasets], limits, cmap)
 
 
 def suffix(path: Path) -> str:

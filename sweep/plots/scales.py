@@ -19,6 +19,7 @@ from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, N
 from sweep.grid import Array
 
 Limits = tuple[float, float]
+Arrows = Literal["both", "min", "max", "neither"]
 
 SEQUENTIAL, DIVERGING = "viridis", "PuOr_r"
 
@@ -42,6 +43,8 @@ class Scale:
     norm: Normalize
     labels: list[str] | None = None
     """For each colour, what it stands for; None for a continuous scale."""
+    arrows: Arrows = "neither"
+    """Ends of the bar beyond which there are values."""
 
     def rgba(self, values: Array) -> Array:
         return np.asarray(self.colours(self.norm(values)))
@@ -109,16 +112,17 @@ def continuous(values: Array, limits: Limits | None = None, name: str | None = N
     low, high = limits or ((float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0))
     if low < 0 < high:
         high = max(-low, high)
-        return Scale(colour_map(name or DIVERGING), Normalize(-high, high))
+        return _smooth(finite, Normalize(-high, high), name or DIVERGING)
     norm = LogNorm(low, high) if low > 0 and high > 100 * low else Normalize(low, high)
-    return Scale(colour_map(name or SEQUENTIAL), norm)
+    return _smooth(finite, norm, name or SEQUENTIAL)
 
 
 def ratios(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
     """A diverging scale of positive numbers, logarithmic and the same on both sides of one."""
-    finite = np.abs(np.log(values[np.isfinite(values) & (values > 0)]))
-    top = max(np.abs(np.log(limits))) if limits else min(float(finite.max(initial=0.01)), log(_MAX_RATIO))
-    return Scale(colour_map(name or DIVERGING), LogNorm(exp(-top), exp(top)))
+    finite = values[np.isfinite(values) & (values > 0)]
+    most = float(np.abs(np.log(finite)).max(initial=0.01))
+    top = max(np.abs(np.log(limits))) if limits else min(most, log(_MAX_RATIO))
+    return _smooth(finite, LogNorm(exp(-top), exp(top)), name or DIVERGING)
 
 
 def flags(present: list[int], name: str | None = None) -> Scale:
@@ -126,6 +130,18 @@ def flags(present: list[int], name: str | None = None) -> Scale:
     shades = colour_map(name or SEQUENTIAL)(np.linspace(0.95, 0.05, len(present)))
     bounds = [present[0] - 0.5, *((a + b) / 2 for a, b in pairwise(present)), present[-1] + 0.5]
     return Scale(ListedColormap(shades), BoundaryNorm(bounds, len(present)))
+
+
+def _smooth(values: Array, norm: Normalize, name: str) -> Scale:
+    """A continuous scale, with arrows where values lie beyond it."""
+    low, high = norm.vmin or 0.0, norm.vmax or 0.0
+    slack = 1e-9 * max(abs(low), abs(high))
+    arrows = _arrows(bool((values < low - slack).any()), bool((values > high + slack).any()))
+    return Scale(colour_map(name), norm, arrows=arrows)
+
+
+def _arrows(below: bool, above: bool) -> Arrows:
+    return "both" if below and above else "min" if below else "max" if above else "neither"
 
 
 def _steps(top: int, most: int) -> Array:
@@ -142,12 +158,10 @@ def _steps(top: int, most: int) -> Array:
 def _stepped(steps: Array, colours: Colormap, below: bool, above: bool) -> Scale:
     """A colour for each of the ranges of integers that begin at `steps`."""
     number = len(steps) - 1 + below + above
-    ends: Literal["both", "min", "max", "neither"] = (
-        "both" if below and above else "min" if below else "max" if above else "neither"
-    )
-    norm = BoundaryNorm(steps - 0.5, number, extend=ends)
+    arrows = _arrows(below, above)
+    norm = BoundaryNorm(steps - 0.5, number, extend=arrows)
     labels = [_integers(first, last - 1) for first, last in pairwise(steps.tolist())]
-    return Scale(colours.resampled(number), norm, labels)
+    return Scale(colours.resampled(number), norm, labels, arrows)
 
 
 def _integers(first: int, last: int) -> str:

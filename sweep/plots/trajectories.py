@@ -72,7 +72,8 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     for k, (title, names) in enumerate(panels):
         axes = figure.add_subplot(grid[1 + k // 2, k % 2], sharex=first)
         _series(axes, dataset, names)
-        axes.set_title(title, fontsize=9, loc="left")
+        per_mass = " per unit mass" if "per unit mass" in dataset[next(iter(names))].attrs.get("long_name", "") else ""
+        axes.set_title(f"{title}{per_mass}", fontsize=9, loc="left")
         axes.tick_params(labelbottom=k >= len(panels) - 2)
         if k >= len(panels) - 2:
             axes.set_xlabel(labels.label(dataset, "time"), fontsize=9)
@@ -181,8 +182,8 @@ def _label(dataset: xr.Dataset, i: int) -> str:
     """The parameters that set this trajectory apart from the others, and its number of reversals."""
     varying = [name for name in parameters(dataset) if len(set(np.ravel(dataset[name].values))) > 1]
     names = varying or [name for name in ("n0", "omega3") if name in dataset]
-    named = ", ".join(labels.value(name, float(np.ravel(dataset[name].values)[i])) for name in names)
-    return f"{named}: {int(dataset['reversals'][i])} reversals" if "reversals" in dataset else named
+    named = ", ".join(labels.measured(dataset, name, float(np.ravel(dataset[name].values)[i])) for name in names)
+    return f"{named}: {labels.reversals(int(dataset['reversals'][i]))}" if "reversals" in dataset else named
 
 
 def _with_unit(words: str, unit: str) -> str:
@@ -192,5 +193,5 @@ def _with_unit(words: str, unit: str) -> str:
 def _constants_apart(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the parameters that all trajectories share as scalar coordinates."""
     values = {name: set(np.ravel(dataset[name].values)) for name in parameters(dataset)}
-    shared = {name: float(found.pop()) for name, found in values.items() if len(found) == 1}
+    shared = {name: ((), found.pop(), dataset[name].attrs) for name, found in values.items() if len(found) == 1}
     return dataset.drop_vars(list(shared)).assign_coords(shared)

@@ -66,6 +66,7 @@ def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] =
     return {
         "config": identity.config,
         "config_hash": identity.config_hash,
+        "measured": " ".join(config.measure),
         "source_hash": identity.source_hash,
         "versions": identity.versions,
         **_brought(config),

@@ -10,7 +10,8 @@ from sweep.kernels.status import DIVERGED, LIFT_OFF, SETTLED, TIME_LIMIT
 from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 from sweep.plots.labels import STATUS_WORDS
-from sweep.plots.marks import WORDS, blank, field, in_words, legend, marks
+from sweep.plots.marks import WORDS, blank, in_words, legend, marks
+from sweep.plots.quantities import field
 from sweep.results.dataset import STATUSES, VARIABLES, described
 
 STATUS = [SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, 0, SETTLED]
@@ -112,6 +113,41 @@ def test_labels(cells: xr.Dataset) -> None:
     plain["torque"].attrs = {"long_name": "torque, in all", "units": "N m"}
     assert labels.label(plain, "torque") == "torque, in all (N m)"
     assert labels.label(xr.Dataset({"other_thing": 1.0}), "other_thing") == "other thing"
+
+
+@pytest.mark.parametrize(
+    ("units", "written"),
+    [("kg m2 s-1", "kg m²/s"), ("radian s-1", "rad/s"), ("s m-1", "s/m"), ("m s-2", "m/s²"), ("s-1", "1/s"),
+     ("W m-2 K-1", "W/(m² K)"), ("m/s", "m/s"), ("", "")],
+)  # fmt: skip
+def test_units_are_written_as_fractions(units: str, written: str) -> None:
+    assert labels.unit(xr.Dataset({"x": ((), 1.0, {"units": units})}), "x") == written
+
+
+@pytest.mark.parametrize(
+    ("at", "written"),
+    [
+        (0.05, "0.05"),
+        (-5, "−5"),
+        (-2e-5, "−2×10⁻⁵"),
+        (1e-7, "10⁻⁷"),
+        (-1e-7, "−10⁻⁷"),
+        (1.1e-7, "1.1×10⁻⁷"),
+        (1e9, "10⁹"),
+    ],
+)
+def test_numbers(at: float, written: str) -> None:
+    assert labels.number(at) == written
+
+
+def test_constants_stand_in_the_order_of_the_reference() -> None:
+    si = {"Ixz": 0.0, "mass": (1.0, "kg"), "omega3": 0.0, "n0": (-5.0, "radian s-1"), "a": (0.2, "m"), "offset": 0.0}
+    pairs = {name: v if isinstance(v, tuple) else (v, "1") for name, v in si.items()}
+    dataset = xr.Dataset(coords={name: ((), v, {"units": units}) for name, (v, units) in pairs.items()})
+    assert labels.constants(dataset) == "a = 0.2 m, mass = 1 kg, n₀ = −5 rad/s"
+    # Zero is nothing special in a user's model, whose parameters may have any names.
+    own = dataset.assign_attrs(model_brings="a model", model_parameters="mass Ixz")
+    assert labels.constants(own).startswith("mass = 1 kg, Ixz = 0, omega3".replace("omega3", "ω₃"))
 
 
 def test_no_variable_keeps_its_scale_in_its_words() -> None:

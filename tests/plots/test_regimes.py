@@ -10,7 +10,8 @@ import xarray as xr
 
 import sweep
 from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
-from sweep.plots.marks import field, legend
+from sweep.plots.marks import legend
+from sweep.plots.quantities import field
 from sweep.plots.regimes import FEW, REGIMES, REGULAR, SETTLES, UNDECIDED, WANDERS
 
 

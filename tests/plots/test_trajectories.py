@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from support.cli import invoke, refused
 
 from sweep.plots import picture, trajectories
+from sweep.plots.panels import in_lines
 from sweep.results.dataset import VARIABLES
 
 Write = Callable[..., Path]
@@ -71,6 +72,33 @@ def test_axes_have_plain_names() -> None:
     assert figure.axes[0].get_ylabel() == "spin n (√(g/c))"
     assert figure.axes[-1].get_xlabel() == "time t (√(c/g))"
     assert "b = 3" in figure.get_suptitle()
+
+
+def test_a_body_in_si_has_its_units_everywhere() -> None:
+    dataset = made([60, 60], a=0.2, n0=[-1.0, 2.0])
+    for name, units in (("a", "m"), ("n0", "radian s-1"), ("spin", "radian s-1"), ("energy", "m2 s-2")):
+        dataset[name].attrs = {"units": units, "long_name": f"{name} per unit mass" if name == "energy" else name}
+    dataset["reversals"][:] = [1, 2]
+    figure = trajectories.draw(dataset)
+    assert figure.get_suptitle().startswith("a = 0.2 m,")
+    assert entries(figure)[:2] == ["n₀ = −1 rad/s: 1 reversal", "n₀ = 2 rad/s: 2 reversals"]
+    assert figure.axes[0].get_ylabel() == "spin n (rad/s)"
+    assert (figure.axes[-1].get_title("left"), figure.axes[-1].get_ylabel()) == ("energy per unit mass", "m²/s²")
+
+
+def test_critical_spins_have_their_unit_and_sources() -> None:
+    spins = {f"{name}_simulated": ("mu", [1.0, 2.0], {"units": "radian s-1"}) for name in CRITICAL}
+    figure = picture.draw(xr.Dataset({**spins, "critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]}))
+    assert figure.axes[0].get_ylabel() == "spin n (rad/s)"
+    assert entries(figure)[2:] == ["simulation"]
+
+
+def test_constants_break_between_them_alone() -> None:
+    constants = "a = 0.2 m, Ixy = −2×10⁻⁵ kg m², gravity = 9.81 m/s²"
+    for width in np.linspace(1.8, 4, 40):
+        lines = in_lines(constants, width).split("\n")
+        assert all(line.endswith(",") for line in lines[:-1])
+        assert " ".join(lines) == constants
 
 
 def test_one_series_is_drawn_alone() -> None:

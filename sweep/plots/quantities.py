@@ -1,0 +1,95 @@
+"""What can be drawn of a dataset: its variables, what is derived from them, and which of these it is about.
+
+Pictures and the explorer both ask here.  From the dataset alone, and without any library that draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import xarray as xr
+
+from sweep.kernels.measures import MEASURES
+from sweep.plots import regimes
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A quantity that no dataset stores."""
+
+    needs: tuple[str, ...]
+    """The variables from which it is derived."""
+    derive: Callable[[xr.Dataset], xr.DataArray]
+
+
+def _difference(dataset: xr.Dataset) -> xr.DataArray:
+    found = dataset["reversals"].astype("int32") - dataset["reversals_predicted"]
+    long_name = "spin reversals simulated less those predicted by Takano (2011)"
+    return found.rename("difference").assign_attrs(long_name=long_name, units="1")
+
+
+def _ratio(dataset: xr.Dataset) -> xr.DataArray:
+    found = dataset["t_first_reversal"] / dataset["t_first_reversal_predicted"]
+    long_name = "time of the first spin reversal, simulated, divided by that of Garcia and Hubbard (1988)"
+    return found.rename("ratio").assign_attrs(long_name=long_name, units="1")
+
+
+PREDICTIONS = {
+    "reversals": ("reversals_predicted", "difference"),
+    "t_first_reversal": ("t_first_reversal_predicted", "ratio"),
+}
+"""What is drawn beside a simulated variable: the predicted one, and how the two compare."""
+
+COMPARISONS = tuple(comparison for _, comparison in PREDICTIONS.values())
+
+DERIVED = {
+    "difference": Derived(("reversals", "reversals_predicted"), _difference),
+    "ratio": Derived(("t_first_reversal", "t_first_reversal_predicted"), _ratio),
+    "regime": Derived(regimes.NEEDS, regimes.regimes),
+}
+"""`difference`: how many more reversals are simulated than predicted; `ratio`: how many times as late the first
+reversal is simulated as predicted; `regime`: see `sweep.plots.regimes`."""
+
+_SERVE = {"cycles": "regime", "lyapunov": "regime"}
+"""The derived quantity that a measurement serves."""
+
+
+def derivable(dataset: xr.Dataset) -> list[str]:
+    """The quantities that can be derived from the variables of a dataset."""
+    return [name for name, derived in DERIVED.items() if set(derived.needs) <= set(dataset.data_vars)]
+
+
+def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """A variable, or one of the quantities `DERIVED`.
+
+    Raises
+    ------
+    ValueError
+        if the dataset has no such variable, nor those from which it is derived.
+    """
+    if name in (possible := derivable(dataset)):
+        return DERIVED[name].derive(dataset)
+    if name not in dataset.data_vars:
+        raise ValueError(f"no variable {name}; allowed: {', '.join([*map(str, dataset.data_vars), *possible])}")
+    return dataset[name]
+
+
+def with_derived(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with all that can be derived from its variables."""
+    return dataset.assign({name: field(dataset, name) for name in derivable(dataset)})
+
+
+def subject(dataset: xr.Dataset) -> str:
+    """The variable that a dataset is about, which is shown where none is named.
+
+    It is the first variable of the measurement that the configuration names first, or the quantity that this serves.
+    Where it is lacking, it is the reversals.
+    """
+    measurement = str(dataset.attrs.get("measured", "")).partition(" ")[0].partition("=")[0]
+    served = [_SERVE[measurement]] if measurement in _SERVE else []
+    variables = MEASURES[measurement].variables if measurement in MEASURES else {}
+    own = [name for name, spec in variables.items() if not spec.along]
+    there = {*map(str, dataset.data_vars), *derivable(dataset)}
+    wanted = (*served, *own[:1], "reversals", "reversals_predicted")
+    return next((name for name in wanted if name in there), "spin_final")

@@ -1,0 +1,161 @@
+"""What can be drawn of a dataset, and what it is about, is the same for pictures and the explorer; nothing is run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import ROOT
+
+import sweep
+from sweep.config import load_config
+from sweep.explore import state
+from sweep.explore.colours import scale
+from sweep.explore.slices import Source
+from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
+from sweep.plots import labels, picture
+from sweep.plots.quantities import DERIVED, derivable, field, subject
+from sweep.plots.regimes import REGIMES, REGULAR, UNDECIDED
+from sweep.results.provenance import provenance
+
+SIZE = (6, 7)
+
+
+@pytest.fixture
+def whole() -> xr.Dataset:
+    """A dataset with all that a quantity is derived from: half of it reverses regularly, one cell has lifted off.
+
+    The first reversal comes 1.25 times as late as predicted, in the last row 5 times, and in one cell never.
+    """
+    late = np.full(SIZE, 1.25)
+    late[-1] = 5
+    late[2, 3] = np.nan
+    status = np.full(SIZE, TIME_LIMIT, "int8")
+    status[0, 0] = LIFT_OFF
+    values: dict[str, Any] = {
+        "status": status,
+        "reversals": np.full(SIZE, 30, "int16"),
+        "reversals_predicted": np.full(SIZE, 28, "int16"),
+        "cycle_variation": np.where(np.arange(SIZE[1]) < 4, 1e-4, 0.2) * np.ones(SIZE),
+        "lyapunov": np.zeros(SIZE),
+        "lyapunov_error": np.ones(SIZE),
+        "t_first_reversal": 100 * late,
+        "t_first_reversal_predicted": np.full(SIZE, 100.0),
+        "energy_error": np.full(SIZE, 1e-9),
+    }
+    axes = {"n0": np.geomspace(0.01, 0.1, SIZE[0]), "delta": np.geomspace(0.02, 0.4, SIZE[1])}
+    return xr.Dataset({name: (tuple(axes), v) for name, v in values.items()}, axes)
+
+
+def titles(figure: Any) -> list[str]:
+    return [axes.get_title() for axes in figure.axes if axes.get_title()]
+
+
+COUNTS = ["simulated", "predicted (Takano 2011)", "simulated − predicted"]
+TIMES = ["simulated", "predicted (Garcia and Hubbard 1988)", "simulated / predicted"]
+SHOWN = {
+    "": ("reversals", COUNTS),
+    "reversals first_reversal cycles lyapunov": ("reversals", COUNTS),
+    "first_reversal reversals": ("t_first_reversal", TIMES),
+    "lyapunov cycles reversals": ("regime", ["regime of motion"]),
+    "energy_error reversals": ("energy_error", ["largest error of the energy, relative"]),
+    "reversal_times=12 reversals": ("reversals", COUNTS),
+    "noise_limited reversals": ("reversals", COUNTS),  # which this dataset does not have
+}
+
+
+@pytest.mark.parametrize("measured", SHOWN)
+def test_what_is_measured_first_is_shown_first(measured: str, whole: xr.Dataset) -> None:
+    dataset = whole.assign_attrs(measured=measured)
+    variable, maps = SHOWN[measured]
+    assert subject(dataset) == variable
+    assert titles(sweep.plot(dataset)) == maps
+    assert state.first(Source(dataset)).show == variable
+    beside = picture.draw([dataset, whole])  # which does not say what it measured
+    assert beside.get_suptitle().startswith(labels.words(field(dataset, variable).to_dataset(name=variable), variable))
+
+
+def test_several_numbers_a_cell_are_no_picture(whole: xr.Dataset) -> None:
+    times = ("n0", "delta", "reversal"), np.ones((*SIZE, 12))
+    assert subject(whole.assign(reversal_times=times).assign_attrs(measured="reversal_times=12")) == "reversals"
+
+
+def test_reversals_that_are_named_are_drawn_alone(whole: xr.Dataset) -> None:
+    assert titles(sweep.plot(whole, "reversals")) == ["spin reversals, simulated"]
+
+
+def test_without_the_cycles_an_exponent_is_shown_itself(whole: xr.Dataset) -> None:
+    dataset = whole.drop_vars("cycle_variation").assign_attrs(measured="lyapunov reversals")
+    assert subject(dataset) == "lyapunov"
+
+
+@pytest.mark.parametrize(
+    ("name", "variable"),
+    [
+        ("regimes", "regime"),
+        ("reversal_time", "t_first_reversal"),
+        ("mu_b", "reversals"),
+        ("kane_levinson", "reversals"),
+    ],
+)
+def test_the_picture_of_a_configuration_shows_what_it_is_about(name: str, variable: str, whole: xr.Dataset) -> None:
+    config = load_config(ROOT / "configs" / f"{name}.yaml")
+    assert subject(whole.assign_attrs(provenance(config, 1.0, 1))) == variable
+
+
+def test_a_run_tells_what_it_measured(small: xr.Dataset) -> None:
+    assert small.attrs["measured"].split()[0] == "reversals"
+    assert "energy_error" in small.attrs["measured"].split()
+
+
+def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
+    source = Source(whole)
+    assert set(DERIVED) == set(derivable(whole)) < set(source.variables)
+    assert source.variables[:5] == ["reversals", "reversals_predicted", "difference", "ratio", "regime"]
+    for name in source.variables:
+        picture.draw(whole, name)
+        part = source.slice(name, "delta", "n0", {})
+        np.testing.assert_array_equal(part.values, field(whole, name).values)
+        assert scale(part).palette
+    assert not set(DERIVED) & set(Source(whole[["status", "reversals", "energy_error"]]).variables)
+
+
+def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None:
+    source = Source(whole)
+    for (i, j), regime in (((1, 1), REGULAR), ((1, 5), UNDECIDED)):
+        told = source.describe({"n0": i, "delta": j})
+        assert told["regime of motion"] == REGIMES[regime].replace("_", " ")
+        assert told["first reversal, simulated / predicted"] == "1.25"
+        assert told["simulated − predicted"] == "+2"
+    assert source.slice("regime", "delta", "n0", {}).legend["failed"] == "failed: 1 lifted off the table (1 of 42)"
+
+
+def test_ratios_have_the_same_scale_in_pictures_and_explorer(whole: xr.Dataset) -> None:
+    found = scale(Source(whole).slice("ratio", "delta", "n0", {}))
+    figure = picture.draw(whole, "ratio")
+    norm = figure.axes[0].collections[0].norm
+    assert (found.low, found.high) == (norm.vmin, norm.vmax) == (0.5, 2)
+    assert (found.logarithmic, found.words[found.ticks[2]]) == (True, "1")
+    assert found.beyond == "the last colours also stand for ratios up to 5"
+
+
+@pytest.mark.parametrize(("variable", "limits", "arrows"), [("ratio", None, "max"), ("energy_error", None, "neither"),
+                                                            ("t_first_reversal", (100, 200), "max"),
+                                                            ("lyapunov_error", (2, 3), "min")])  # fmt: skip
+def test_a_bar_has_arrows_where_values_lie_beyond(variable: str, limits: Any, arrows: str, whole: xr.Dataset) -> None:
+    bars = [axes for axes in picture.draw(whole, variable, limits=limits).axes if hasattr(axes, "_colorbar")]
+    assert bars[0]._colorbar.extend == arrows
+
+
+def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None:
+    whole["t_first_reversal_predicted"][:, :2] = np.nan
+    (legend,) = picture.draw(whole, "t_first_reversal").legends
+    assert "no reversal, or none predicted (12 of 42)" in [text.get_text() for text in legend.get_texts()]
+    whole["t_first_reversal_predicted"][3:5, 3] = np.nan
+    figure = picture.draw(whole.isel(delta=3), "t_first_reversal")
+    (missing,) = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
+    assert (missing.get_label(), len(missing.get_xdata())) == ("no reversal (1 of 6)", 1)
+    none = picture.draw(whole.isel(delta=1), "t_first_reversal")
+    assert [text.get_text() for text in none.legends[0].get_texts()] == ["time of the first reversal"]
