@@ -115,16 +115,21 @@ def test_the_exponent_is_that_of_their_equations() -> None:
     starts = stack(config.equations.start(body)).T
     for i, p in enumerate(cells):
         full, length = int(table["full_bins"][i]), table["bin_width"][i] * BLOCK * table["step"][i]
-        times = np.array([full - full // 2, full]) * length
-
-        def both(_: float, q: np.ndarray, p: dict[str, float] = p) -> np.ndarray:
-            return np.concatenate([motion(q[:6], p)[0], slope(lambda z: motion(z, p)[0], q[:6], q[6:])])
-
         np.testing.assert_allclose(starts[i], set_off(p), rtol=1e-12, atol=1e-13)
-        q = np.concatenate([to_theirs(set_off(p), p), slope(lambda y: to_theirs(y, p), set_off(p), np.full(5, 5**-0.5))])
-        end = solve_ivp(both, (0, times[1]), q, "DOP853", times, rtol=1e-10, atol=1e-10).y.T
-        grown = [np.linalg.norm(slope(lambda z: to_ours(z, p), each[:6], each[6:])) for each in end]
-        assert found[i] == pytest.approx(np.log(grown[1] / grown[0]) / np.diff(times)[0], abs=1e-4)
+        assert found[i] == pytest.approx(growth(p, (full - full // 2) * length, full * length), abs=1e-4)
+
+
+def growth(p: dict[str, float], begin: float, end: float) -> float:
+    """The mean rate at which a tangent (1, …, 1) to the states grows between two times."""
+
+    def both(_: float, q: np.ndarray) -> np.ndarray:
+        return np.concatenate([motion(q[:6], p)[0], slope(lambda z: motion(z, p)[0], q[:6], q[6:])])
+
+    y = set_off(p)
+    q = np.concatenate([to_theirs(y, p), slope(lambda y: to_theirs(y, p), y, np.full(5, 5**-0.5))])
+    found = solve_ivp(both, (0, end), q, "DOP853", (begin, end), rtol=1e-10, atol=1e-10).y.T
+    first, last = (np.linalg.norm(slope(lambda z: to_ours(z, p), each[:6], each[6:])) for each in found)
+    return float(np.log(last / first) / (end - begin))
 
 
 def test_a_stable_cycle_becomes_chaotic_beyond_its_period_doubling() -> None:
