@@ -148,6 +148,13 @@ def test_a_mode_that_has_decayed_is_not_filled_in_by_round_off() -> None:
     assert abs(found["lyapunov"][0]) < 0.002
 
 
+def test_a_cycle_as_long_as_a_bin_is_not_taken_for_chaos() -> None:
+    """All bins are alike then, and their scatter alone made this regular motion positive by six standard errors."""
+    body, step = columns(n0=0.025617, delta=0.319641), 0.007565
+    found = exponents(kernel("dopri5", "noslip", ["lyapunov"]), body, step, 10000.0)
+    assert abs(found["lyapunov"][0]) < 3 * found["lyapunov_error"][0] < 0.002
+
+
 def test_a_short_trajectory_has_no_exponent() -> None:
     found = exponents(_lorenz(), columns(mu=28.0), 0.01, 7 * BLOCK * 0.01)
     assert np.isnan(found["lyapunov"]).all()

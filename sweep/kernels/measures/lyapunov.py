@@ -2,9 +2,12 @@
 
 The growth is added up in bins of equal length.  When all `BINS` are full, pairs are merged and bins become twice as
 long, so that however long the trajectory is, between half and all of them are full.  The exponent is the mean over the
-later half of the full bins, which leaves out the start; its error is their scatter divided by the root of their number.
+later half of the full bins, which leaves out the start; its error is their scatter divided by the root of their number,
+and beside it 1/τ, with the length τ of that half.
 
-That is the statistical error for chaotic motion, whose bins are long against its memory.  In regular motion the
+The scatter is the statistical error for chaotic motion, whose bins are long against its memory.  1/τ is what another
+norm of the tangent might make of the exponent, a factor of e.  Without it the error was far too small where a bin is as
+long as a cycle of regular motion: all bins are alike then, whatever the phase of the cycle adds.  In regular motion the
 distance grows like the time at most, so that the exponent of a trajectory of the length T comes out as ln 2 / (T/2) or
 less, beside what the distance oscillates by.  See `docs/explanation/regimes.md`.
 """
@@ -89,7 +92,8 @@ class Lyapunov(Measurement):
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
         full = table["full_bins"][:, None]
-        rates = table.columns(self._bins) / (table["bin_width"] * BLOCK * table["step"])[:, None]
+        length = table["bin_width"] * BLOCK * table["step"]
+        rates = table.columns(self._bins) / length[:, None]
         place = np.arange(BINS)
         used = (place >= full - full // 2) & (place < full)
         number = used.sum(axis=1)
@@ -97,5 +101,5 @@ class Lyapunov(Measurement):
         with np.errstate(divide="ignore", invalid="ignore"):
             mean = np.where(used, rates, 0).sum(axis=1) / number
             scatter = np.where(used, (rates - mean[:, None]) ** 2, 0).sum(axis=1)
-            error = np.sqrt(scatter / (number - 1) / number)
+            error = np.sqrt(scatter / (number - 1) / number + (number * length) ** -2.0)
         return {"lyapunov": np.where(enough, mean, np.nan), "lyapunov_error": np.where(enough, error, np.nan)}
