@@ -101,6 +101,7 @@ def _model_faults(made: Model) -> Faults:
     for name in ("start", "slower_period", "fastest_decay", "spin_unit", "extremes"):
         yield from _arity(getattr(made, name), name, "columns")
     yield from _arity(made.tilt, "tilt", "states")
+    yield from _arity(made.decided, "decided", "states", "constants")
     yield from _arity(made.observe, "observe", "states", "constants")
     if made.fastest_motion:
         yield from _arity(made.fastest_motion, "fastest_motion", "columns")
@@ -179,6 +180,10 @@ def _wrong_values(model: Model, columns: Columns, cells: int) -> Faults:
     yield from _tuple(model.rhs, "rhs: derivatives", given[0], len(y), "one for each state")
     yield from _tuple(model.rhs, "rhs: its second part", given[1], 4, "(spin, power, normal force, denominator)")
     yield from _tuple(model.energy, "energy", model.energy(y, constants), 3, "(spin, energy, moment of inertia)")
+    decided = np.asarray(model.decided(y, constants))
+    if decided.dtype != bool or decided.shape not in ((), (cells,)):
+        words = f"decided is of the type {decided.dtype} and the shape {decided.shape}"
+        yield model.decided, f"{words}; allowed: true or false, a comparison, or several joined by & and |"
     if model.upright is not never_upright:
         spin = np.zeros(cells)
         yield from _tuple(model.upright, "upright", model.upright(spin), len(y), "a number for each state")
