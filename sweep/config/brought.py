@@ -14,7 +14,7 @@ from sweep.config import files
 from sweep.config.document import Document
 from sweep.config.faults import ConfigError, Fault, brief
 from sweep.config.schema import Config
-from sweep.models import TIERS, inspection, outside
+from sweep.models import TIERS, outside, trial
 from sweep.models.origin import ModelError, Origin
 
 LIMIT = 1 * files.MIB
@@ -73,4 +73,4 @@ def try_out(config: Config) -> None:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
         ends |= {name: np.array([column[0], column[-1]]) for name, column in (config.cases or {}).items()}
         with explained(config.origin):
-            inspection.try_out(config.equations, ends)
+            trial.try_out(config.equations, ends, config.own_law)

@@ -326,7 +326,7 @@ def _section(name: str, table: Mapping[str, Parameter], words: type[_Words]) -> 
 def schema_of(origin: Origin | None) -> Any:
     """The schema of the configurations of a user's model, or, without one, of the models of this package."""
     table = outside.table(origin)
-    words = {} if origin else _WORDS
+    words = _WORDS if not origin else {"body": Shape} if outside.law(origin) else {}
     found: dict[str, Any] = {name: _section(name, table, words.get(name, _Words)) for name in sections(table)}
     if origin:
         found["model"] = str, ...
@@ -393,7 +393,7 @@ class Config:
         """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
         names = (*self.parameters, *(self.cases or ()))
         if self.origin:
-            return outside.find(self.origin, self.units, names)
+            return outside.find(self.origin, self.units, names, self.surface)
         return tier_of(self.model, self.law, self.units, names, self.surface)
 
     @property
