@@ -44,8 +44,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         words = "code of a user, which is not run for a configuration that comes from a dataset"
         raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; allowed: {', '.join(TIERS)}")])
     if origin is None:
-        path, text = source.read_beside("model", name, LIMIT)
-        origin = Origin.of_file(name, str(path), text)
+        origin = of_file(source, name)
     source.model = origin
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
@@ -55,6 +54,12 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     with explained(origin):
         outside.load(origin)
     return origin
+
+
+def of_file(source: Document, name: str) -> Origin:
+    """The model in a file that a document names, whose code is not run; a `ConfigError` if it cannot be read."""
+    path, text = source.read_beside("model", name, LIMIT)
+    return Origin.of_file(name, str(path), text)
 
 
 @contextmanager

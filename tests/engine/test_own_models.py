@@ -25,8 +25,6 @@ import sweep
 from sweep.config import ConfigError, load_config
 from sweep.engine.cluster import Cluster
 from sweep.engine.plan import kernels
-from sweep.explore import cells
-from sweep.explore.slices import open_source
 from sweep.grid import Grid
 from sweep.kernels import build as builder
 from sweep.kernels.build import build
@@ -297,17 +295,3 @@ from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN
 
 MODEL = replace(slip.MODEL, name="mine", offers=frozenset({COUNT, SPIN, ENERGY, LINEAR}))
 """
-
-
-@pytest.mark.usefixtures("few")
-def test_the_explorer_shows_its_maps_and_runs_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.models.outside.load", lambda origin: pytest.fail(f"ran {origin.place}"))
-    source = open_source(folder / "pendulum.nc")
-    assert cells.usable(source) is None
-    with pytest.raises(
-        ConfigError, match="code of a user, which is not run for a configuration that comes from a data"
-    ):
-        cells.Setup(source)
-    why = f"Its model is code of a user, {folder / 'pendulum.py'}, which the explorer does not run."
-    assert cells.why_still(source) == why
-    assert source.describe({"damping": 0, "torque": 1})
