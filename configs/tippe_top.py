@@ -16,6 +16,14 @@ sign, while the top turns about the vertical in the same sense as before: a reve
 
 Friction takes energy but leaves Jellett's integral -L·a as it is.  Spun fast enough, a top turns over completely if
 1 - α < A/C < 1 + α (S. Rauch-Wojciechowski and N. Rutstam, SIGMA 10 (2014), 017, arXiv 1306.2470).
+
+With both, a trajectory knows when its spin can reverse no more.  For λ = -L·a and c = e·ẑ the least energy of any
+motion, and that of a motion with ω3 = 0, are
+
+    U(c) = λ² / (2 (A (1 - c²) + C (c - α)²)) + α (1 - c)  and  U0(c) = λ² / (2 A (1 - c²)) + α (1 - c).
+
+So ω3 stays what it is once the energy is below the least U0, which is at c0, or below U at some c between c0 and the
+present one: the top is caught in a well that has no ω3 = 0.  Of these wells only that of upright spin is looked for.
 """
 
 from typing import Any, NamedTuple
@@ -37,16 +45,44 @@ PARAMETERS = (
     Parameter("tilt", "start", "radian", "start angle of the axis with the vertical", 0.1, at_least=0, below=3.1),
 )  # fmt: skip
 
+MARGIN = 1 - 1e-6
+"""For the errors of the integration: energies below another by less do not count as below."""
+
 
 class Constants(NamedTuple):
     alpha: Any
     A: Any
     C: Any
     mu: Any
+    least: Any
+    ridge: Any
+    over: Any
 
     @classmethod
     def of(cls, columns: Columns) -> "Constants":
-        return cls(columns["eccentricity"], columns["ratio"] * columns["C"], columns["C"], columns["mu"])
+        A = columns["ratio"] * columns["C"]
+        return cls(columns["eccentricity"], A, columns["C"], columns["mu"], *barriers(columns))
+
+
+def barriers(columns: Columns) -> tuple[Array, Array, Array]:
+    """The least U0, and the ridge that rings upright spin: its c, and U there."""
+    alpha, C, A = columns["eccentricity"], columns["C"], columns["ratio"] * columns["C"]
+    jellett = C * columns["n0"] * (np.cos(columns["tilt"]) - alpha)
+
+    def U(c: Array) -> Array:
+        return jellett**2 / (2 * (A * (1 - c**2) + C * (c - alpha) ** 2)) + alpha * (1 - c)
+
+    low, high = 0 * alpha, 0 * alpha + 1
+    for _ in range(50):  # U0 is convex
+        c0 = (low + high) / 2
+        rises = jellett**2 * c0 > alpha * A * (1 - c0**2) ** 2
+        low, high = np.where(rises, low, c0), np.where(rises, c0, high)
+    least = jellett**2 / (2 * A * (1 - c0**2)) + alpha * (1 - c0)
+    ridge, over = c0, U(c0)
+    for share in np.linspace(0, 1, 200, endpoint=False):
+        c = c0 + share * (1 - c0)
+        ridge, over = np.where(U(c) > over, c, ridge), np.maximum(U(c), over)
+    return MARGIN * least, ridge, MARGIN * over
 
 
 def start(columns: Columns) -> tuple[Array, ...]:
@@ -91,6 +127,13 @@ def energy(y: Any, p: Any) -> Any:
     return spin, 0.5 * (drift + p.A * (d1 * d1 + d2 * d2 + d3 * d3)) + p.alpha * (1.0 - e3), p.C
 
 
+@inline
+def decided(y: Any, p: Any) -> Any:
+    spin, rest, inertia = energy(y, p)
+    total = rest + 0.5 * inertia * spin * spin
+    return (total < p.least) | ((total < p.over) & (y[5] > p.ridge))
+
+
 def observe(y: Array, p: Any) -> dict[str, Array]:
     L, e = y[:3], y[3:6]
     jellett = L[2] - p.alpha * (L * e).sum(axis=0)
@@ -126,6 +169,7 @@ MODEL = Model(
     start=start,
     rhs=rhs,
     energy=energy,
+    decided=decided,
     observe=observe,
     series=(
         ("inclination", "radian", "angle of the axis with the vertical"),

@@ -332,7 +332,8 @@ def info(file: Path) -> None:
 @FILE
 @click.option("--port", type=click.IntRange(1, 65535), help="Port of the page [default: the first free from 5006].")
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
-def explore(file: Path, port: int | None, no_browser: bool) -> None:
+@click.option("--model", help="File or entry point of the model that a user brought; its code runs.")
+def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -> None:
     """Explore the maps of a dataset in the browser.
 
     A click on a cell runs its trajectory.  The page is served to this machine alone, until Ctrl-C.
@@ -340,11 +341,13 @@ def explore(file: Path, port: int | None, no_browser: bool) -> None:
     with _explained():
         with _needs_bokeh("explore"):
             from sweep.explore.server import serve
+        from sweep.explore.setup import Setup, usable
         from sweep.explore.slices import open_source
 
         with _about(file):
             source = open_source(file)
-        serve(source, port, browser=not no_browser, say=_say)
+        setup = Setup(source, model, _announce) if model else usable(source)
+        serve(source, setup, port, browser=not no_browser, say=_say)
         _say("stopped")
         sys.stdout.flush()
         os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it

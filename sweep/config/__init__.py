@@ -129,8 +129,7 @@ def _resolve(checked: Any, source: document.Document, origin: Origin | None) -> 
     if not origin and "offset" in given and given["offset"].spec == 0.0:
         del given["offset"]  # the default: it does not make a body other than the paper's
     columns = _table(checked.cases, source, known) if checked.cases is not None else None
-    model, law, units = _model(checked, origin, (*given, *(columns or ())), source)
-    surface = ELLIPSOID.name if origin else checked.body.surface
+    model, law, units, surface = _model(checked, origin, (*given, *(columns or ())), source)
     needed = scenes.without_default(units, surface)
     checked = _with_method(checked, model)
     faults = list(fitting.misfits(checked, model, given, columns, source, known))
@@ -177,17 +176,18 @@ def _resolve(checked: Any, source: document.Document, origin: Origin | None) -> 
 
 def _model(
     checked: Any, origin: Origin | None, names: Collection[str], source: document.Document
-) -> tuple[Tier, str, str]:
-    """The model of a configuration that names these parameters, with its law of friction and its units."""
+) -> tuple[Tier, str, str, str]:
+    """The model of a configuration that names these parameters, with its law of friction, its units and its surface."""
     law, units = outside.law(origin) if origin else None, checked.units
+    surface = checked.body.surface if law or not origin else ELLIPSOID.name
     found = scenes.misfits_of_own(checked, law, names, source) if origin else scenes.misfits(checked, names, source)
     if faults := list(found):
         raise ConfigError(faults)
     if not origin:
-        law_name, surface = checked.friction.name, checked.body.surface
-        return tier_of(checked.model, law_name, units, names, surface), law_name, units
-    model = outside.find(origin, units, names)
-    return (model, law.name, units) if law else (model, PAPERS_LAW, model.units)
+        law_name = checked.friction.name
+        return tier_of(checked.model, law_name, units, names, surface), law_name, units, surface
+    model = outside.find(origin, units, names, surface)
+    return (model, law.name, units, surface) if law else (model, PAPERS_LAW, model.units, surface)
 
 
 def _given(checked: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:

@@ -14,7 +14,7 @@ from sweep.config import files
 from sweep.config.checked import Config
 from sweep.config.document import Document
 from sweep.config.faults import ConfigError, Fault, brief
-from sweep.models import TIERS, inspection, outside
+from sweep.models import TIERS, outside, trial
 from sweep.models.origin import ModelError, Origin
 
 LIMIT = 1 * files.MIB
@@ -44,8 +44,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         words = "code of a user, which is not run for a configuration that comes from a dataset"
         raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; allowed: {', '.join(TIERS)}")])
     if origin is None:
-        path, text = source.read_beside("model", name, LIMIT)
-        origin = Origin.of_file(name, str(path), text)
+        origin = of_file(source, name)
     source.model = origin
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
@@ -55,6 +54,12 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     with explained(origin):
         outside.load(origin)
     return origin
+
+
+def of_file(source: Document, name: str) -> Origin:
+    """The model in a file that a document names, whose code is not run; a `ConfigError` if it cannot be read."""
+    path, text = source.read_beside("model", name, LIMIT)
+    return Origin.of_file(name, str(path), text)
 
 
 @contextmanager
@@ -73,4 +78,4 @@ def try_out(config: Config) -> None:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
         ends |= {name: np.array([column[0], column[-1]]) for name, column in (config.cases or {}).items()}
         with explained(config.origin):
-            inspection.try_out(config.equations, ends)
+            trial.try_out(config.equations, ends, config.own_law)

@@ -78,7 +78,7 @@ class Config:
         """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
         names = (*self.parameters, *(self.cases or ()))
         if self.origin:
-            return outside.find(self.origin, self.units, names)
+            return outside.find(self.origin, self.units, names, self.surface)
         return tier_of(self.model, self.law, self.units, names, self.surface)
 
     @property

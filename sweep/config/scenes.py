@@ -30,7 +30,7 @@ def misfits_of_own(checked: Any, law: Law | None, names: Collection[str], source
         if "units" in checked.model_fields_set:
             yield source.fault(("units",), "the model's file says its units; allowed: no units", at_key=True)
         return
-    for name, reason in strangers(law.name, checked.units, names, own=law).items():
+    for name, reason in strangers(law.name, checked.units, names, checked.body.surface, law).items():
         yield source.fault(PARAMETERS[name].place, reason, at_key=True)
 
 

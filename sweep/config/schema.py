@@ -194,7 +194,7 @@ def _section(name: str, table: Mapping[str, Parameter], words: type[_Words]) -> 
 def schema_of(origin: Origin | None) -> Any:
     """The schema of the configurations of a user's model, or, without one, of the models of this package."""
     table = outside.table(origin)
-    words = {} if origin else _WORDS
+    words = _WORDS if not origin else {"body": Shape} if outside.law(origin) else {}
     found: dict[str, Any] = {name: _section(name, table, words.get(name, _Words)) for name in sections(table)}
     if origin:
         found["model"] = str, ...

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import tempfile
 import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from sweep.config import Config, ConfigError, Values, load_config
+from sweep.config import Config, ConfigError, Values
 from sweep.config.faults import printable
 from sweep.engine.reporter import Progress, Reporter
-from sweep.explore.slices import Source
+from sweep.explore.setup import Setup
 from sweep.explore.state import Cell
 from sweep.grid import Array
 from sweep.jit import showing
@@ -61,57 +59,6 @@ class News:
 
 
 Tell = Callable[[News], None]
-
-
-class Setup:
-    """How the dataset's trajectories are run: its configuration, and the parameters of a cell that are not named.
-
-    Raises
-    ------
-    ConfigError
-        if the dataset has no configuration, or one that cannot be run.
-    """
-
-    def __init__(self, source: Source) -> None:
-        self.config = _configuration(source)
-        here = source.parameters_at(tuple(self.config.parameters), dict.fromkeys(source.dims, 0))
-        self.base: Cell = {name: here.get(name, v.numbers[0]) for name, v in self.config.parameters.items()}
-
-
-def why_still(source: Source) -> str:
-    """Why no trajectory is run of a file that is not `usable`."""
-    if place := source.dataset.attrs.get("model_place"):
-        return f"Its model is code of a user, {place}, which the explorer does not run."
-    return "This file tells no configuration to run trajectories from."
-
-
-def usable(source: Source) -> Setup | None:
-    """The setup of the dataset, None if it has no configuration to run trajectories from."""
-    try:
-        return Setup(source)
-    except ConfigError:
-        return None
-
-
-def _configuration(source: Source) -> Config:
-    """The configuration in the dataset; a table of cases, which is another file, gives way to the first case.
-
-    It may come from anybody, so that a model in it that is a file or an entry point is refused, not run.
-    """
-    text = str(source.dataset.attrs.get("config", ""))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "explore.yaml")
-        path.write_text(text, encoding="utf-8")
-        overrides: dict[str, Any] = {}
-        if "case" in source.dims:
-            path.write_text("\n".join(line for line in text.split("\n") if not line.startswith("cases:")), "utf-8")
-            coordinates = [str(n) for n, c in source.dataset.coords.items() if n != "case"]
-            overrides = source.parameters_at(tuple(coordinates), {"case": 0})
-        config = load_config(path, overrides, announce=None)
-    if not config.simulated:
-        raise ConfigError([])
-    names = config.tier.parameters
-    return replace(config, parameters={name: config.parameters[name] for name in names if name in config.parameters})
 
 
 def single(config: Config, cell: Cell) -> Config:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from sweep.explore.colours import CURVES
 from sweep.explore.controls import BARE, escaped, on
 from sweep.explore.slices import Axis, Source
 from sweep.explore.state import MAX_CELLS, Cell
-from sweep.parameters import PARAMETERS
+from sweep.parameters import Parameter
 from sweep.plots import labels
 
 
@@ -22,8 +22,8 @@ class CellControls:
     """The list of the cells that are drawn, and the parameters of the active one."""
 
     def __init__(
-        self, source: Source, base: Cell, edit: Callable[[str, float], None], activate: Callable[[int], None],
-        remove: Callable[[int], None],
+        self, source: Source, base: Cell, known: Mapping[str, Parameter], edit: Callable[[str, float], None],
+        activate: Callable[[int], None], remove: Callable[[int], None],
     ) -> None:  # fmt: skip
         self._edit = edit
         self._quiet = False
@@ -31,7 +31,7 @@ class CellControls:
         self._rows = [self._row(k, activate, remove) for k in range(MAX_CELLS)]
         self._title = Div(text="", margin=(8, 0, 0, 0))
         self._end = Div(text="", margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
-        self._inputs = {name: self._input(name, source.axes.get(name)) for name in self._order(source, base)}
+        self._inputs = {name: self._input(known[name], source.axes.get(name)) for name in self._order(source, base)}
         wrap = {"gap": "4px 10px", "flex-wrap": "wrap", "align-items": "flex-end"}
         dragged = [Row(*pair, sizing_mode="stretch_width", styles=wrap) for pair in self._inputs.values() if pair[1:]]
         typed = [pair[0] for pair in self._inputs.values() if not pair[1:]]
@@ -83,9 +83,9 @@ class CellControls:
         away.on_click(lambda: remove(k))
         return Row(button, away, visible=False, sizing_mode="stretch_width"), button
 
-    def _input(self, name: str, axis: Axis | None) -> list[Any]:
+    def _input(self, parameter: Parameter, axis: Axis | None) -> list[Any]:
         """A field for the number, and on an axis of the dataset a slider as well."""
-        parameter = PARAMETERS[name]
+        name = parameter.name
         allowed = {"title": labels.symbol(name), "stylesheets": [BARE], "name": f"parameter {name}"}
         field = Spinner(value=0, width=88, step=_step(axis), mode="float", **allowed)
         on(field, "value", partial(self._edited, name))

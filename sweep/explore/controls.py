@@ -10,7 +10,7 @@ from typing import Any
 
 from bokeh.models import Column, CustomJS, Div, RadioButtonGroup, Row, Select, Slider
 
-from sweep.explore.cells import why_still
+from sweep.explore.setup import why_still
 from sweep.explore.slices import Axis, Source
 from sweep.explore.state import State
 from sweep.plots import labels

@@ -28,6 +28,7 @@ from sweep.explore.colours import CURVES
 from sweep.explore.slices import critical_symbol
 from sweep.explore.state import MAX_CELLS
 from sweep.grid import Array
+from sweep.plots import labels
 
 _POINTS = 6000
 """Points drawn of a curve at most: the lowest and the highest sample of each stretch."""
@@ -36,20 +37,16 @@ _CRITICAL = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
 
 _EMPTY: dict[str, list[float]] = {"x": [], "y": []}
 
-TIME = "time t (√(c/g))"
-
 
 class Curves:
     """The figures of the trajectories, with a place for each of `MAX_CELLS` curves."""
 
     def __init__(self) -> None:
-        self.spin = _figure("spin n (√(g/c))", 260, "spin")
-        self.energy = _figure("energy (m g c)", 190, "energies")
-        self.path = _figure("contact point y (c)", 320, "contact path")
-        self.path.xaxis[0].axis_label = "contact point x (c)"
+        self.spin = _figure(260, "spin")
+        self.energy = _figure(190, "energies")
+        self.path = _figure(320, "contact path")
         self.path.match_aspect = True
         self.energy.x_range = self.spin.x_range
-        self.energy.xaxis[0].axis_label = TIME
         self._slots = [_Slot(self, colour) for colour in CURVES[:MAX_CELLS]]
         self._critical = [self._critical_line(name) for name in _CRITICAL]
         _legend(self.energy, [("energy above rest", "solid"), ("work against friction", "dashed")])
@@ -62,6 +59,8 @@ class Curves:
         for slot in self._slots[len(curves) :]:
             slot.show(None, "")
         present = [curve for curve in curves if curve]
+        if present:
+            self._label(present[0].dataset)
         self._slider.end = max([float(np.nanmax(curve.dataset["time"])) for curve in present], default=1.0)
         self._slider.step = self._slider.end / 2000
         chosen = curves[active] if active < len(curves) else None
@@ -71,6 +70,20 @@ class Curves:
             if line.visible:
                 line.location = label.y = spin
                 label.x = self._slider.end * (0.93 if "c1" in name else 1.0)  # they often lie close together
+
+    def _label(self, one: xr.Dataset) -> None:
+        """Label the axes, in the units of a trajectory."""
+        lowest, highest = (self.energy, self.spin) if "energy" in one else (self.spin, self.energy)
+        lowest.xaxis[0].axis_label, highest.xaxis[0].axis_label = labels.label(one, "time"), None
+        self.spin.yaxis[0].axis_label = labels.label(one, "spin")
+        for axis, name, words in (
+            (self.energy.yaxis, "energy", "energy"),
+            (self.path.xaxis, "contact_x", "contact point x"),
+            (self.path.yaxis, "contact_y", "contact point y"),
+        ):
+            if name in one:
+                unit = labels.unit(one, name)
+                axis[0].axis_label = f"{words} ({unit})" if unit else words
 
     def _critical_line(self, name: str) -> tuple[Span, Label]:
         dash = "dotted" if "c1" in name else "dashed"
@@ -169,10 +182,10 @@ def _thinned(x: Array, y: Array) -> dict[str, Any]:
     return {"x": x[at].astype("float32"), "y": y[at].astype("float32")}
 
 
-def _figure(label: str, height: int, name: str) -> Any:
+def _figure(height: int, name: str) -> Any:
     plot = figure(
         height=height, min_width=220, sizing_mode="stretch_width", tools="pan,box_zoom,wheel_zoom,reset,save",
-        active_drag="box_zoom", toolbar_location="right", y_axis_label=label, name=name,
+        active_drag="box_zoom", toolbar_location="right", name=name,
     )  # fmt: skip
     plot.toolbar.logo = None
     plot.toolbar.autohide = True

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
-from sweep.explore.cells import Curve, News, Runner, Setup
+from sweep.explore.cells import Curve, News, Runner
+from sweep.explore.setup import Setup
 from sweep.explore.state import MAX_CELLS, Cell
 
 

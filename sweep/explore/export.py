@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from sweep.config import Config, Values
-from sweep.explore.cells import Curve, Setup
+from sweep.explore.cells import Curve
+from sweep.explore.setup import Setup
 from sweep.explore.slices import Source
 from sweep.explore.state import Cell, State
 

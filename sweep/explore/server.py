@@ -18,6 +18,7 @@ from tornado.ioloop import IOLoop
 
 from sweep.explore import view
 from sweep.explore.cells import Runner
+from sweep.explore.setup import Setup
 from sweep.explore.slices import Source
 
 ADDRESS = "127.0.0.1"
@@ -26,8 +27,8 @@ FIRST_PORT, LAST_PORT = 5006, 5105
 """Tried in turn where no port is asked for, so that a link to the only explorer holds."""
 
 
-def serve(source: Source, port: int | None, *, browser: bool, say: Callable[[str], None]) -> None:
-    """Serve until Ctrl-C.
+def serve(source: Source, setup: Setup | None, port: int | None, *, browser: bool, say: Callable[[str], None]) -> None:
+    """Serve until Ctrl-C; without a `setup` no trajectories are run.
 
     Raises
     ------
@@ -36,7 +37,7 @@ def serve(source: Source, port: int | None, *, browser: bool, say: Callable[[str
     """
     loop = IOLoop()
     loop.make_current()
-    _server, found = start(source, port, loop)
+    _server, found = start(source, setup, port, loop)
     url = f"http://localhost:{found}/"
     say(f"exploring {source.name} at {url} (Ctrl-C ends it)")
     if browser:
@@ -46,14 +47,14 @@ def serve(source: Source, port: int | None, *, browser: bool, say: Callable[[str
     loop.start()
 
 
-def start(source: Source, port: int | None, loop: IOLoop) -> tuple[BaseServer, int]:
+def start(source: Source, setup: Setup | None, port: int | None, loop: IOLoop) -> tuple[BaseServer, int]:
     """A server on `ADDRESS` that takes requests as soon as the loop runs, and its port."""
     # Its advice to name an option of Bokeh's own command helps nobody here; the browser is refused all the same.
     logging.getLogger("bokeh.server.views.ws").setLevel(logging.CRITICAL)
     logging.getLogger("tornado.access").setLevel(logging.ERROR)
     sockets, found = _bind(port)
     hosts = [f"{host}:{found}" for host in ("localhost", ADDRESS)]
-    application = Application(FunctionHandler(view.make(source, Runner())))
+    application = Application(FunctionHandler(view.make(source, setup, Runner())))
     web = BokehTornado({"/": application}, extra_websocket_origins=hosts, absolute_url=f"http://{hosts[0]}/")
     http = HTTPServer(web)
     http.add_sockets(sockets)

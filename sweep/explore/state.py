@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 
 from sweep.config.faults import brief
 from sweep.explore.slices import Source
-from sweep.parameters import PARAMETERS
+from sweep.parameters import PARAMETERS, Parameter
 from sweep.plots.quantities import subject
 
 MAX_CELLS = 6
@@ -60,13 +60,16 @@ def write(state: State, source: Source, base: Cell) -> str:
     return urlencode(pairs, safe=":,")
 
 
-def read(query: Mapping[str, Sequence[str]], source: Source, base: Cell) -> tuple[State, list[str]]:
+def read(
+    query: Mapping[str, Sequence[str]], source: Source, base: Cell, known: Mapping[str, Parameter] = PARAMETERS
+) -> tuple[State, list[str]]:
     """The state that an address asks for, and what in it cannot be done and is left out.
 
     Parameters
     ----------
     query : the values of each key of the query
     base : the parameters of a trajectory that a cell does not name; empty where none can be run
+    known : what they are, by name
     """
     state, faults = first(source), list[str]()
     given = {key: values[-1] for key, values in query.items() if values}
@@ -97,7 +100,7 @@ def read(query: Mapping[str, Sequence[str]], source: Source, base: Cell) -> tupl
             at[key] = index
     found = []
     for text in cells[:MAX_CELLS]:
-        cell, wrong = _cell(text, base)
+        cell, wrong = _cell(text, base, known)
         faults += wrong
         if not wrong:
             found.append(cell)
@@ -106,11 +109,11 @@ def read(query: Mapping[str, Sequence[str]], source: Source, base: Cell) -> tupl
     return replace(state, at=at, cells=tuple(found)), faults
 
 
-def wrong_value(name: str, value: float | None) -> str:
+def wrong_value(parameter: Parameter, value: float | None) -> str:
     """What is wrong with the value of a parameter; "" if nothing is."""
-    if value is not None and math.isfinite(value) and PARAMETERS[name].allows(value):
+    if value is not None and math.isfinite(value) and parameter.allows(value):
         return ""
-    return f"{name}: {'not a number' if value is None else f'{value:g}'}; allowed: {PARAMETERS[name].allowed}"
+    return f"{parameter.name}: {'not a number' if value is None else f'{value:g}'}; allowed: {parameter.allowed}"
 
 
 def _index(source: Source, axis: str, text: str) -> int | None:
@@ -122,12 +125,12 @@ def _index(source: Source, axis: str, text: str) -> int | None:
     return source.axes[axis].nearest(number)
 
 
-def _cell(text: str, base: Cell) -> tuple[Cell, list[str]]:
+def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> tuple[Cell, list[str]]:
     cell = dict(base)
-    return cell, list(_fill(cell, text))
+    return cell, list(_fill(cell, text, known))
 
 
-def _fill(cell: dict[str, float], text: str) -> Iterator[str]:
+def _fill(cell: dict[str, float], text: str, known: Mapping[str, Parameter]) -> Iterator[str]:
     if not cell:
         yield f"cell={brief(text)}: this file has no configuration from which a trajectory could be run"
         return
@@ -135,7 +138,7 @@ def _fill(cell: dict[str, float], text: str) -> Iterator[str]:
         name, _, value = pair.partition(":")
         if name not in cell:
             yield f"cell={brief(text)}: no parameter {brief(name)}; allowed: {', '.join(cell)}"
-        elif fault := wrong_value(name, _number(value)):
+        elif fault := wrong_value(known[name], _number(value)):
             yield f"cell={brief(text)}: {fault}"
         else:
             cell[name] = float(value)

@@ -13,7 +13,7 @@ from bokeh.models import Column, ColumnDataSource, CustomJS, Div
 
 from sweep.explore import controls, export, figure, page
 from sweep.explore import state as states
-from sweep.explore.cells import News, Runner, Setup, usable
+from sweep.explore.cells import News, Runner
 from sweep.explore.chosen import CellControls
 from sweep.explore.colours import CURVES
 from sweep.explore.controls import escaped
@@ -21,8 +21,10 @@ from sweep.explore.curves import Curves
 from sweep.explore.drawn import Drawn
 from sweep.explore.lines import critical_lines
 from sweep.explore.saving import Saving
+from sweep.explore.setup import Setup
 from sweep.explore.slices import Source
 from sweep.explore.state import Cell, State
+from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 
 _BESIDE = ("reversals", "reversals_predicted", "status")
@@ -42,7 +44,8 @@ class View:
     ) -> None:
         self._document, self._source, self._setup = document, source, setup
         self._base: Cell = setup.base if setup else {}
-        self.state, self._faults = states.read(query, source, self._base)
+        self._known = setup.config.table if setup else PARAMETERS
+        self.state, self._faults = states.read(query, source, self._base, self._known)
         self._shown: figure.Map | None = None
         self._build()
         self._drawn = Drawn(self.state.cells, setup, runner, self._tell)
@@ -69,12 +72,12 @@ class View:
         self._document.js_on_event("document_ready", CustomJS(args=args, code=code))
         self._figures = Curves()
         self._controls = controls.MapControls(self._source, self._change)
-        self._chosen = CellControls(self._source, self._base, self._edit, self._activate, self._remove)
+        self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
         self._hint = Div(text=controls.EMPTY, sizing_mode="stretch_width")
         plots = (self._figures.spin, self._figures.energy)
         curves = Column(self._hint, *plots, sizing_mode="stretch_width", name="curves")
         path = Column(self._figures.path, self._figures.player, sizing_mode="stretch_width", name="path")
-        self._shown_with_curves = (*plots, *path.children)
+        self._shown_with = {"spin": plots[:1], "energy": plots[1:], "contact_x": path.children}
         self._saving = Saving(
             self._source, self._netcdf, self._yaml if self._setup else None, self._map,
             [self._figures.spin, self._figures.energy, self._figures.path],
@@ -157,7 +160,7 @@ class View:
         """Run the active cell with another value of a parameter."""
         if not self._drawn.cells or not self._setup:
             return
-        if fault := states.wrong_value(name, value):
+        if fault := states.wrong_value(self._known[name], value):
             self._faults = [fault]
             self._draw_progress()
             return
@@ -211,8 +214,10 @@ class View:
             for k, (name, curve) in enumerate(zip(self._names(), self._drawn.curves, strict=True))
         ]
         self._hint.visible = not any(self._drawn.curves)
-        for part in self._shown_with_curves:
-            part.visible = any(self._drawn.curves)
+        drawn = [curve.dataset for curve in self._drawn.curves if curve]
+        for series, parts in self._shown_with.items():
+            for part in parts:
+                part.visible = any(series in one for one in drawn)
         self._figures.show(self._drawn.curves, names, self._drawn.active)
         self._chosen.tell(self._drawn.curves)
 
@@ -245,9 +250,8 @@ class View:
         return export.yaml(self._source, self._setup, self.state, f"{self._saving.stem}.yaml").encode()
 
 
-def make(source: Source, runner: Runner) -> Callable[[Document], None]:
+def make(source: Source, setup: Setup | None, runner: Runner) -> Callable[[Document], None]:
     """What fills the document of each visitor."""
-    setup = usable(source)
     if setup:
         runner.warm_up(setup)
 

@@ -17,7 +17,7 @@ from sweep.jit import exactly_compiled, full_width, inline
 from sweep.kernels.codegen import make_load, make_rest, make_store
 from sweep.kernels.layout import LANES, Layout
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
-from sweep.models.model import ENERGY, Model
+from sweep.models.model import ENERGY, Model, never_decided
 
 STABLE = ("stable_from", "stable_to", "below_from", "below_to", "above_from", "above_to")
 """Ends of the ranges of spin in which the rattle decays: the range about zero, and the next below and above it."""
@@ -119,6 +119,7 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
     FAINT = layout.at(f"constant.{model.faint}") if saturates else 0
     stops = bool(model.still)
     STILL = layout.at(f"constant.{model.still}") if stops else 0
+    decides, decided = model.decided is not never_decided, model.decided
     GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP = map(layout.at, ("goal", "done", "status", "energy", "stable_step"))
     lanes, allowed, conserved = LANES, 1.0 + given.energy_gain, ENERGY in model.offers
     wide = full_width()
@@ -142,6 +143,8 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Loo
                 settled = settled & (rattle < group[FAINT + lane])
             if stops:
                 settled = settled | ((total < group[STILL + lane]) & followed)
+            if decides:
+                settled = settled | (decided(y, load_constants(group, lane)) & followed)
             ends = SETTLED if settled & stop_when_settled else RUNNING
             if pauses:
                 small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])

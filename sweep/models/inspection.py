@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from inspect import signature
 from typing import Any
 
-import numpy as np
-
 from sweep.models.general import SlipWith
 from sweep.models.laws import LAWS, Law
-from sweep.models.linear import fastest_motion
-from sweep.models.model import COUNT, ENERGY, LINEAR, OWN, SPIN, Array, Columns, Model, never_rocks, never_upright
+from sweep.models.model import COUNT, ENERGY, LINEAR, OWN, SPIN, Model, never_rocks, never_upright
 from sweep.models.origin import ModelError, Origin
 from sweep.parameters import PARAMETERS, Parameter
 
@@ -29,10 +26,10 @@ _TAKEN = frozenset({
 def inspect(made: Any, origin: Origin) -> None:
     """Raise a `ModelError` for the first thing that is wrong with `made`, the MODEL of a file or an entry point."""
     for function, message in _faults(made):
-        raise ModelError(origin.place, _line(function, origin), message)
+        raise ModelError(origin.place, line_of(function, origin), message)
 
 
-def _line(function: Any, origin: Origin) -> int | None:
+def line_of(function: Any, origin: Origin) -> int | None:
     """The line of a function of the file, or else that of MODEL."""
     code = getattr(function, "__code__", None)
     if code and code.co_filename == origin.place:
@@ -101,6 +98,7 @@ def _model_faults(made: Model) -> Faults:
     for name in ("start", "slower_period", "fastest_decay", "spin_unit", "extremes"):
         yield from _arity(getattr(made, name), name, "columns")
     yield from _arity(made.tilt, "tilt", "states")
+    yield from _arity(made.decided, "decided", "states", "constants")
     yield from _arity(made.observe, "observe", "states", "constants")
     if made.fastest_motion:
         yield from _arity(made.fastest_motion, "fastest_motion", "columns")
@@ -143,60 +141,3 @@ def _arity(function: Any, name: str, *arguments: str) -> Faults:
         signature(function).bind(*arguments)
     except TypeError:
         yield function, f"{name}{signature(function)}; allowed: {wanted}"
-
-
-def try_out(model: Model, columns: Columns) -> None:
-    """Call the functions of a user's model for some cells.
-
-    Parameters
-    ----------
-    columns : physical parameters by name, each of shape (cells,)
-
-    Raises
-    ------
-    ModelError
-        if one of them gives something else than it has to.
-    """
-    assert model.origin
-    with np.errstate(all="ignore"):
-        for function, message in _wrong_values(model, columns, len(next(iter(columns.values())))):
-            raise ModelError(model.origin.place, _line(function, model.origin), message)
-
-
-def _wrong_values(model: Model, columns: Columns, cells: int) -> Faults:
-    constants, start = model.constants.of(columns), model.start(columns)
-    fields = model.constants._fields
-    allowed = f"; allowed: ({cells},), as the columns"
-    for name, value in zip(fields, constants, strict=True):
-        if np.shape(value) != (cells,):
-            yield model.constants.of, f"constant {name} has the shape {np.shape(value)}{allowed}"
-    yield from _tuple(model.start, "start", start, len(model.states), "a number for each state")
-    if np.shape(sum(start)) != (cells,):
-        yield model.start, f"start has the shape {np.shape(sum(start))}{allowed}"
-    y = tuple(np.broadcast_to(value, (cells,)) for value in start)
-    given = model.rhs(y, constants)
-    yield from _tuple(model.rhs, "rhs", given, 2, "(derivatives, (spin, power, normal force, denominator))")
-    yield from _tuple(model.rhs, "rhs: derivatives", given[0], len(y), "one for each state")
-    yield from _tuple(model.rhs, "rhs: its second part", given[1], 4, "(spin, power, normal force, denominator)")
-    yield from _tuple(model.energy, "energy", model.energy(y, constants), 3, "(spin, energy, moment of inertia)")
-    if model.upright is not never_upright:
-        spin = np.zeros(cells)
-        yield from _tuple(model.upright, "upright", model.upright(spin), len(y), "a number for each state")
-    bounds: list[tuple[str, Callable[[Columns], Array]]] = [
-        (name, getattr(model, name)) for name in ("slower_period", "fastest_decay", "spin_unit")
-    ]
-    bounds += [("fastest_motion", model.fastest_motion)] if model.fastest_motion else []
-    for name, function in bounds:
-        if np.shape(value := function(columns)) != (cells,):
-            yield function, f"{name} has the shape {np.shape(value)}{allowed}"
-    fastest = np.asarray(fastest_motion(model, columns))
-    if not ((fastest > 0) & np.isfinite(fastest) | np.isfinite(model.slower_period(columns))).all():
-        where = model.fastest_motion or model.slower_period
-        yield where, f"the fastest motion is {fastest[0]:g}, by which steps are chosen; allowed: a number > 0"
-
-
-def _tuple(function: Any, name: str, value: Any, length: int, what: str) -> Faults:
-    if not isinstance(value, tuple):
-        yield function, f"{name} is of the type {type(value).__name__}; allowed: a tuple, {what}"
-    elif len(value) != length:
-        yield function, f"{name} has {len(value)} values; allowed: {length}, {what}"

@@ -13,7 +13,7 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 5. If friction or anything else makes the model stiff, bound its fastest decay (`fastest_decay`).
 
 A model of a user (`sweep.models.outside`) may be of any body.  Where that has no upright spin, no state need vanish:
-the model does not offer `LINEAR`, tells its `fastest_motion`, and never settles.
+the model does not offer `LINEAR`, tells its `fastest_motion`, and settles where it says that its spin is `decided`.
 
 `constants.of`, `start` and `energy` are called when a run is prepared, `rhs` in every stage of a step, and `energy`
 again at every look.  The linear theory of `sweep.models.linear` calls `upright` and `rhs`, the latter with complex
@@ -70,6 +70,12 @@ def never_tilts(y: Any) -> float:  # noqa: ARG001
 def never_upright(spin: Any) -> tuple[Any, ...]:
     """The default `upright`: there is no such motion."""
     raise NotImplementedError
+
+
+@inline
+def never_decided(y: Any, p: Any) -> bool:  # noqa: ARG001
+    """The default `decided`: nothing is known beside the linear theory."""
+    return False
 
 
 def nothing_decays(columns: Columns) -> Array:
@@ -180,6 +186,9 @@ class Model(Tier):
     still: str = ""
     """Name of the constant that is the energy above rest below which a body counts as at rest, so that the trajectory
     settles; "" if there is none."""
+    decided: Callable[..., Any] = never_decided
+    """Inline, (states, constants) -> whether the spin can reverse no more, so that the trajectory settles, whatever the
+    linear theory says; by default it leaves no instruction.  It is asked at every look."""
     extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
     """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005

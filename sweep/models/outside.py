@@ -27,6 +27,7 @@ from sweep.models.laws import Law
 from sweep.models.model import Model
 from sweep.models.origin import ModelError, Origin
 from sweep.models.scene import variant
+from sweep.models.surfaces import ELLIPSOID
 from sweep.parameters import PARAMETERS, Parameter
 
 GROUP = "sweep.models"
@@ -124,12 +125,12 @@ def law(origin: Origin) -> Law | None:
     return made.law if isinstance(made, SlipWith) else None
 
 
-def find(origin: Origin, units: str, names: Collection[str]) -> Model:
-    """The model for a configuration that names these parameters."""
+def find(origin: Origin, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> Model:
+    """The model for a configuration that names these parameters; `surface` is that of a body with a law of friction."""
     made = load(origin)
     if isinstance(made, Model):
         return made
-    found = variant("slip", made.law.name, units, names, own=made.law)
+    found = variant("slip", made.law.name, units, names, surface, made.law)
     return replace(found, origin=origin, own_parameters=made.own_parameters)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +18,10 @@ from support.own import FADING, PENDULUM
 
 import sweep
 from sweep.config import ConfigError, load_config
+from sweep.grid import Grid
 from sweep.models import outside
+from sweep.models.model import ENERGY, LINEAR
+from sweep.models.stability import stable_ranges
 
 MARK = "import numpy as np\n"
 
@@ -87,8 +92,17 @@ BROKEN = {
     "unknown": after(PENDULUM, "spin_state=1,", 'spin_state=1, parameters=("nu",),', "unknown parameter 'nu'; allowed"),
     "no motion": (PENDULUM.replace("2 + columns", "0 * columns").replace("0.5 + 0 * columns", "np.inf + columns"),
                   line_of(PENDULUM, "    fastest_motion"), "the fastest motion is 0, by which steps are chosen"),
+    "decided": (PENDULUM.replace("MODEL =", "@inline\ndef decided(y, p):\n    return y[1]\n\n\nMODEL =")
+                .replace("spin_state=1,", "spin_state=1, decided=decided,"), line_of(PENDULUM, "MODEL ="),
+                "decided is of the type float64 and the shape (2,); allowed: comparisons, joined by & and |"),
+    "decided's arity": after(PENDULUM, "spin_state=1,", "spin_state=1, decided=start,",
+                             "decided(columns); allowed: decided(states, constants)", "def start"),
+    "decided of a tuple": (PENDULUM.replace("spin_state=1,", "spin_state=1, decided=energy,"),
+                           line_of(PENDULUM, "@inline\ndef energy"), "decided is of the type tuple"),
     "law": after(FADING, "resistance,\n", "3,\n", "resistance is no function; allowed: resistance(square, p)"),
     "law's arity": after(FADING, "def resistance(square, p)", "def resistance(p)", "resistance(p); allowed", "@inline"),
+    "law without linear_to": (re.sub("        linear_to=.*\n", "", FADING), line_of(FADING, "@inline"),
+                              "the resistance depends on the slip velocity; allowed: linear_to"),
     "law's section": after(FADING, '"fading", "friction"', '"fading", "body"', "body.fading; allowed: of the section"),
 }  # fmt: skip
 
@@ -106,6 +120,18 @@ def test_a_broken_file_is_refused_with_its_line(folder: Path, kind: str) -> None
     assert said[1].startswith(place), said
     assert message in said[1], said
     assert len(said) == 2
+
+
+def test_a_theory_that_does_not_hold_is_refused_where_trajectories_would_settle_by_it(folder: Path) -> None:
+    """It needs a Jacobian that is quadratic in the spin."""
+    for power, fault in ((2, ""), (4, "broken.py:{line}: the pendulum model: the Jacobian of the rattle is not quadr")):
+        text = PENDULUM.replace("(rate, turning, 2 / 3)", f"(-angle * (1 + rate**{power}), 0.0, -phase)")
+        text = text.replace("SPIN})", "SPIN, LINEAR}), upright=inline(lambda spin: (0.0, spin, 0.0))")
+        text = text.replace("import COUNT", "import LINEAR, COUNT")
+        (folder / "broken.py").write_text(text, encoding="utf-8")
+        result = invoke("run", folder / "pendulum.yaml", "--set", "model=broken.py", "--dry-run")
+        assert fault.format(line=line_of(text, "@inline")) in result.stderr
+        assert result.exit_code == (2 if fault else 0), result.stderr
 
 
 @pytest.mark.parametrize("name", ["missing.py", "."])
@@ -221,9 +247,53 @@ def test_the_law_of_a_file_takes_the_place_of_law(folder: Path) -> None:
         ("friction.law", "coulomb", "friction.law: unknown key"),
         ("mu_static", 1.0, "mu_static: not of the law fading; allowed: mu, speed, fading"),
         ("offset", 0.03, r"centre of mass outside the ellipsoid"),
+        ("body.surface", "cone", r"body.surface: 'cone'; allowed: ellipsoid, paraboloid"),
     ):
         with pytest.raises(ConfigError, match=message):
             load_config(file, {key: value})
+
+
+LIKE_OURS = """\
+from sweep.jit import inline
+from sweep.models.general import with_law
+from sweep.models.laws import Law
+
+
+@inline
+def resistance(square, p):
+    return p.mu / (square + p.speed * p.speed) ** 0.5
+
+
+MODEL = with_law(Law(
+    "mine", ("mu", "speed"), resistance, lambda columns: columns["mu"] / columns["speed"],
+    linear_to=lambda columns: 0.1 * columns["speed"], pure=frozenset({"mu"}),
+))
+"""
+
+
+@pytest.mark.parametrize("shape", [{"a": 0.2, "b": 0.03}, {"a": 0.05, "b": 0.45, "surface": "paraboloid"}], ids=str)
+def test_a_body_of_either_surface_slips_by_the_law_of_a_file_as_by_the_same_of_ours(
+    folder: Path, shape: dict[str, Any]
+) -> None:
+    """The motion, the step, and what settling depends on."""
+    (folder / "mine.py").write_text(LIKE_OURS, encoding="utf-8")
+    inertia = {"Ixx": 2.0e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2.0e-5}
+    scene = {"units": "SI", "body": {"c": 0.02, "offset": 0.01, "mass": 1.0, **inertia, **shape}}
+    scene |= {"start": {"roll": 0.1, "pitch": 0.2, "omega1": 1.0, "omega3": [-5.0, 0.3], "slip1": 0.1}}
+    force = {"mu": 0.5, "speed": 0.01, "sigma": 1e-4}
+    ours = load_config({**scene, "friction": {"law": "coulomb", "regularisation": "sqrt", **force}})
+    mine = load_config({**scene, "model": str(folder / "mine.py"), "friction": force})
+    assert mine.surface == shape.get("surface", "ellipsoid")
+    assert load_config(mine, {"mu": 0.6}).surface == load_config(dict(mine.document())).surface == mine.surface
+    assert outside.compiled_as(mine.origin, mine.equations.name).constants._fields == ours.equations.constants._fields
+    columns, got = Grid.of(ours).columns(), []
+    for model in (ours.equations, mine.equations):
+        constants = model.constants.of(columns)
+        slopes, rest = model.rhs(model.start(columns), constants)
+        got.append([*slopes, *rest, *constants, model.fastest_decay(columns), *stable_ranges(model, columns)])
+    np.testing.assert_allclose(got[1], got[0], rtol=1e-13)
+    assert {LINEAR, ENERGY} <= mine.equations.offers == ours.equations.offers
+    assert (mine.equations.faint, mine.equations.still) == (ours.equations.faint, ours.equations.still)
 
 
 @pytest.fixture

@@ -25,11 +25,14 @@ import sweep
 from sweep.config import ConfigError, load_config
 from sweep.engine.cluster import Cluster
 from sweep.engine.plan import kernels
-from sweep.explore import cells
-from sweep.explore.slices import open_source
+from sweep.grid import Grid
 from sweep.kernels import build as builder
 from sweep.kernels.build import build
+from sweep.kernels.status import SETTLED, TIME_LIMIT
+from sweep.models import MODELS
+from sweep.models.stability import stable_ranges
 from sweep.plots import labels, trajectories
+from sweep.prediction import predict
 from sweep.results.store import StoreError
 from sweep.results.summary import describe
 
@@ -248,15 +251,47 @@ def test_a_law_of_ones_own_moves_the_body_as_newton_says(folder: Path, monkeypat
     np.testing.assert_allclose(one["slip_1"], y[5], rtol=0, atol=1e-9)
 
 
-@pytest.mark.usefixtures("few")
-def test_the_explorer_shows_its_maps_and_runs_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.models.outside.load", lambda origin: pytest.fail(f"ran {origin.place}"))
-    source = open_source(folder / "pendulum.nc")
-    assert cells.usable(source) is None
-    with pytest.raises(
-        ConfigError, match="code of a user, which is not run for a configuration that comes from a data"
-    ):
-        cells.Setup(source)
-    why = f"Its model is code of a user, {folder / 'pendulum.py'}, which the explorer does not run."
-    assert cells.why_still(source) == why
-    assert source.describe({"damping": 0, "torque": 1})
+def test_its_body_settles_as_one_of_ours_and_reverses_no_more(folder: Path) -> None:
+    """The page's law of friction, where the couple alone would stop it after minutes."""
+    asked = {"fading": [0.1, 1.0], "omega3": [-5.0, -1.0, 0.5, 5.0], "t_end": 120}
+    ends = sweep.run(folder / "fading.yaml", **asked)
+    later = sweep.run(folder / "fading.yaml", stop_when_settled=False, **asked)
+    assert (ends["status"] == SETTLED).all()
+    assert (later["status"] == TIME_LIMIT).all()
+    assert (ends["t_stop"] < 0.5 * later["t_stop"]).all()
+    np.testing.assert_array_equal(ends["reversals"], later["reversals"])
+    assert ends["reversals"].sum() > 0
+
+
+def test_a_model_with_an_upright_spin_settles_by_the_linear_theory(folder: Path) -> None:
+    """A rattle that decays as exp(-2 t) in energy, below a spin that it could change by its root at most."""
+    text = PENDULUM.replace("(rate, turning, 2 / 3)", "(-angle * (1 + rate**2), 0.0, -phase)")
+    text = text.replace("SPIN})", "SPIN, LINEAR}), upright=inline(lambda spin: (0.0, spin, 0.0))")
+    text = text.replace("import COUNT", "import LINEAR, COUNT").replace("y[1], 0.0", "y[1], 0.5 * y[0] * y[0]")
+    text = text.replace('columns["angle"], nothing,', 'columns["angle"], columns["torque"],')
+    (folder / "pendulum.py").write_text(text, encoding="utf-8")
+    ends = sweep.run(folder / "pendulum.yaml", torque=[0.0, 1e-4, 0.1, 0.5], damping=0.5, t_end=60)
+    assert ends["status"].values.ravel().tolist() == [TIME_LIMIT, SETTLED, SETTLED, SETTLED]
+    _, slow, middle, fast = ends["t_stop"].values.ravel()
+    assert slow > middle > fast
+    assert -np.log(1e-4) < slow < -2 * np.log(1e-4)
+
+
+def test_the_linear_theory_of_a_model_is_that_of_ours(folder: Path) -> None:
+    (folder / "mine.py").write_text(UPRIGHT, encoding="utf-8")
+    scene = {"friction": {"mu": [5.0, 60.0]}, "start": {"n0": [0.03, -0.1]}}
+    config = load_config({"model": str(folder / "mine.py"), **scene})
+    found = predict(config.equations, Grid.of(config)).stability
+    ours = stable_ranges(MODELS["slip"], Grid.of(config).columns())
+    np.testing.assert_allclose(found.ranges, ours, rtol=1e-12)
+    assert np.isfinite(ours[:2]).all()
+
+
+UPRIGHT = """\
+from dataclasses import replace
+
+from sweep.models import slip
+from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN
+
+MODEL = replace(slip.MODEL, name="mine", offers=frozenset({COUNT, SPIN, ENERGY, LINEAR}))
+"""

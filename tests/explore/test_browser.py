@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from support import ROOT
+from support import ROOT, own
 
 import sweep
 
@@ -407,6 +407,40 @@ def test_nothing_runs_out_of_the_window(width: int, visit: Callable[..., Page]) 
     # The patterns are painted for the new size.
     shape = model(page, "map figure", "m.renderers[2].data_source.data.image[0].shape")
     assert abs(shape[1] - model(page, "map figure", "m.inner_width")) <= 1
+
+
+def test_a_click_runs_a_users_model_that_the_user_names(browser: Browser, tmp_path: Path) -> None:
+    own.write(tmp_path)
+    run = sweep.run(tmp_path / "pendulum.yaml", tmp_path, torque=[0.5, 1.0, 1.2], damping=[0.3, 0.5], t_end=60)
+    with explorer(tmp_path / "pendulum.nc", "--model", tmp_path / "pendulum.py") as process:
+        try:
+            assert process.stdout
+            found = re.search(r"http://localhost:\d+/", process.stdout.readline())
+            assert found
+            page, complaints = browser.new_page(), list[str]()
+            page.set_default_timeout(TIMEOUT)
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.goto(found[0])
+            settle(page)
+            spot = {"torque": 2, "damping": 1}
+            page.mouse.click(*place(page, *(spot[str(dim)] for dim in run["reversals"].dims)))
+            wait_for_curves(page, 1)
+            count = run["reversals"].isel(spot).item()
+            assert curves(page)[0].endswith(f"torque = 1.2, {count} reversals")
+            assert model(page, "spin", "m.left[0].axis_label") == "spin n"
+            assert model(page, "spin", "m.below[0].axis_label") == "time t"
+            assert not model(page, "contact path", "m.visible")
+            field = control(page, "parameter torque", "input")
+            field.fill("1.5")
+            field.press("Enter")
+            wait(page, "curve legend", "/torque = 1.5, .*reversals/.test(m.items[0].label.value)")
+            page.close()
+            process.send_signal(signal.SIGINT)
+            said, announced = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert (process.returncode, said, complaints) == (0, "stopped\n", [])
+    assert re.fullmatch(rf"running the code of {tmp_path / 'pendulum.py'} \(SHA-256 \w{{16}}…\)\n", announced)
 
 
 # ---- files

@@ -11,7 +11,8 @@ import xarray as xr
 
 import sweep
 from sweep.explore import cells, export
-from sweep.explore.cells import COMPILING, News, Runner, Setup
+from sweep.explore.cells import COMPILING, News, Runner
+from sweep.explore.setup import Setup, usable
 from sweep.explore.slices import Source, open_source
 from sweep.explore.state import State
 from sweep.kernels.status import LIFT_OFF
@@ -159,4 +160,4 @@ def test_cases_are_run_with_their_own_parameters(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["", "colour: red\n", "model: analytic\nfriction: {mu: [1, 2]}\n"])
 def test_without_a_usable_configuration_there_are_maps_alone(text: str, opened: xr.Dataset) -> None:
-    assert cells.usable(Source(opened.assign_attrs(config=text))) is None
+    assert usable(Source(opened.assign_attrs(config=text))) is None

@@ -8,7 +8,7 @@ from urllib.parse import parse_qs
 import pytest
 
 from sweep.explore import state
-from sweep.explore.cells import Setup
+from sweep.explore.setup import Setup
 from sweep.explore.slices import Source, open_source
 from sweep.explore.state import State
 

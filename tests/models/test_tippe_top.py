@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,6 +12,7 @@ from scipy.optimize import minimize_scalar
 from support import ROOT
 
 import sweep
+from sweep.kernels.status import SETTLED, TIME_LIMIT
 
 CONFIG = ROOT / "configs" / "tippe_top.yaml"
 TOP = {"eccentricity": 0.3, "ratio": 0.936, "C": 0.4, "mu": 0.3, "n0": 6.0, "tilt": 0.1}
@@ -37,13 +40,17 @@ def slopes(y: np.ndarray, p: dict[str, float]) -> np.ndarray:
     return np.concatenate([np.cross(w, turned.T).T.ravel(), found[3:6], found[:3]])
 
 
-def test_it_turns_over_as_newton_and_euler_say() -> None:
-    one = sweep.trajectory(CONFIG, t_end=60, tolerance=1e-12, every=2.0, **TOP).isel(trajectory=0)
-    sin, cos = np.sin(TOP["tilt"]), np.cos(TOP["tilt"])
+def at_start(p: dict[str, float]) -> np.ndarray:
+    sin, cos = np.sin(p["tilt"]), np.cos(p["tilt"])
     turned = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
-    y = np.concatenate([turned.ravel(), TOP["n0"] * turned[:, 2], np.zeros(3)])
-    times = one["time"].values
-    y = solve_ivp(lambda _, y: slopes(y, TOP), (0, times[-1]), y, "DOP853", times, rtol=1e-12, atol=1e-13).y
+    return np.concatenate([turned.ravel(), p["n0"] * turned[:, 2], np.zeros(3)])
+
+
+def test_it_turns_over_as_newton_and_euler_say() -> None:
+    asked = {**TOP, "t_end": 60, "stop_when_settled": False}
+    one = sweep.trajectory(CONFIG, tolerance=1e-12, every=2.0, **asked).isel(trajectory=0)
+    start, times = at_start(TOP), one["time"].values
+    y = solve_ivp(lambda _, y: slopes(y, TOP), (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13).y
     e = y[:9].reshape(3, 3, -1)[:, 2]
     np.testing.assert_allclose(one["spin"], (y[9:12] * e).sum(axis=0), rtol=0, atol=2e-9)
     np.testing.assert_allclose(one["inclination"], np.arccos(e[2]), rtol=0, atol=1e-7)
@@ -53,7 +60,7 @@ def test_it_turns_over_as_newton_and_euler_say() -> None:
 
 
 def test_energy_balances_and_jelletts_integral_stays() -> None:
-    one = sweep.trajectory(CONFIG, t_end=100, **TOP).isel(trajectory=0)
+    one = sweep.trajectory(CONFIG, t_end=100, stop_when_settled=False, **TOP).isel(trajectory=0)
     lost = float(one["energy"][0] - one["energy"][-1])
     assert lost > 0.5 * float(one["energy"][0])
     total = one["energy"] + one["dissipated"]
@@ -95,7 +102,7 @@ RATIOS = [0.6, 0.9, 1.1, 1.5]
 @pytest.fixture(scope="module")
 def ends() -> xr.Dataset:
     tops = {**TOP, "mu": 1.0, "ratio": RATIOS, "n0": [5.0, 6.0]}
-    return sweep.run(CONFIG, t_end=4000, **tops)
+    return sweep.run(CONFIG, t_end=4000, stop_when_settled=False, **tops)
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
@@ -125,9 +132,48 @@ def test_the_map_shows_where_it_turns_over() -> None:
     assert not counts.sel(n0=1.0).any()
 
 
+def test_no_settled_top_reverses_later(tmp_path: Path) -> None:
+    """Tops of any shape, started at any inclination; some of them reverse a dozen times."""
+    draw, n = np.random.default_rng(1).uniform, 400
+    tops = {"eccentricity": draw(0.01, 0.6, n), "ratio": draw(0.6, 1.8, n), "C": draw(0.2, 0.6, n)}
+    tops |= {"mu": 10 ** draw(-2, 0.5, n), "n0": draw(0.2, 8, n), "tilt": draw(0, 3, n)}
+    table = np.column_stack(list(tops.values()))
+    np.savetxt(tmp_path / "tops.csv", table, delimiter=",", header=",".join(tops), comments="")
+    asked = {"model": str(CONFIG.with_suffix(".py")), "cases": str(tmp_path / "tops.csv"), "max_failed_fraction": 1}
+    ends = sweep.run(asked, t_end=1000)
+    later = sweep.run(asked, t_end=1000, stop_when_settled=False)
+    settled = (ends["status"] == SETTLED) & (later["status"] == TIME_LIMIT)
+    assert settled.sum() > 0.7 * n
+    for low, high in ((0, 0), (1, 1), (2, 99)):
+        assert (settled & (low <= ends["reversals"]) & (ends["reversals"] <= high)).any()
+    assert not (settled & (ends["reversals"] != later["reversals"])).any()
+    assert not (settled & (ends["spin_final"] * later["spin_final"] <= 0)).any()
+
+
+@pytest.mark.parametrize(
+    ("more", "signs"),
+    [({"eccentricity": 0.05}, [1]), ({"mu": 1.0}, [1, -1]), ({"n0": 1.0}, [1])],
+    ids=["upright", "upside down", "slow"],
+)
+def test_the_spin_of_a_settled_top_keeps_its_sign_as_newton_and_euler_say(
+    more: dict[str, float], signs: list[int]
+) -> None:
+    top = {**TOP, **more}
+    end = sweep.run(CONFIG, **top)
+    assert end["status"].item() == SETTLED
+    assert end["reversals"].item() == len(signs) - 1
+    y = solve_ivp(
+        lambda _, y: slopes(y, top), (0, float(end["t_stop"]) + 40), at_start(top), "DOP853", rtol=1e-8, atol=1e-9
+    )
+    spins = np.einsum("it,it->t", y.y[9:12], y.y[:9].reshape(3, 3, -1)[:, 2])
+    changes = np.flatnonzero(np.diff(np.sign(spins)))
+    assert np.sign(spins[[0, *(changes + 1)]]).tolist() == signs
+    assert (y.t[changes] < float(end["t_stop"])).all()
+
+
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
 def test_the_automatic_step_keeps_the_tolerance(tolerance: float) -> None:
-    asked = {**TOP, "n0": [2.0, 6.0], "eccentricity": [0.1, 0.3], "t_end": 100}
+    asked = {**TOP, "n0": [2.0, 6.0], "eccentricity": [0.1, 0.3], "t_end": 100, "stop_when_settled": False}
     found = sweep.run(CONFIG, tolerance=tolerance, **asked)["spin_final"]
     exact = sweep.run(CONFIG, tolerance=1e-13, **asked)["spin_final"]
     assert abs(found - exact).max() < tolerance

@@ -1,0 +1,141 @@
+"""The explorer and a dataset of a user's model: its code runs only if the user names it, and only if it is the same."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import Result
+from support import own
+from support.cli import invoke
+from support.own import PENDULUM
+
+import sweep
+from sweep.config import ConfigError
+from sweep.explore import cells, export, state
+from sweep.explore.setup import Setup, usable, why_still
+from sweep.explore.slices import Source, open_source
+from sweep.explore.state import State
+from sweep.models import outside
+
+FEW = {"damping": [0.3, 0.5, 0.7], "torque": [0.5, 1.0, 1.2, 1.5], "t_end": 60}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """With the dataset of the pendulum."""
+    found = own.write(tmp_path_factory.mktemp("pendulum"))
+    sweep.run(found / "pendulum.yaml", found, **FEW)
+    return found
+
+
+@pytest.fixture(scope="module")
+def source(folder: Path) -> Source:
+    return open_source(folder / "pendulum.nc")
+
+
+@pytest.fixture(scope="module")
+def setup(source: Source, folder: Path) -> Setup:
+    return Setup(source, str(folder / "pendulum.py"), lambda _: None)
+
+
+def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.models.outside.load", lambda origin: pytest.fail(f"ran {origin.place}"))
+    assert usable(source) is None
+    with pytest.raises(ConfigError, match="code of a user, which is not run for a configuration that comes from a da"):
+        Setup(source)
+    why = f"Its model is code of a user, {folder / 'pendulum.py'}, and runs only if you name it: "
+    assert why_still(source) == f"{why}sweep explore FILE --model MODEL."
+    assert source.describe({"damping": 0, "torque": 1})
+
+
+def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, folder: Path) -> None:
+    said = list[str]()
+    outside.load.cache_clear()
+    setup = Setup(source, str(folder / "pendulum.py"), said.append)
+    (words,) = said
+    assert words.startswith(f"running the code of {folder / 'pendulum.py'} (SHA-256 ")
+    index = {"damping": 1, "torque": 2}
+    curve = cells.run(setup, {**setup.base, **source.parameters_at(tuple(setup.base), index)})
+    for name in ("reversals", "t_stop", "spin_final"):
+        assert curve.dataset[name].item() == source.dataset[name].isel(index).item()
+    assert len(curve.reversals) == curve.dataset["reversals"] > 5
+
+
+def refused(source: Source, model: Path | str, monkeypatch: pytest.MonkeyPatch) -> str:
+    """What is said of another model, whose code does not run."""
+    monkeypatch.setattr("sweep.models.outside.load", lambda origin: pytest.fail(f"ran {origin.place}"))
+    with pytest.raises(ConfigError) as error:
+        Setup(source, str(model), lambda words: pytest.fail(words))
+    (fault,) = error.value.faults
+    return str(fault)
+
+
+def test_another_file_is_not_run(source: Source, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = folder / "other.py"
+    other.write_text(PENDULUM.replace("2 / 3", "3 / 4"), encoding="utf-8")
+    said = refused(source, other, monkeypatch)
+    digest = source.dataset.attrs["model_sha256"]
+    assert re.fullmatch(rf"--model: .*other.py has the SHA-256 [0-9a-f]{{64}}; allowed: that of .*, {digest}", said)
+
+
+def test_nor_is_the_one_beside_a_dataset_that_tells_no_hash(
+    source: Source, folder: Path, tiny: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bare = Source(source.dataset.drop_attrs(deep=False).assign_attrs(config=source.dataset.attrs["config"]), "bare.nc")
+    said = refused(bare, folder / "pendulum.py", monkeypatch)
+    assert said == "--model: the model of bare.nc is none that a user brought; allowed: no --model"
+    assert "allowed: no --model" in refused(open_source(tiny), folder / "pendulum.py", monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [("missing.py", "no such file in "), ("sliip", "sliip: unknown; allowed: a Python file, or an entry point")],
+)
+def test_a_model_that_is_not_there_is_told(
+    source: Source, folder: Path, model: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = refused(source, folder / model if model.endswith(".py") else model, monkeypatch)
+    assert said.startswith("--model: ")
+    assert message in said
+
+
+def test_what_a_dataset_says_of_its_file_is_not_believed(source: Source, folder: Path, tmp_path: Path) -> None:
+    """Its configuration may name any file: the one that the user names is run, no other."""
+    sign, trap = tmp_path / "ran", tmp_path / "trap.py"
+    trap.write_text(f"open({str(sign)!r}, 'w').close()\n{PENDULUM}", encoding="utf-8")
+    text = source.dataset.attrs["config"].replace("model: pendulum.py", f"model: {trap}")
+    assert str(trap) in text
+    forged = Source(source.dataset.assign_attrs(config=text, model_place=str(trap)))
+    setup = Setup(forged, str(folder / "pendulum.py"), lambda _: None)
+    assert setup.config.origin.place == str(folder / "pendulum.py")
+    assert usable(forged) is None
+    assert not sign.exists()
+
+
+def test_cells_in_an_address_know_its_parameters(source: Source, setup: Setup) -> None:
+    known = setup.config.table
+    shown, faults = state.read({"cell": ["torque:1.1,angle:0.5"]}, source, setup.base, known)
+    assert not faults
+    assert shown.cells[0] == {"damping": 0.3, "torque": 1.1, "angle": 0.5}
+    _, faults = state.read({"cell": ["torque:-1"]}, source, setup.base, known)
+    assert faults == ["cell=torque:-1: torque: -1; allowed: a finite number >= 0 and < 10"]
+
+
+def test_its_files_make_what_is_seen(source: Source, setup: Setup, tmp_path: Path) -> None:
+    cell = {**setup.base, "torque": 1.2, "damping": 0.5}
+    text = export.yaml(source, setup, State("torque", "damping", "reversals", {}, (cell,)), "saved.yaml")
+    (tmp_path / "saved.yaml").write_text(text, encoding="utf-8")
+    again = sweep.run(tmp_path / "saved.yaml")
+    np.testing.assert_array_equal(again["reversals"], source.dataset["reversals"])
+
+
+def test_the_command_refuses_it_before_it_serves(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "other.py").write_text(PENDULUM + "\n", encoding="utf-8")
+    result: Result = invoke("explore", folder / "pendulum.nc", "--no-browser", "--model", tmp_path / "other.py")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("--model: ")
+    assert "has the SHA-256" in result.stderr
+    assert "running the code" not in result.stderr
