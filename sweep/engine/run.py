@@ -26,7 +26,7 @@ from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
-from sweep.interrupt import deferred
+from sweep.interrupt import deferred, point
 from sweep.results import dataset
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
@@ -77,6 +77,7 @@ def run(
             store = Checkpoint(files.checkpoint, identity, reporter.note)
             _compute(config, store, reporter, cluster, earlier).save(files.dataset)
         files.discard_checkpoint()
+        point()
         result = open_dataset(files.dataset, load=Grid.of(config).size <= LARGE)
         _draw(result, files, reporter)
     return result

@@ -243,9 +243,10 @@ def test_killed_at_any_moment(
     "moments",
     [
         ("kernel", "dataset"),
-        pytest.param(("kernel", "checkpoint", "kernel", "dataset", "files"), marks=pytest.mark.campaign),
+        pytest.param(("kernel", "checkpoint", "kernel", "dataset"), marks=pytest.mark.campaign),
+        pytest.param(("kernel", "files"), marks=pytest.mark.campaign),
     ],
-    ids=["some", "many"],
+    ids=["some", "many", "late"],
 )
 def test_interrupted(runs: Runs, undisturbed: dict[str, bytes], moments: tuple[str, ...]) -> None:
     for moment in moments:
