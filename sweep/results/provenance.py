@@ -25,7 +25,7 @@ _PACKAGE = Path(__file__).parent.parent
 # What lies above the engine asks for numbers or shows them, but decides none.  Every file that is not named here
 # counts as decisive: if a new one is forgotten, runs start again for nothing, but never resume from other numbers.
 _ABOVE_THE_ENGINE = {
-    "__init__.py", "__main__.py", "api.py", "cli.py", "progress.py",
+    "__init__.py", "__main__.py", "api.py", "cli", "progress.py",
     "plots", "studies", "report", "reproduce", "bench",
 }  # fmt: skip
 

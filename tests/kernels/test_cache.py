@@ -93,7 +93,7 @@ def test_every_numeric_source_is_in_the_fingerprint(
     assert jit.fingerprint() != before
 
 
-@pytest.mark.parametrize("name", ["config/schema.py", "plots/maps.py", "cli.py"])
+@pytest.mark.parametrize("name", ["config/schema.py", "plots/maps.py", "cli/runs.py"])
 def test_other_sources_leave_compiled_kernels_alone(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(ROOT / "sweep", tmp_path / "sweep", ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(jit, "__file__", str(tmp_path / "sweep" / "jit.py"))

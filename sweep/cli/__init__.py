@@ -1,0 +1,28 @@
+"""The command line: `python -m sweep VERB`.
+
+Each command imports what it needs when it runs, so that `--help` and faults of the command line come
+at once.
+"""
+
+from __future__ import annotations
+
+import click
+
+from sweep.cli.reports import bench, reproduce
+from sweep.cli.results import explore, info, plot
+from sweep.cli.runs import critical, run, trajectory
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="rattleback-sweep", prog_name="sweep")
+def main() -> None:
+    """Parameter sweeps for the reversals of a rattleback.
+
+    Exit codes: 0 done; 2 a configuration or file is wrong; 3 more cells failed than the
+    configuration allows; 130 interrupted, the same command resumes the run; 141 what read its
+    output has closed the pipe.
+    """
+
+
+for _command in (run, trajectory, critical, reproduce, bench, plot, info, explore):
+    main.add_command(_command)

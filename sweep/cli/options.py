@@ -1,0 +1,106 @@
+"""Arguments and options that commands share, and what their texts mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sweep.cli.faults import refuse, say
+from sweep.parameters import PARAMETERS, Parameter
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
+    from sweep.config import Config
+
+PATH = click.Path(path_type=Path)
+
+
+def _begun_keys(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """The keys of a configuration that go on from what was typed."""
+    from click.shell_completion import CompletionItem
+
+    from sweep.config.schema import PATHS
+
+    return [CompletionItem(f"{key}=", help=words) for key, words in PATHS.items() if key.startswith(begun)]
+
+
+def begun_parameters(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """The parameters that go on from what was typed."""
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(f"{p.name}=", help=p.long_name) for p in PARAMETERS.values() if p.name.startswith(begun)]
+
+
+CONFIG = click.argument("config", type=PATH)
+FILE = click.argument("file", type=PATH)
+SETTINGS = click.option(
+    "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=_begun_keys,
+    help="Replace a value of the configuration, e.g. friction.mu=60, or friction.mu=20..60:41 for the range "
+    "START..STOP:NUM (repeatable).",
+)  # fmt: skip
+OUTPUT = click.option("--output", type=PATH, help="Folder for the results [default: runs/NAME].")
+QUIET = click.option("--quiet", is_flag=True, help="Print only errors.")
+
+
+def report_folder(default: str) -> Callable[[Any], Any]:
+    """The option `--output` of a command that writes a report."""
+    return click.option("--output", type=PATH, default=default, show_default=True, help="Folder for the report.")
+
+
+def loaded(config: Path, settings: tuple[str, ...]) -> Config:
+    """The configuration of a command, with the values of `--set`."""
+    from sweep.config import load_config
+    from sweep.config.document import parse_value
+    from sweep.config.faults import brief
+
+    parsed = {}
+    for setting in settings:
+        path, equals, value = setting.partition("=")
+        if not (equals and path):
+            refuse(f"--set {brief(setting)}", "not a setting; allowed: PATH=VALUE")
+        parsed[path] = parse_value(value, f"--set {brief(path)}")
+    return load_config(config, parsed, argument=lambda path: f"--set {path}", announce=announce)
+
+
+def announce(words: str) -> None:
+    """Said even with --quiet: code of a user never runs unseen."""
+    say(words, err=True)
+
+
+def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:
+    """The values of `--at` by parameter."""
+    from sweep.config.faults import brief, suggestion
+
+    given: dict[str, list[float]] = {}
+    for text in texts:
+        name = text.partition("=")[0]
+        if name not in known:
+            meant = suggestion(name, known)
+            refuse(f"--at {brief(text)}", f"unknown parameter{meant}; allowed: {', '.join(known)}")
+        given.setdefault(name, []).append(parse_pair(text, "--at")[1])
+    return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
+
+
+def parse_pair(text: str, option: str) -> tuple[str, float]:
+    from sweep.config.document import number
+    from sweep.config.faults import brief
+
+    name, _, value = text.partition("=")
+    if (parsed := number(value)) is None:
+        refuse(f"{option} {brief(text)}", "allowed: NAME=NUMBER")
+    return name, parsed
+
+
+def parse_span(text: str, option: str) -> tuple[float, float]:
+    from sweep.config.document import number
+    from sweep.config.faults import brief
+
+    low, dots, high = text.partition("..")
+    ends = number(low), number(high)
+    if not dots or ends[0] is None or ends[1] is None or not ends[0] < ends[1]:
+        refuse(f"{option} {brief(text)}", "allowed: LOW..HIGH, two numbers, the lower one first")
+    return ends[0], ends[1]
