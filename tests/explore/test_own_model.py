@@ -132,6 +132,7 @@ def test_its_files_make_what_is_seen(source: Source, setup: Setup, tmp_path: Pat
     np.testing.assert_array_equal(again["reversals"], source.dataset["reversals"])
 
 
+@pytest.mark.browser
 def test_the_command_refuses_it_before_it_serves(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "other.py").write_text(PENDULUM + "\n", encoding="utf-8")
     result: Result = invoke("explore", folder / "pendulum.nc", "--no-browser", "--model", tmp_path / "other.py")

@@ -25,7 +25,9 @@ import xarray as xr
 from click.testing import CliRunner
 
 import sweep
-from sweep import cli
+from sweep.cli import main
+from sweep.cli.faults import of_option
+from sweep.cli.options import cells_of, loaded
 from sweep.config import ConfigError, load_config
 from sweep.config.document import parse_value
 from sweep.parameters import PARAMETERS
@@ -119,7 +121,7 @@ def setting(random: Random, folder: Path) -> bool:
         given.append(text)
     file = folder / "base.yaml"
     names = (str(file), "--set", str(folder / "cells.csv"), "/etc/passwd")
-    config = _refused(lambda: cli._load(file, tuple(given)), *names)
+    config = _refused(lambda: loaded(file, tuple(given)), *names)
     if config is not None:
         _round_trip(config, folder)
     return config is not None
@@ -153,8 +155,8 @@ def at(random: Random, folder: Path) -> bool:
         texts.append(damage(random, texts.pop().encode()).decode("utf-8", "surrogateescape"))
 
     def pick() -> Any:
-        with cli._of_option("--at", PARAMETERS):
-            return choose(_config_at(folder / "base.yaml"), cli._cells(tuple(texts), PARAMETERS))
+        with of_option("--at", PARAMETERS):
+            return choose(_config_at(folder / "base.yaml"), cells_of(tuple(texts), PARAMETERS))
 
     return _refused(pick, "--at") is not None
 
@@ -201,7 +203,7 @@ def _invoke(folder: Path, *arguments: str) -> bool:
     before = set(folder.rglob("*"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        result = CliRunner().invoke(cli.main, list(arguments))
+        result = CliRunner().invoke(main, list(arguments))
     if result.exception and not isinstance(result.exception, SystemExit):
         raise Violation(f"{arguments}: {result.exception!r:.500}") from result.exception
     if result.exit_code not in (0, 2):
