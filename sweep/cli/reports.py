@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sized
 from pathlib import Path
+from typing import NoReturn
 
 import click
 
@@ -20,14 +22,9 @@ def reproduce(output: Path) -> None:
     Exit code 0 only if every row holds, 1 otherwise.
     """
     with Explained():
-        from sweep.progress import Terminal
         from sweep.reproduce import reproduce as compare
 
-        interrupt.raise_again()
-        with Terminal():
-            failed = compare(output, click.echo)
-        click.echo(f"\nwrote {output / 'reproduce.html'}; {len(failed)} rows do not hold")
-        sys.exit(ROWS_FAILED if failed else DONE)
+        _write(compare, output, "reproduce.html", "rows")
 
 
 @click.command()
@@ -41,10 +38,16 @@ def bench(output: Path) -> None:
     """
     with Explained():
         from sweep.bench import bench as measure
-        from sweep.progress import Terminal
 
-        interrupt.raise_again()
-        with Terminal():
-            failed = measure(output, click.echo)
-        click.echo(f"\nwrote {output / 'bench.html'}, .png and .csv; {len(failed)} hard cases do not hold")
-        sys.exit(ROWS_FAILED if failed else DONE)
+        _write(measure, output, "bench.html, .png and .csv", "hard cases")
+
+
+def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path, files: str, rows: str) -> NoReturn:
+    """Write a report, its `files` in the folder `output`, and end by whether all of its `rows` hold."""
+    from sweep.progress import Terminal
+
+    interrupt.raise_again()
+    with Terminal():
+        failed = report(output, click.echo)
+    click.echo(f"\nwrote {output / files}; {len(failed)} {rows} do not hold")
+    sys.exit(ROWS_FAILED if failed else DONE)
