@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models import solid
-from sweep.models.general import variant
+from sweep.models.general import rigid_body
+from sweep.models.general.variants import variant
 from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, nothing_decays
 from sweep.parameters import Parameter
 
@@ -97,7 +97,7 @@ MODEL = replace(
     rhs=rhs,
     ripple=replace(NOSLIP.ripple, of=lambda columns: NOSLIP.ripple.of(body(columns))),
     fastest_decay=nothing_decays,
-    spin_unit=lambda columns: solid.spin_unit(body(columns)),
+    spin_unit=lambda columns: rigid_body.spin_unit(body(columns)),
     impossible=lambda columns: NOSLIP.impossible(body(columns)) | ~(attitude(columns)[1] > 0),
     radians_a_step=0.07,
     fastest_motion=lambda columns: 2 * np.sqrt(2 * columns["E"] / columns["I1"]),

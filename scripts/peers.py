@@ -50,8 +50,8 @@ from tracing import traced_rhs
 
 import sweep
 from sweep.jit import load_numba
+from sweep.models.ladder.slip import MODEL
 from sweep.models.model import Array, stack
-from sweep.models.slip import MODEL
 
 numba = load_numba()
 

@@ -28,8 +28,10 @@ import numpy as np
 from reversals import last_reversal, sign_changes, window_and_ripple
 from tracing import traced_rhs
 
-from sweep.models import ellipsoid, linear, slip
+from sweep.models import ellipsoid
+from sweep.models.ladder import slip
 from sweep.models.model import Array, stack
+from sweep.models.theory import linear
 
 SEED, CELLS = 20250500, 500
 T_END = 30_000.0

@@ -30,8 +30,10 @@ import numpy as np
 from numpy.polynomial import legendre
 from tracing import traced_rhs
 
-from sweep.models import MODELS, coefficients, slip
+from sweep.models import MODELS
+from sweep.models.ladder import slip
 from sweep.models.model import Array, Model
+from sweep.models.theory import coefficients
 
 Case = dict[str, float]
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tracing import traced_rhs
 
-from sweep.models import slip
+from sweep.models.ladder import slip
 
 Array = NDArray[np.float64]
 Cell = dict[str, float]

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import sweep
-from sweep.models.rocking import slower_period
+from sweep.models.theory.rocking import slower_period
 
 BODY = {"a": 10.0, "b": 5.0, "c": 1.0, "delta": 0.03}
 FROM, TO = 0.0, 1100.0

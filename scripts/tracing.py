@@ -6,7 +6,8 @@ from collections.abc import Callable
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
-from sweep.models import ellipsoid, friction
+from sweep.models import ellipsoid
+from sweep.models.ladder import friction
 from sweep.models.model import Model
 
 

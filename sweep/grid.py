@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.models.starts import point
-from sweep.models.surfaces import PARABOLOID
+from sweep.models.general.starts import point
+from sweep.models.general.surfaces import PARABOLOID
 from sweep.parameters import PARAMETERS, START
 
 Array = NDArray[Any]

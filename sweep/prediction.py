@@ -10,10 +10,12 @@ import numpy as np
 from sweep.grid import Array, Grid
 from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.stability import stable_ranges
-from sweep.models import analytic, general, reversal_time, stability
-from sweep.models.linear import fastest_spin
+from sweep.models.general import reversal_time, variants
+from sweep.models.general.selection import PAPER_PARAMETERS
+from sweep.models.ladder import analytic
 from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
-from sweep.models.scene import PAPERS
+from sweep.models.theory import stability
+from sweep.models.theory.linear import fastest_spin
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class ReversalTime:
     time: Array
     """In the units of the model, over the cells; NaN where there is none."""
     reason: Array
-    """Why there is none, as in `sweep.models.reversal_time.REASONS`, over the cells."""
+    """Why there is none, as in `sweep.models.general.reversal_time.REASONS`, over the cells."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ def _reversal_time(model: Model, grid: Grid, found: Stability) -> ReversalTime:
     time, reason = np.full(grid.size, np.nan), np.full(grid.size, reversal_time.NOT_KNOWN)
     possible = np.flatnonzero(~model.impossible(columns))
     upper, lower = (n[place][possible] if slips else np.zeros(len(possible)) for n in found.n_c1)
-    *_, surface = general.parts(model.name)
+    *_, surface = variants.parts(model.name)
     theirs = {name: values[possible] for name, values in columns.items()}
     time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
     return ReversalTime(time, reason)
@@ -130,5 +132,5 @@ def formulas(tier: Tier, grid: Grid) -> Prediction:
     found = None
     if FORMULAS in tier.offers:
         found = Formulas(analytic.reversal_count(grid.columns()), analytic.critical_spins(bodies))
-    papers = set(bodies) <= PAPERS and not (isinstance(tier, Model) and tier.origin)
+    papers = set(bodies) <= PAPER_PARAMETERS and not (isinstance(tier, Model) and tier.origin)
     return Prediction(analytic.form_factor(bodies) if papers else None, found, None)

@@ -11,7 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from sweep.cli import main
-from sweep.models import MODELS, analytic, coefficients
+from sweep.models import MODELS
+from sweep.models.ladder import analytic
+from sweep.models.theory import coefficients
 from sweep.report import rows
 from sweep.report.rows import Section
 from sweep.reproduce import report, simulations, theory

@@ -10,8 +10,10 @@ from sweep.grid import Array
 from sweep.kernels.methods import METHODS, automatic_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import MODELS, linear, slip
+from sweep.models import MODELS
+from sweep.models.ladder import slip
 from sweep.models.model import Columns, stack
+from sweep.models.theory import linear
 from sweep.report.cells import Ends, simulate, standard
 from sweep.report.rows import Row, Section, against, below, states
 from sweep.results.dataset import STATUSES

@@ -26,7 +26,7 @@ from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.runge_kutta import step_source
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
-from sweep.models.slip_split import SPLIT, newton, slow
+from sweep.models.stiff.slip import STIFF_MODEL, newton, slow
 from sweep.report.cells import MEASURE, make_kernel, standard
 from sweep.report.rows import Section
 
@@ -126,7 +126,7 @@ def flops_of_dopri5(image: list[Counting]) -> int:
 
 def flops_of_adams(image: list[Counting]) -> int:
     """Flops of one step without measurements: two evaluations, a Newton step, and sums over the history."""
-    p, (u1, u2, M1, M2, M3, v1, v2) = SPLIT.constants(*image[7:21]), image[:7]
+    p, (u1, u2, M1, M2, M3, v1, v2) = STIFF_MODEL.constants(*image[7:21]), image[:7]
     Counting.flops = 0
     _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
     once = Counting.flops

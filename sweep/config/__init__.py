@@ -22,11 +22,11 @@ from sweep.config.values import Values
 from sweep.grid import Grid
 from sweep.kernels import methods
 from sweep.kernels.measures import MEASURES
-from sweep.models import outside
+from sweep.models.general.selection import PAPER_LAW, SI
+from sweep.models.general.surfaces import ELLIPSOID
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
-from sweep.models.scene import PAPERS_LAW, SI
-from sweep.models.surfaces import ELLIPSOID
+from sweep.models.user import loading
 from sweep.parameters import Parameter, sections
 
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
@@ -63,7 +63,7 @@ def load_config(
     if isinstance(config, Config) and not overrides:
         return config
     source, origin = _opened(config, overrides or {}, argument, announce)
-    known = outside.table(origin)
+    known = loading.table(origin)
     for key, value in (overrides or {}).items():
         source.set(_full_path(key, known), plain(value), argument(key))
     # A name made from the file's must not be refused, since the user did not choose it.
@@ -84,7 +84,7 @@ def parameters_of(config: ConfigLike, overrides: Mapping[str, Any]) -> Mapping[s
     if isinstance(config, Config) and "model" not in overrides:
         return config.table
     _, origin = _opened(config, overrides, str, lambda words: None)  # noqa: ARG005
-    return outside.table(origin)
+    return loading.table(origin)
 
 
 def _opened(
@@ -124,7 +124,7 @@ def _full_path(key: str, known: Mapping[str, Parameter]) -> tuple[str, ...]:
 
 def _resolve(checked: Any, source: document.Document, origin: Origin | None) -> Config:
     """Fill in defaults, order the axes, and check that the values fit together."""
-    known = outside.table(origin)
+    known = loading.table(origin)
     given = _given(checked, source, known)
     if not origin and "offset" in given and given["offset"].spec == 0.0:
         del given["offset"]  # the default: it does not make a body other than the paper's
@@ -178,7 +178,7 @@ def _model(
     checked: Any, origin: Origin | None, names: Collection[str], source: document.Document
 ) -> tuple[Tier, str, str, str]:
     """The model of a configuration that names these parameters, with its law of friction, its units and its surface."""
-    law, units = outside.law(origin) if origin else None, checked.units
+    law, units = loading.law(origin) if origin else None, checked.units
     surface = checked.body.surface if law or not origin else ELLIPSOID.name
     found = scenes.misfits_of_own(checked, law, names, source) if origin else scenes.misfits(checked, names, source)
     if faults := list(found):
@@ -186,8 +186,8 @@ def _model(
     if not origin:
         law_name = checked.friction.name
         return tier_of(checked.model, law_name, units, names, surface), law_name, units, surface
-    model = outside.find(origin, units, names, surface)
-    return (model, law.name, units, surface) if law else (model, PAPERS_LAW, model.units, surface)
+    model = loading.find(origin, units, names, surface)
+    return (model, law.name, units, surface) if law else (model, PAPER_LAW, model.units, surface)
 
 
 def _given(checked: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:

@@ -14,8 +14,9 @@ from sweep.config import files
 from sweep.config.checked import Config
 from sweep.config.document import Document
 from sweep.config.faults import ConfigError, Fault, brief
-from sweep.models import TIERS, outside, trial
+from sweep.models import TIERS
 from sweep.models.origin import ModelError, Origin
+from sweep.models.user import loading, trial_run
 
 LIMIT = 1 * files.MIB
 
@@ -38,7 +39,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     if not isinstance(name, str) or name in TIERS:
         return None
     origin = source.model if source.model and source.model.name == name else None
-    if origin is None and not name.endswith(SUFFIX) and (origin := outside.entry_point(name)) is None:
+    if origin is None and not name.endswith(SUFFIX) and (origin := loading.entry_point(name)) is None:
         return None  # the schema refuses it
     if announce is None:
         words = "code of a user, which is not run for a configuration that comes from a dataset"
@@ -52,7 +53,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         raise ConfigError([source.fault(("model_sha256",), words)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
     with explained(origin):
-        outside.load(origin)
+        loading.load(origin)
     return origin
 
 
@@ -66,7 +67,7 @@ def of_file(source: Document, name: str) -> Origin:
 def explained(origin: Origin | None) -> Iterator[None]:
     """Turn errors of the code of a user's model into a `ConfigError` that tells its file and line."""
     try:
-        with outside.blamed(origin):
+        with loading.blamed(origin):
             yield
     except ModelError as error:
         raise ConfigError([Fault(error.place, error.line, None, (), error.message)]) from None
@@ -78,4 +79,4 @@ def try_out(config: Config) -> None:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
         ends |= {name: np.array([column[0], column[-1]]) for name, column in (config.cases or {}).items()}
         with explained(config.origin):
-            trial.try_out(config.equations, ends, config.own_law)
+            trial_run.try_out(config.equations, ends, config.own_law)

@@ -18,12 +18,14 @@ from sweep.config.faults import Fault, Path
 from sweep.config.schema import LATEST, T_END, Integrator
 from sweep.config.values import Values
 from sweep.kernels.kernel import STRETCH
-from sweep.models import TIERS, laws, outside
-from sweep.models.general import BASES
+from sweep.models import TIERS
+from sweep.models.general import laws
+from sweep.models.general.selection import PAPER, PAPER_LAW, SI, is_papers, variant
+from sweep.models.general.surfaces import ELLIPSOID, PARABOLOID
+from sweep.models.general.variants import BASES
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
-from sweep.models.scene import PAPER, PAPERS_LAW, SI, is_papers, variant
-from sweep.models.surfaces import ELLIPSOID, PARABOLOID
+from sweep.models.user import loading
 from sweep.parameters import ON_PARABOLOID, Parameter, sections
 from sweep.variables import in_si
 
@@ -56,10 +58,10 @@ class Config:
     """Columns of the table of cases, if there is one."""
     cases_file: str | None = None
     units: str = PAPER
-    law: str = PAPERS_LAW
-    """Name of the law of friction, as in `sweep.models.laws.LAWS`."""
+    law: str = PAPER_LAW
+    """Name of the law of friction, as in `sweep.models.general.laws.LAWS`."""
     surface: str = ELLIPSOID.name
-    """Name of the surface, as in `sweep.models.surfaces.SURFACES`."""
+    """Name of the surface, as in `sweep.models.general.surfaces.SURFACES`."""
     origin: Origin | None = None
     """Where the model comes from, if a user brings it."""
     source: Document | None = field(default=None, init=False, compare=False, repr=False)
@@ -78,7 +80,7 @@ class Config:
         """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
         names = (*self.parameters, *(self.cases or ()))
         if self.origin:
-            return outside.find(self.origin, self.units, names, self.surface)
+            return loading.find(self.origin, self.units, names, self.surface)
         return tier_of(self.model, self.law, self.units, names, self.surface)
 
     @property
@@ -89,7 +91,7 @@ class Config:
     @property
     def own_law(self) -> laws.Law | None:
         """The law of friction that a user brings for a rattleback."""
-        return outside.law(self.origin) if self.origin else None
+        return loading.law(self.origin) if self.origin else None
 
     @property
     def of_rattlebacks(self) -> bool:
@@ -99,7 +101,7 @@ class Config:
     @property
     def table(self) -> Mapping[str, Parameter]:
         """The parameters that it may name."""
-        return outside.table(self.origin)
+        return loading.table(self.origin)
 
     @property
     def equations(self) -> Model:
@@ -136,7 +138,7 @@ class Config:
         top: dict[str, Any] = {"model_sha256": self.origin.digest} if self.origin else {}
         if self.units != PAPER and self.of_rattlebacks:
             top["units"] = self.units
-        if self.law != PAPERS_LAW and not self.origin:
+        if self.law != PAPER_LAW and not self.origin:
             law, _, regularisation = self.law.partition("-")
             found["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
         if self.surface != ELLIPSOID.name:

@@ -16,11 +16,11 @@ from sweep.config.checked import Config
 from sweep.config.document import Document
 from sweep.config.faults import Fault
 from sweep.grid import BODY, Grid, distinct, off_the_body
-from sweep.models import bodies
-from sweep.models.general import BASES
-from sweep.models.laws import Law
-from sweep.models.scene import INERTIA, PAPER, PAPERS, PAPERS_LAW, SI, is_papers, strangers
-from sweep.models.surfaces import ELLIPSOID, PARABOLOID, SURFACES
+from sweep.models.general import validity
+from sweep.models.general.laws import Law
+from sweep.models.general.selection import INERTIA, PAPER, PAPER_LAW, PAPER_PARAMETERS, SI, is_papers, strangers
+from sweep.models.general.surfaces import ELLIPSOID, PARABOLOID, SURFACES
+from sweep.models.general.variants import BASES
 from sweep.parameters import PARAMETERS, Parameter
 
 
@@ -46,8 +46,8 @@ def misfits(checked: Any, names: Collection[str], source: Document) -> Iterator[
     if is_papers(law, units, names, surface):
         return
     if checked.model not in BASES:
-        beyond = [name for name in names if name not in PAPERS]
-        beyond += [f"law: {law}"] * (law != PAPERS_LAW) + [f"units: {units}"] * (units != PAPER)
+        beyond = [name for name in names if name not in PAPER_PARAMETERS]
+        beyond += [f"law: {law}"] * (law != PAPER_LAW) + [f"units: {units}"] * (units != PAPER)
         beyond += [f"surface: {surface}"] * (surface != ELLIPSOID.name)
         words = f"the {checked.model} model knows no {', '.join(beyond)}; allowed: {', '.join(BASES)}"
         yield source.fault(("model",), words)
@@ -58,7 +58,7 @@ def misfits(checked: Any, names: Collection[str], source: Document) -> Iterator[
 
 def without_default(units: str, surface: str) -> list[Parameter]:
     """The parameters of the paper that a configuration has to give, because their defaults are of other bodies."""
-    names = PAPERS if units == SI else {"a", "b"} if surface == PARABOLOID.name else ()
+    names = PAPER_PARAMETERS if units == SI else {"a", "b"} if surface == PARABOLOID.name else ()
     return [PARAMETERS[name] for name in names]
 
 
@@ -110,7 +110,7 @@ def _reasons(config: Config) -> list[_Reason]:
     for columns in distinct(grid, BODY):
         left = np.ones(len(columns["a"]), bool)
         seen += len(left)
-        for bad, words in bodies.wrongs(columns, surface):
+        for bad, words in validity.wrongs(columns, surface):
             cells = np.flatnonzero(bad & left)
             if len(cells):
                 given = [name for name in ("a", "b", "c", "offset", *INERTIA) if name in columns]

@@ -17,10 +17,11 @@ from sweep.config.values import Strict, Whole, parse_values, whole
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
-from sweep.models import TIERS, outside
+from sweep.models import TIERS
+from sweep.models.general.selection import PAPER, SI
+from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.origin import Origin
-from sweep.models.scene import PAPER, SI
-from sweep.models.surfaces import ELLIPSOID, SURFACES
+from sweep.models.user import loading
 from sweep.parameters import PARAMETERS, Parameter, sections
 
 _STEP = Allowed("auto, or a finite number > 0")
@@ -133,7 +134,7 @@ class Law(_Words):
 
     @property
     def name(self) -> str:
-        """As in `sweep.models.laws.LAWS`."""
+        """As in `sweep.models.general.laws.LAWS`."""
         return f"{self.law}-{self.regularisation}" if self.law == "coulomb" else self.law
 
 
@@ -193,8 +194,8 @@ def _section(name: str, table: Mapping[str, Parameter], words: type[_Words]) -> 
 @cache
 def schema_of(origin: Origin | None) -> Any:
     """The schema of the configurations of a user's model, or, without one, of the models of this package."""
-    table = outside.table(origin)
-    words = _WORDS if not origin else {"body": Shape} if outside.law(origin) else {}
+    table = loading.table(origin)
+    words = _WORDS if not origin else {"body": Shape} if loading.law(origin) else {}
     found: dict[str, Any] = {name: _section(name, table, words.get(name, _Words)) for name in sections(table)}
     if origin:
         found["model"] = str, ...

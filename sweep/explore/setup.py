@@ -13,7 +13,7 @@ from sweep.config.document import Document
 from sweep.config.faults import brief
 from sweep.explore.slices import Source
 from sweep.explore.state import Cell
-from sweep.models import outside
+from sweep.models.user import loading
 
 Announce = Callable[[str], None]
 
@@ -61,7 +61,7 @@ def _named(source: Source, model: str) -> dict[str, Any]:
     place = str(Path(model).absolute()) if model.endswith(brought.SUFFIX) else model
     option = Document("", {"model": place}, arguments={("model",): ("--model", ("model",))})
     wanted = source.dataset.attrs.get("model_sha256")
-    found = brought.of_file(option, place) if model.endswith(brought.SUFFIX) else outside.entry_point(model)
+    found = brought.of_file(option, place) if model.endswith(brought.SUFFIX) else loading.entry_point(model)
     if wanted is None:
         words = f"the model of {source.name} is none that a user brought; allowed: no --model"
     elif found is None:

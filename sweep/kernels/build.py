@@ -33,9 +33,10 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import make_kernel
 from sweep.kernels.quartic import compiled_modes, has_fast_slip
 from sweep.kernels.stability import compile_theory, compiled_search
-from sweep.models import find, outside
+from sweep.models import find
 from sweep.models.model import Model
 from sweep.models.origin import Origin
+from sweep.models.user import loading
 from sweep.parameters import PAPER
 
 Piece = tuple[str, ...]
@@ -73,7 +74,7 @@ def try_compiling(model: Model) -> None:
     """Compile the inline functions of a model one by one, so that a fault is known by its line; `ModelError` if any."""
     numba, states = load_numba(), (0.0,) * len(model.states)
     constants = model.constants(*(0.0 for _ in model.constants._fields))
-    with outside.blamed(model.origin):
+    with loading.blamed(model.origin):
         for function, arguments in ((model.rhs, (states, constants)), (model.energy, (states, constants)),
                                     (model.tilt, (states,))):  # fmt: skip
             compiled(function).compile(tuple(map(numba.typeof, arguments)))
@@ -145,7 +146,7 @@ def main(what: str, *which: str) -> None:
 
 
 def _brought(name: str) -> Model:
-    return outside.compiled_as(Origin(**json.loads(sys.stdin.buffer.readline())), name.partition("@")[0])
+    return loading.compiled_as(Origin(**json.loads(sys.stdin.buffer.readline())), name.partition("@")[0])
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def has_fast_slip(model: Model) -> bool:
 
 
 def make_jacobian(model: Model) -> Any:
-    """Compiled (rows, i, spin, J) -> None: the Jacobian of `sweep.models.linear`, of the body in row i, to J (6, 6)."""
+    """Compiled (rows, i, spin, J) -> None: the Jacobian of `theory.linear`, of the body in row i, to J (6, 6)."""
     rattle = [i for i in range(len(model.states)) if i != model.spin_state]
     slopes = compiled(compile_inline("slopes", "def slopes(y, p):\n    return rhs(y, p)[0]", {"rhs": model.rhs}))
     constants = " ".join(f"rows[i, {j}]," for j in range(len(model.constants._fields)))

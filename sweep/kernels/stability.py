@@ -1,4 +1,4 @@
-"""At which spins upright spin is stable, compiled: `sweep.models.stability` and `sweep.models.linear` for slip.
+"""At which spins upright spin is stable, compiled: `theory.stability` and `theory.linear` for slip.
 
 A rattle decays where the coefficients of its polynomial (`sweep.kernels.quartic`) fulfil the conditions of Routh and
 Hurwitz,
@@ -23,8 +23,9 @@ import numpy as np
 
 from sweep.jit import Cached, called, compiled, on_all_threads, serial
 from sweep.kernels.quartic import compiled_modes, has_fast_slip, make_jacobian, quartic
-from sweep.models import analytic, linear, stability
+from sweep.models.ladder import analytic
 from sweep.models.model import Array, Columns, Model, nothing, stack, take
+from sweep.models.theory import linear, stability
 
 # Samples of the coefficients, at Chebyshev points; the last two terms of their Chebyshev series must be below this
 # share of the largest.
@@ -46,7 +47,7 @@ _PART = 128
 
 
 def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
-    """As `sweep.models.stability.stable_ranges`, shape (6, bodies), and the |spin| up to which no range is missing.
+    """As `theory.stability.stable_ranges`, shape (6, bodies), and the |spin| up to which no range is missing.
 
     The range about zero is always found; of the ranges beyond it, those that begin within the |spin| in the second
     array, shape (bodies,), which is infinite where the eigenvalues were asked.
@@ -72,7 +73,7 @@ def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
 
 
 def fastest_motion(model: Model, columns: Columns) -> Array:
-    """As `sweep.models.linear.fastest_motion`."""
+    """As `sweep.models.theory.linear.fastest_motion`."""
     if not has_fast_slip(model) or _uncompiled.get():
         return linear.fastest_motion(model, columns)
     reach, rows = linear.fastest_spin(model, columns), _rows(model.constants.of(columns))

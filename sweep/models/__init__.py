@@ -1,6 +1,7 @@
 """The ladder of models, one file each; every model approximates the one before it."""
 
-from sweep.models import analytic, averaged, effective, general, noslip, slip
+from sweep.models.general import variants
+from sweep.models.ladder import analytic, averaged, effective, noslip, slip
 from sweep.models.model import Model, Tier
 
 MODELS: dict[str, Model] = {module.MODEL.name: module.MODEL for module in (slip, noslip, effective, averaged)}
@@ -8,7 +9,7 @@ MODELS: dict[str, Model] = {module.MODEL.name: module.MODEL for module in (slip,
 
 def find(name: str) -> Model:
     """The model of a name: one of `MODELS`, or a variant such as `slip+coulomb-tanh+sigma`."""
-    return MODELS[name] if name in MODELS else general.variant(name)
+    return MODELS[name] if name in MODELS else variants.variant(name)
 
 
 TIERS: dict[str, Tier] = {**MODELS, analytic.MODEL.name: analytic.MODEL}

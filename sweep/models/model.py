@@ -12,12 +12,12 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 4. Say what the model depends on and what can be asked of it (`parameters`, `offers`).
 5. If friction or anything else makes the model stiff, bound its fastest decay (`fastest_decay`).
 
-A model of a user (`sweep.models.outside`) may be of any body.  Where that has no upright spin, no state need vanish:
-the model does not offer `LINEAR`, tells its `fastest_motion`, and settles where it says that its spin is `decided`.
+A model of a user (`sweep.models.user`) may be of any body.  Where that has no upright spin, no state need vanish: the
+model does not offer `LINEAR`, tells its `fastest_motion`, and settles where it says that its spin is `decided`.
 
 `constants.of`, `start` and `energy` are called when a run is prepared, `rhs` in every stage of a step, and `energy`
-again at every look.  The linear theory of `sweep.models.linear` calls `upright` and `rhs`, the latter with complex
-states.
+again at every look.  The linear theory (`sweep.models.theory.linear`) calls `upright` and `rhs`, the latter with
+complex states.
 
 Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.  Equations that hold in any units say what
 sqrt(g/c) is in theirs (`spin_unit`).

@@ -7,7 +7,7 @@ import re
 import xarray as xr
 
 from sweep.kernels import status
-from sweep.models.surfaces import PARABOLOID
+from sweep.models.general.surfaces import PARABOLOID
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 from sweep.results.kind import is_of_own_body, parameters

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.grid import Array
-from sweep.models.analytic import best_b
+from sweep.models.ladder.analytic import best_b
 from sweep.plots import labels
 from sweep.plots.quantities import PREDICTIONS, field, subject
 

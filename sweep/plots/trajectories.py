@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sweep.grid import Array
-from sweep.models import solid
-from sweep.models.surfaces import ELLIPSOID, SURFACES
+from sweep.models.general import rigid_body
+from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, legends, theory
 from sweep.plots.figure import Picture
 from sweep.plots.panels import heading
@@ -168,9 +168,9 @@ def reversal_times(one: xr.Dataset) -> Array:
     if is_of_own_body(one):  # whose period nobody knows
         at = np.flatnonzero(spin[1:] * spin[:-1] < 0)
         return np.asarray(time[at] + (time[at + 1] - time[at]) * spin[at] / (spin[at] - spin[at + 1]))
-    columns = {name: np.atleast_1d(one[name].values) for name in solid.PARAMETERS if name in one}
+    columns = {name: np.atleast_1d(one[name].values) for name in rigid_body.PARAMETERS if name in one}
     surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
-    tau = float(solid.slower_period(columns, surface)[0])
+    tau = float(rigid_body.slower_period(columns, surface)[0])
     total = np.concatenate([[0], np.cumsum(np.diff(time) * (spin[1:] + spin[:-1]) / 2)])
     ends = np.arange(0, time[-1], tau)
     means = np.diff(np.interp(ends, time, total)) / tau

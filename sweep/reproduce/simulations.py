@@ -13,7 +13,8 @@ from sweep.config import Config, Integrator, Values
 from sweep.engine.run import run
 from sweep.grid import Array
 from sweep.kernels.measures import possible
-from sweep.models import MODELS, TIERS, analytic
+from sweep.models import MODELS, TIERS
+from sweep.models.ladder import analytic
 from sweep.parameters import PARAMETERS
 from sweep.plots.trajectories import draw_spin
 from sweep.report.cells import standard

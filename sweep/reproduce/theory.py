@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.grid import Array
-from sweep.models import MODELS, analytic, stability
-from sweep.models.coefficients import coefficients
+from sweep.models import MODELS
+from sweep.models.ladder import analytic
 from sweep.models.model import Columns, stack
-from sweep.models.rocking import slower_period
+from sweep.models.theory import stability
+from sweep.models.theory.coefficients import coefficients
+from sweep.models.theory.rocking import slower_period
 from sweep.report import cells
 from sweep.report.cells import standard
 from sweep.report.rows import Row, Section, against, below

@@ -15,9 +15,9 @@ from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
-from sweep.models import reversal_time
-from sweep.models.scene import PAPER, SI
-from sweep.models.surfaces import ELLIPSOID
+from sweep.models.general import reversal_time
+from sweep.models.general.selection import PAPER, SI
+from sweep.models.general.surfaces import ELLIPSOID
 from sweep.prediction import Prediction
 from sweep.variables import Variable, in_si, without_unit
 

@@ -18,9 +18,9 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import TIME_LIMIT
 from sweep.kernels.tableau import DOPRI5
-from sweep.models.linear import jacobian
 from sweep.models.model import Columns, Model, stack
-from sweep.models.stability import SPIN_LIMIT
+from sweep.models.theory.linear import jacobian
+from sweep.models.theory.stability import SPIN_LIMIT
 from sweep.studies.bracket import FAILED, HAPPENS, NOT_YET, Bracket, Question, search
 from sweep.studies.rounds import Batch, Rounds, Simulations
 from sweep.studies.stepwise import stepwise

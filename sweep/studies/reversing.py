@@ -17,9 +17,9 @@ from sweep.kernels import methods
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import AUTO, METHODS, allowed
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
-from sweep.models import linear
 from sweep.models.model import Columns
-from sweep.models.stability import SPIN_LIMIT
+from sweep.models.theory import linear
+from sweep.models.theory.stability import SPIN_LIMIT
 from sweep.studies.bracket import FAILED, HAPPENS, NOT_YET, UNDECIDED, Bracket, Question, search
 from sweep.studies.rounds import Batch, Rounds, Simulations
 

@@ -29,8 +29,8 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import RUNNING
-from sweep.models.linear import fastest_motion
 from sweep.models.model import Columns, Model
+from sweep.models.theory.linear import fastest_motion
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.rounds import Simulations

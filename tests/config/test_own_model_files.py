@@ -19,9 +19,9 @@ from support.own import FADING, PENDULUM
 import sweep
 from sweep.config import ConfigError, load_config
 from sweep.grid import Grid
-from sweep.models import outside
 from sweep.models.model import ENERGY, LINEAR
-from sweep.models.stability import stable_ranges
+from sweep.models.theory.stability import stable_ranges
+from sweep.models.user import loading
 
 MARK = "import numpy as np\n"
 
@@ -38,9 +38,9 @@ def ran(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("SIGN_OF_THE_PENDULUM", str(sign))
     sign_it = "import os\nopen(os.environ['SIGN_OF_THE_PENDULUM'], 'w').close()\n"
     (folder / "pendulum.py").write_text(PENDULUM.replace(MARK, MARK + sign_it, 1), encoding="utf-8")
-    outside.load.cache_clear()
+    loading.load.cache_clear()
     yield sign
-    outside.load.cache_clear()
+    loading.load.cache_clear()
 
 
 def after(text: str, old: str, new: str, message: str, at: str = "MODEL =") -> tuple[str, int, str]:
@@ -171,7 +171,7 @@ def test_what_only_opens_the_dataset_does_not_run_it(folder: Path, ran: Path) ->
     sweep.run(folder / "pendulum.yaml", folder, damping=[0.3, 0.5], torque=1.0, t_end=5)
     assert ran.exists()
     ran.unlink()
-    outside.load.cache_clear()
+    loading.load.cache_clear()
     file = folder / "pendulum.nc"
     assert invoke("info", file).exit_code == 0
     assert invoke("plot", file, "--output", folder / "map.png").exit_code == 0
@@ -255,8 +255,8 @@ def test_the_law_of_a_file_takes_the_place_of_law(folder: Path) -> None:
 
 LIKE_OURS = """\
 from sweep.jit import inline
-from sweep.models.general import with_law
-from sweep.models.laws import Law
+from sweep.models.general.variants import with_law
+from sweep.models.general.laws import Law
 
 
 @inline
@@ -285,7 +285,7 @@ def test_a_body_of_either_surface_slips_by_the_law_of_a_file_as_by_the_same_of_o
     mine = load_config({**scene, "model": str(folder / "mine.py"), "friction": force})
     assert mine.surface == shape.get("surface", "ellipsoid")
     assert load_config(mine, {"mu": 0.6}).surface == load_config(dict(mine.document())).surface == mine.surface
-    assert outside.compiled_as(mine.origin, mine.equations.name).constants._fields == ours.equations.constants._fields
+    assert loading.compiled_as(mine.origin, mine.equations.name).constants._fields == ours.equations.constants._fields
     columns, got = Grid.of(ours).columns(), []
     for model in (ours.equations, mine.equations):
         constants = model.constants.of(columns)

@@ -30,7 +30,7 @@ from sweep.kernels import build as builder
 from sweep.kernels.build import build
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models import MODELS
-from sweep.models.stability import stable_ranges
+from sweep.models.theory.stability import stable_ranges
 from sweep.plots import labels, trajectories
 from sweep.prediction import predict
 from sweep.results.store import StoreError
@@ -290,7 +290,7 @@ def test_the_linear_theory_of_a_model_is_that_of_ours(folder: Path) -> None:
 UPRIGHT = """\
 from dataclasses import replace
 
-from sweep.models import slip
+from sweep.models.ladder import slip
 from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN
 
 MODEL = replace(slip.MODEL, name="mine", offers=frozenset({COUNT, SPIN, ENERGY, LINEAR}))

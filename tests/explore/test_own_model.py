@@ -18,7 +18,7 @@ from sweep.explore import cells, export, state
 from sweep.explore.setup import Setup, usable, why_still
 from sweep.explore.slices import Source, open_source
 from sweep.explore.state import State
-from sweep.models import outside
+from sweep.models.user import loading
 
 FEW = {"damping": [0.3, 0.5, 0.7], "torque": [0.5, 1.0, 1.2, 1.5], "t_end": 60}
 
@@ -42,7 +42,7 @@ def setup(source: Source, folder: Path) -> Setup:
 
 
 def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.models.outside.load", lambda origin: pytest.fail(f"ran {origin.place}"))
+    monkeypatch.setattr("sweep.models.user.loading.load", lambda origin: pytest.fail(f"ran {origin.place}"))
     assert usable(source) is None
     with pytest.raises(ConfigError, match="code of a user, which is not run for a configuration that comes from a da"):
         Setup(source)
@@ -53,7 +53,7 @@ def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest
 
 def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, folder: Path) -> None:
     said = list[str]()
-    outside.load.cache_clear()
+    loading.load.cache_clear()
     setup = Setup(source, str(folder / "pendulum.py"), said.append)
     (words,) = said
     assert words.startswith(f"running the code of {folder / 'pendulum.py'} (SHA-256 ")
@@ -66,7 +66,7 @@ def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, 
 
 def refused(source: Source, model: Path | str, monkeypatch: pytest.MonkeyPatch) -> str:
     """What is said of another model, whose code does not run."""
-    monkeypatch.setattr("sweep.models.outside.load", lambda origin: pytest.fail(f"ran {origin.place}"))
+    monkeypatch.setattr("sweep.models.user.loading.load", lambda origin: pytest.fail(f"ran {origin.place}"))
     with pytest.raises(ConfigError) as error:
         Setup(source, str(model), lambda words: pytest.fail(words))
     (fault,) = error.value.faults

@@ -21,9 +21,11 @@ from sweep.kernels.adams.weights import fitted_weights, plain_weights
 from sweep.kernels.layout import LANES
 from sweep.kernels.methods import automatic_step, make_kernel
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
-from sweep.models import MODELS, find, slip, slip_split
+from sweep.models import MODELS, find
+from sweep.models.ladder import slip
 from sweep.models.model import take
-from sweep.models.rocking import frequencies
+from sweep.models.stiff import slip as stiff_slip
+from sweep.models.theory.rocking import frequencies
 
 Write = Callable[..., Path]
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
@@ -36,39 +38,39 @@ bodies = st.fixed_dictionaries({"a": st.floats(2, 15), "b": st.floats(1.1, 10), 
 
 @given(st.tuples(tilt, tilt, rate, rate, rate, slide, slide).map(np.array), bodies)
 def test_the_split_equations_are_those_of_slip(y: np.ndarray, body: dict[str, float]) -> None:
-    p_slip, p = take(slip.Constants.of(columns(**body)), 0), take(slip_split.Constants.of(columns(**body)), 0)
+    p_slip, p = take(slip.Constants.of(columns(**body)), 0), take(stiff_slip.Constants.of(columns(**body)), 0)
     slopes, (n, _, R, _) = slip.rhs(y, p_slip)
-    split = np.array(slip_split.momentum(y, p))
-    ours, geometry = slip_split.slow(*split, p)
+    split = np.array(stiff_slip.momentum(y, p))
+    ours, geometry = stiff_slip.slow(*split, p)
     np.testing.assert_allclose(geometry[7:10], y[2:5], atol=1e-12)
     # M' along the slip model's motion, by a complex step through the change of variables.
-    moved = np.array(slip_split.momentum(y + 1e-30j * np.array(slopes), p)).imag / 1e-30
+    moved = np.array(stiff_slip.momentum(y + 1e-30j * np.array(slopes), p)).imag / 1e-30
     scale = 1 + np.abs(moved).max() + body["mu"]
     np.testing.assert_allclose(ours, moved[:5], atol=1e-11 * scale)
     # A Newton step of vanishing weight γ moves v by γ v'; with 1e-9 the second order showed near the paradox.
     gamma = 1e-11
-    v1, v2, num, den = slip_split.newton(*split[[0, 1, 5, 6]], geometry, p, gamma, y[5], y[6])
+    v1, v2, num, den = stiff_slip.newton(*split[[0, 1, 5, 6]], geometry, p, gamma, y[5], y[6])
     np.testing.assert_allclose((np.array([v1, v2]) - y[5:]) / gamma, slopes[5:], atol=1e-5 * scale)
     assert num / den == pytest.approx(R, abs=1e-9 * scale)
-    assert slip_split.energy(split, p)[0] == pytest.approx(n, abs=1e-12)
-    np.testing.assert_allclose(slip_split.energy(split, p), slip.energy(y, p_slip), atol=1e-11)
+    assert stiff_slip.energy(split, p)[0] == pytest.approx(n, abs=1e-12)
+    np.testing.assert_allclose(stiff_slip.energy(split, p), slip.energy(y, p_slip), atol=1e-11)
 
 
 @given(st.floats(-0.002, 0.002), st.floats(-0.002, 0.002), st.floats(100, 1e5), st.floats(-1, 1), st.floats(-1, 1))
 def test_newton_solves_the_stiff_slip(v1: float, v2: float, mu: float, away1: float, away2: float) -> None:
     """One step leaves little of the residual of v = b + γ v_p'(v): the Jacobian is that of all stiff terms."""
-    p = take(slip_split.Constants.of(columns(mu=mu)), 0)
-    split = np.array(slip_split.momentum(np.array([1e-2, 2e-2, 1e-2, 2e-2, -0.05, v1, v2]), p))
+    p = take(stiff_slip.Constants.of(columns(mu=mu)), 0)
+    split = np.array(stiff_slip.momentum(np.array([1e-2, 2e-2, 1e-2, 2e-2, -0.05, v1, v2]), p))
     gamma = 0.05
 
     def slip_rate(v: np.ndarray) -> np.ndarray:
-        y = slip_split.velocities(np.array([*split[:5], *v]), p)
+        y = stiff_slip.velocities(np.array([*split[:5], *v]), p)
         return np.array(slip.rhs(y, p)[0][5:])
 
     base = np.array([v1, v2]) - gamma * slip_rate(np.array([v1, v2]))  # so that (v1, v2) is the solution
     start = np.array([v1, v2]) + 0.01 / mu * np.array([away1, away2])
-    _, geometry = slip_split.slow(*split[:5], *start, p)
-    end = slip_split.newton(split[0], split[1], *start, geometry, p, gamma, *base)[:2]
+    _, geometry = stiff_slip.slow(*split[:5], *start, p)
+    end = stiff_slip.newton(split[0], split[1], *start, geometry, p, gamma, *base)[:2]
     assert np.abs(end - np.array([v1, v2])).max() <= 0.05 * np.abs(start - np.array([v1, v2])).max() + 1e-5 / mu
 
 
@@ -93,12 +95,12 @@ def test_weights(formula: tuple[int, ...]) -> None:
 @given(bodies, st.floats(0, 0.1))
 def test_rocking_frequency_and_corrector_matrix(body: dict[str, float], weight: float) -> None:
     """Its frequency and the matrix of the corrector against the derivatives of `slow` by complex steps."""
-    p = take(slip_split.Constants.of(columns(**body)), 0)
-    slopes = [slip_split.slow(*(1e-30j * np.eye(7)[i]), p)[0] for i in range(4)]
+    p = take(stiff_slip.Constants.of(columns(**body)), 0)
+    slopes = [stiff_slip.slow(*(1e-30j * np.eye(7)[i]), p)[0] for i in range(4)]
     J = np.array(slopes).T[:4].imag / 1e-30
     theirs = np.sort(np.abs(np.linalg.eigvals(J).imag))[[0, -1]]
     assert frequencies(p) == pytest.approx(theirs, rel=1e-6, abs=1e-6)
-    inverse = np.reshape(slip_split.implicit(weight, p), (4, 4))
+    inverse = np.reshape(stiff_slip.implicit(weight, p), (4, 4))
     np.testing.assert_allclose(inverse @ (np.eye(4) - weight * J), np.eye(4), atol=1e-12)
 
 

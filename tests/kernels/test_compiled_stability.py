@@ -7,8 +7,9 @@ import pytest
 from support import columns, wide_bodies
 
 from sweep.kernels import stability as compiled
-from sweep.models import MODELS, linear, stability
+from sweep.models import MODELS
 from sweep.models.model import Columns
+from sweep.models.theory import linear, stability
 
 SLIP = MODELS["slip"]
 

@@ -7,7 +7,7 @@ import pytest
 
 from sweep.kernels.differentiate import Traced, make_extended
 from sweep.models import MODELS, find
-from sweep.models.laws import LAWS
+from sweep.models.general.laws import LAWS
 
 COUPLES = ("slip+viscous+sigma+rolling", "noslip+solid+sigma+rolling")
 

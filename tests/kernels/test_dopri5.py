@@ -14,10 +14,13 @@ from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.method import ACCURACY, STABILITY
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import MODELS, linear, slip, slip_split, stability
-from sweep.models.linear import jacobian
+from sweep.models import MODELS
+from sweep.models.ladder import slip
 from sweep.models.model import take
-from sweep.models.rocking import slower_period
+from sweep.models.stiff import slip as stiff_slip
+from sweep.models.theory import linear, stability
+from sweep.models.theory.linear import jacobian
+from sweep.models.theory.rocking import slower_period
 
 DOPRI = kernel("dopri5")
 STATES = len(slip.MODEL.states)
@@ -142,10 +145,10 @@ def test_windows_are_averages_of_the_ripple_free_spin() -> None:
     table = images(DOPRI, 0.01, t_end, mu=75.0)
     tau, times = of(table, "period")[0], np.arange(0, t_end, 0.02)
     y = adaptive.motion(body, times, rtol=1e-11, atol=1e-15)[:STATES]
-    p = slip_split.Constants.of(body)
-    u1, u2, M1, M2, *_ = slip_split.momentum(y, take(p, 0))
+    p = stiff_slip.Constants.of(body)
+    u1, u2, M1, M2, *_ = stiff_slip.momentum(y, take(p, 0))
     (K11, K12), (K21, K22) = numerical_form(body)
-    spin, *_ = slip.energy(y, take(slip_split.slip_constants(p), 0))
+    spin, *_ = slip.energy(y, take(stiff_slip.slip_constants(p), 0))
     steady = spin - (K11 * u1 * M1 + K12 * u1 * M2 + K21 * u2 * M1 + K22 * u2 * M2)
     ends = np.arange(0, times[-1], tau)
     means = np.diff(CubicSpline(times, steady).antiderivative()(ends)) / tau

@@ -8,7 +8,8 @@ from support import columns, independent
 
 from sweep.kernels.failure import approach
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
-from sweep.models import MODELS, slip
+from sweep.models import MODELS
+from sweep.models.ladder import slip
 from sweep.models.model import Array, stack
 
 ENDS = {

@@ -21,7 +21,7 @@ from sweep.kernels.measures import chosen
 from sweep.kernels.measures.lyapunov import BINS
 from sweep.kernels.runge_kutta import RungeKuttaKernel
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import noslip
+from sweep.models.ladder import noslip
 from sweep.models.model import SPIN, Model, stack, take
 
 Write = Callable[..., Path]

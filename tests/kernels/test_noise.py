@@ -16,8 +16,9 @@ from sweep.kernels.adams import stretches
 from sweep.kernels.measures import noise
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import QUIET, RUNNING
-from sweep.models import MODELS, slip_split
-from sweep.models.modes import _rocking
+from sweep.models import MODELS
+from sweep.models.stiff import slip as stiff_slip
+from sweep.models.stiff.modes import _rocking
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
 Write = Callable[..., Path]
@@ -79,7 +80,7 @@ def test_a_mode_let_down_too_late_is_flagged() -> None:
 def test_growth_is_that_of_the_model() -> None:
     body = columns(b=[1.5, 3.0, 6.0], mu=[60.0, 200.0, 400.0], n0=[0.05, -0.1, 0.08])
     c = noise.growth_coefficients(body)
-    constants = slip_split.Constants.of(body)
+    constants = stiff_slip.Constants.of(body)
     for share in (-1.0, -0.4, 0.1, 0.7):
         spin = share * body["n0"]
         rates, _, _ = _rocking(constants, spin)

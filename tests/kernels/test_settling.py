@@ -11,7 +11,8 @@ from support import wide_bodies
 import sweep
 from sweep.bench.reference import COUNTS
 from sweep.kernels.status import SETTLED
-from sweep.models import MODELS, stability
+from sweep.models import MODELS
+from sweep.models.theory import stability
 
 
 @pytest.mark.parametrize("method", ["dopri5", "adams"])

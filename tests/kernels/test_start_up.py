@@ -15,9 +15,11 @@ from sweep.kernels.layout import LANES
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import LIFT_OFF, RUNNING
 from sweep.kernels.tableau import DOPRI5
-from sweep.models import MODELS, slip, slip_split
+from sweep.models import MODELS
+from sweep.models.ladder import slip
 from sweep.models.model import Columns, take
-from sweep.models.slip_split import PAPERS
+from sweep.models.stiff import slip as stiff_slip
+from sweep.models.stiff.slip import PAPER_FORM
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
 
@@ -48,11 +50,11 @@ def test_states_history_and_work_against_dopri5(mu: float, step: float, bound: f
     for j in range(HISTORY):
         time = image[ADAMS.row("begin")] - j * h
         twin = resolved(body, time, fine)
-        state = np.array(slip_split.momentum(twin[:7], p))
+        state = np.array(stiff_slip.momentum(twin[:7], p))
         slot = HISTORY - 1 - j
         slopes = image[ADAMS.row(f"f{slot}_0") :][:5]
         # By the exact slow slopes, at the exact slip.
-        np.testing.assert_allclose(slopes, slip_split.slow(*state, p)[0], atol=100 * bound)
+        np.testing.assert_allclose(slopes, stiff_slip.slow(*state, p)[0], atol=100 * bound)
         np.testing.assert_allclose(image[ADAMS.row(f"v{slot}_0") :][:2], state[5:], atol=10 * bound)
         if j == 0:
             np.testing.assert_allclose(image[:7], state, atol=10 * bound)
@@ -84,14 +86,15 @@ def test_start_up_leaves_no_trace_in_the_spin() -> None:
 def test_bit_identical_for_each_grouping_and_thread() -> None:
     with threads(2):
         expected = begun(MIXED, STEPS)
-    assert len(np.unique(start_up.count_levels(PAPERS.slip_decay(MIXED), STEPS))) > 10
+    assert len(np.unique(start_up.count_levels(PAPER_FORM.slip_decay(MIXED), STEPS))) > 10
     order = np.random.default_rng(2).permutation(len(STEPS))
     shuffled = begun({name: values[order] for name, values in MIXED.items()}, STEPS[order])
     np.testing.assert_array_equal(shuffled, expected[order])
     with threads(1):
         for i in range(0, len(STEPS), 9):
             np.testing.assert_array_equal(begun(cell(MIXED, i), STEPS[i : i + 1])[0], expected[i])
-    assert len(start_up.compiled_start_up(PAPERS).signatures) == 1  # not compiled once for a cell and again for many
+    # Not compiled once for a cell and again for many.
+    assert len(start_up.compiled_start_up(PAPER_FORM).signatures) == 1
 
 
 def test_a_level_may_have_more_cells_than_lanes() -> None:
@@ -123,14 +126,14 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
     assert (reached[~ended] > begin[~ended, ADAMS.row("begin")]).all()
     assert set(status) == {RUNNING, LIFT_OFF}
     # They keep sound states, those of the start.
-    states = np.stack(slip_split.start(body), axis=-1)
+    states = np.stack(stiff_slip.start(body), axis=-1)
     np.testing.assert_allclose(begin[ended, :7], states[ended], rtol=1e-14, atol=1e-14)
 
 
 def test_the_loop_over_lanes_is_vector_instructions() -> None:
-    lines = start_up._advance(PAPERS, start_up._places(PAPERS))
-    advance = compile_lanes("advance", "group, points, ticks", lines, names(PAPERS))
-    kept = start_up.layout(PAPERS).names
+    lines = start_up._advance(PAPER_FORM, start_up._places(PAPER_FORM))
+    advance = compile_lanes("advance", "group, points, ticks", lines, names(PAPER_FORM))
+    kept = start_up.layout(PAPER_FORM).names
     group, points = np.zeros(len(kept) * LANES), np.zeros((HISTORY + 1) * start_up._POINT_SIZE)
     advance(group, points, 1.0)
     assembly = next(iter(advance.inspect_asm().values()))

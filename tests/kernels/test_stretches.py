@@ -12,9 +12,11 @@ from support.kernels import finish, images, kernel
 from sweep.kernels.adams import stretches
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
-from sweep.models import linear, slip, slip_split, stability
+from sweep.models.ladder import slip
 from sweep.models.model import stack, take
-from sweep.models.modes import RATTLE, Rattle, bending
+from sweep.models.stiff import slip as stiff_slip
+from sweep.models.stiff.modes import RATTLE, Rattle, bending
+from sweep.models.theory import linear, stability
 
 ADAMS = kernel("adams")
 row = ADAMS.row
@@ -41,16 +43,16 @@ def carried(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return seen
 
 
-def resolved(size: float, **parameters: Any) -> tuple[Rattle, np.ndarray, slip_split.Constants, dict[str, np.ndarray]]:
+def resolved(size: float, **parameters: Any) -> tuple[Rattle, np.ndarray, stiff_slip.Constants, dict[str, np.ndarray]]:
     body = columns(x0=size, y0=size, **parameters)
-    states, constants = stack(slip_split.start(body)), slip_split.Constants.of(body)
+    states, constants = stack(stiff_slip.start(body)), stiff_slip.Constants.of(body)
     return Rattle.of(states, constants), states, constants, body
 
 
 def later(body: dict[str, np.ndarray], times: np.ndarray) -> np.ndarray:
-    """States of the split form at `times`, by another integrator."""
+    """States of the stiff form at `times`, by another integrator."""
     states = adaptive.motion(body, times, rtol=1e-11, atol=1e-20)[:7]
-    return stack(slip_split.momentum(states, take(slip_split.Constants.of(body), np.zeros(len(times), int))))
+    return stack(stiff_slip.momentum(states, take(stiff_slip.Constants.of(body), np.zeros(len(times), int))))
 
 
 def test_modes_move_as_the_full_model() -> None:
@@ -71,12 +73,12 @@ def test_modes_move_as_the_full_model() -> None:
 
 def test_energies_of_the_modes_add_up() -> None:
     rattle, states, constants, _ = resolved(1e-6, mu=60.0, n0=[0.05, -0.02, 0.001])
-    _, whole, inertia = slip_split.energy(states, constants)
+    _, whole, inertia = stiff_slip.energy(states, constants)
     energies = rattle.unit_energies * np.abs(rattle.amplitudes) ** 2
     np.testing.assert_allclose(energies.sum(axis=1), 2 * whole / inertia, rtol=0.1)
     np.testing.assert_allclose(
         rattle.rates.real.max(axis=1),
-        linear.growth_rate(slip.MODEL, slip_split.slip_constants(constants), np.array([0.05, -0.02, 0.001])),
+        linear.growth_rate(slip.MODEL, stiff_slip.slip_constants(constants), np.array([0.05, -0.02, 0.001])),
         rtol=1e-9,
     )
 
@@ -217,7 +219,7 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     cells: list[int] = []
     of = Rattle.of
 
-    def counted(states: np.ndarray, constants: slip_split.Constants) -> Rattle:
+    def counted(states: np.ndarray, constants: stiff_slip.Constants) -> Rattle:
         cells.append(states.shape[1])
         return of(states, constants)
 

@@ -10,13 +10,17 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import STANDARD, columns, newton
 
-from sweep.models import find, linear, noslip, rocking, slip, solid, stability, steady
-from sweep.models.bounds import strongest_grip
-from sweep.models.couples import COUPLES as KINDS
-from sweep.models.general import variant
-from sweep.models.laws import LAWS, tanh_ratio
+from sweep.models import find
+from sweep.models.general import rigid_body
+from sweep.models.general import ripple as general_ripple
+from sweep.models.general.bounds import strongest_grip
+from sweep.models.general.couples import COUPLES as KINDS
+from sweep.models.general.laws import LAWS, tanh_ratio
+from sweep.models.general.surfaces import ELLIPSOID, PARABOLOID, Surface
+from sweep.models.general.variants import variant
+from sweep.models.ladder import noslip, slip
 from sweep.models.model import LINEAR, take
-from sweep.models.surfaces import ELLIPSOID, PARABOLOID, Surface
+from sweep.models.theory import linear, rocking, stability
 
 BODY = {"a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 0.7, "gravity": 9.81}
 KANE_LEVINSON = BODY | {"mass": 1.0, "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5}
@@ -129,7 +133,7 @@ def test_the_papers_body_is_a_special_case(name: str) -> None:
 
 def test_the_papers_ripple_period_and_bounds_are_a_special_case() -> None:
     body = columns(b=[2.0, 3.0, 5.0, 8.5], delta=[0.03, -0.1, 0.3, 0.2])
-    np.testing.assert_allclose(solid.slower_period(body), rocking.slower_period(body), rtol=1e-12)
+    np.testing.assert_allclose(rigid_body.slower_period(body), rocking.slower_period(body), rtol=1e-12)
     general = find("slip+viscous")
     for i in range(4):
         y = 1e-3 * states(i, 7)
@@ -151,7 +155,7 @@ def test_frequencies_are_those_of_the_equations(body: dict[str, float]) -> None:
     model, _ = one("noslip+solid", body)
     values = linear.jacobian(model, model.constants.of(cells(**body)), np.zeros(1))[0]
     expected = np.unique(np.abs(np.linalg.eigvals(values).imag).round(9))
-    np.testing.assert_allclose(np.ravel(solid.frequencies(cells(**body))), expected[-2:], rtol=1e-8)
+    np.testing.assert_allclose(np.ravel(rigid_body.frequencies(cells(**body))), expected[-2:], rtol=1e-8)
 
 
 def test_the_ripple_free_spin_of_a_real_body_hardly_ripples() -> None:
@@ -159,10 +163,12 @@ def test_the_ripple_free_spin_of_a_real_body_hardly_ripples() -> None:
     model, constants = one("noslip+solid", KANE_LEVINSON)
     u, omega = np.array([3e-4, -2e-4]), np.array([4e-3, 1e-3])
     y = np.array([*u, *omega, u @ omega])
-    times = np.linspace(0, 3 * solid.slower_period(cells(**KANE_LEVINSON))[0], 400)
+    times = np.linspace(0, 3 * rigid_body.slower_period(cells(**KANE_LEVINSON))[0], 400)
     course = newton.follow(y, KANE_LEVINSON, None, times)
     spin = model.energy(course, constants)[0]
-    steady_spin = spin - model.ripple.value(course, constants, [k[0] for k in steady.form(cells(**KANE_LEVINSON))])
+    steady_spin = spin - model.ripple.value(
+        course, constants, [k[0] for k in general_ripple.form(cells(**KANE_LEVINSON))]
+    )
     trend = [values - np.polyval(np.polyfit(times, values, 3), times) for values in (spin, steady_spin)]
     assert np.std(trend[1]) < 0.05 * np.std(trend[0])
 
@@ -294,7 +300,7 @@ def test_no_point_of_a_paraboloid_is_below_the_contact_point() -> None:
         heights = x * u1 + y * u2 + z * u3
         assert lowest <= heights.min()
         assert heights.min() < lowest + 1e-3
-        (rest,) = solid.height(cells(**BOWL))
+        (rest,) = rigid_body.height(cells(**BOWL))
         assert PARABOLOID.elevation(u1, u2, u3, constants)[0] == pytest.approx(-lowest - rest, rel=1e-12)
 
 

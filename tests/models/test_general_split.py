@@ -1,12 +1,15 @@
-"""The split form of the general equations, for the stiff method: the same motion in other variables."""
+"""The stiff form of the general equations, for the stiff method: the same motion in other variables."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from sweep.models import find, general_split, solid, splits
+from sweep.models import find
+from sweep.models.general import rigid_body
 from sweep.models.model import Columns
+from sweep.models.stiff import forms
+from sweep.models.stiff import general as stiff_general
 
 COUNT = 40
 
@@ -32,7 +35,7 @@ def states() -> np.ndarray:
 def test_they_are_the_equations_of_the_full_model(name: str) -> None:
     sides = {"a": 0.005, "b": 0.22} if name.endswith("paraboloid") else {}
     model, body, y = find(name), bodies(**sides), states()
-    split = splits.of(model)
+    split = forms.of(model)
     assert split is not None
     full, p = model.constants.of(body), split.model.constants.of(body)
     slopes, (_, power, R, denominator) = model.rhs(y, full)
@@ -55,7 +58,7 @@ def test_they_are_the_equations_of_the_full_model(name: str) -> None:
 def test_newton_leaves_little_of_the_residual() -> None:
     model, body, y = find("slip+viscous+sigma"), bodies(mu=500), states()
     y[5:] *= 0.01
-    split = splits.of(model)
+    split = forms.of(model)
     assert split is not None
     full, p = model.constants.of(body), split.model.constants.of(body)
     z, gamma, v = np.array(split.momentum(y, p)), 0.01, y[5:]
@@ -72,7 +75,7 @@ def test_newton_leaves_little_of_the_residual() -> None:
 def test_rocking_and_the_matrix_of_the_corrector_against_derivatives() -> None:
     """At zero angular momentum about the vertical; the products of inertia with z are allowed for in `ROCKING`."""
     body = bodies(Ixz=0.0, Iyz=0.0)
-    split = splits.of(find("slip+viscous"))
+    split = forms.of(find("slip+viscous"))
     assert split is not None
     p = split.model.constants.of(body)
     slopes = [split.slow(*(1e-30j * np.eye(7)[i][:, None] * np.ones(COUNT)), p)[0][:4] for i in range(4)]
@@ -83,7 +86,7 @@ def test_rocking_and_the_matrix_of_the_corrector_against_derivatives() -> None:
     fastest = np.abs(np.linalg.eigvals(J).imag).max(axis=1)
     np.testing.assert_allclose(split.fastest_rocking(p), fastest, rtol=1e-6)
     skew = bodies()
-    _, higher = solid.frequencies(skew)
+    _, higher = rigid_body.frequencies(skew)
     np.testing.assert_allclose(split.fastest_rocking(split.model.constants.of(skew)), higher, rtol=1e-12)
 
 
@@ -91,7 +94,7 @@ def test_the_ripple_is_that_of_the_full_model() -> None:
     """To first order in the rattle, which is all that it is good for."""
     for body in (bodies(Ixz=0.0, Iyz=0.0), bodies()):
         model, y = find("slip+viscous"), states()
-        split = splits.of(model)
+        split = forms.of(model)
         assert split is not None
         y[[0, 1, 2, 3, 5, 6]] *= 1e-6
         full, p = model.constants.of(body), split.model.constants.of(body)
@@ -105,4 +108,4 @@ def test_the_ripple_is_that_of_the_full_model() -> None:
     "name", ["slip+coulomb-sqrt", "slip+none", "slip+viscous+rolling", "slip+viscous+sigma+rolling", "noslip+solid"]
 )
 def test_models_that_have_no_split_form(name: str) -> None:
-    assert general_split.split(find(name)) is None
+    assert stiff_general.form_of(find(name)) is None

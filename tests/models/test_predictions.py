@@ -10,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import columns
 
-from sweep.models import MODELS, analytic, linear, slip
-from sweep.models.coefficients import coefficients
-from sweep.models.rocking import slower_period
+from sweep.models import MODELS
+from sweep.models.ladder import analytic, slip
+from sweep.models.theory import linear
+from sweep.models.theory.coefficients import coefficients
+from sweep.models.theory.rocking import slower_period
 
 SLIP = MODELS["slip"]
 

@@ -19,10 +19,11 @@ from sweep import ConfigError
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import TIME_LIMIT
-from sweep.models import MODELS, averaged, effective, noslip
-from sweep.models.coefficients import coefficients, normal_coordinates
+from sweep.models import MODELS
+from sweep.models.ladder import averaged, effective, noslip
 from sweep.models.model import stack, take
-from sweep.models.rocking import slower_period
+from sweep.models.theory.coefficients import coefficients, normal_coordinates
+from sweep.models.theory.rocking import slower_period
 
 Write = Callable[..., Path]
 

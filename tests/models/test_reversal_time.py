@@ -11,8 +11,10 @@ from scipy.integrate import solve_ivp
 from support import columns, wide_bodies
 
 import sweep
-from sweep.models import find, linear, solid
-from sweep.models.reversal_time import REASONS, energies, first_reversal, growth
+from sweep.models import find
+from sweep.models.general import rigid_body
+from sweep.models.general.reversal_time import REASONS, energies, first_reversal, growth
+from sweep.models.theory import linear
 
 KANE_LEVINSON = {
     "a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 1.0, "gravity": 9.81,
@@ -70,7 +72,7 @@ def test_a_mode_by_itself_keeps_the_other_at_rest() -> None:
 def test_the_time_is_that_of_the_three_variable_equations(side: int, n_c: float) -> None:
     """Integrated by SciPy, with the energy of the mode that decays left out."""
     body = columns(n0=0.05 * side)
-    J = solid.inertia(body)[2][0]
+    J = rigid_body.inertia(body)[2][0]
     sigma, E = next(
         (s[0], e[0]) for s, e in zip(growth(body), energies(body), strict=True) if s[0] * side > 0
     )  # fmt: skip

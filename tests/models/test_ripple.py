@@ -11,8 +11,9 @@ from support import columns
 from support.ripple import form as numerical_form
 from support.ripple import rolling
 
-from sweep.models import MODELS, ripple
+from sweep.models import MODELS
 from sweep.models.model import Model, take
+from sweep.models.theory import ripple
 
 bodies = st.fixed_dictionaries(
     {"a": st.floats(5, 50), "b": st.floats(1.5, 4.5), "c": st.floats(0.5, 1.2), "delta": st.floats(-0.5, 0.5)}

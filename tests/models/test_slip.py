@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from support import columns
 from support.independent import contact, derivative
 
-from sweep.models import slip
+from sweep.models.ladder import slip
 from sweep.models.model import stack, take
 
 bodies = st.fixed_dictionaries(

@@ -14,8 +14,10 @@ from support.kernels import threads
 import sweep
 from sweep.grid import Grid
 from sweep.kernels.status import SETTLED
-from sweep.models import MODELS, linear, slip, stability
+from sweep.models import MODELS
+from sweep.models.ladder import slip
 from sweep.models.model import stack
+from sweep.models.theory import linear, stability
 from sweep.prediction import predict
 
 SLIP = MODELS["slip"]

@@ -28,7 +28,7 @@ def test_every_module_that_a_run_imports_is_decisive() -> None:
     for module in [name for name in graph.modules if name.startswith("sweep.plots")]:
         graph.remove_module(module)
     imported = {"sweep.engine.run", *graph.find_upstream_modules("sweep.engine.run")}
-    assert {"sweep.config.schema", "sweep.grid", "sweep.kernels.adams.step", "sweep.models.slip"} <= imported
+    assert {"sweep.config.schema", "sweep.grid", "sweep.kernels.adams.step", "sweep.models.ladder.slip"} <= imported
     assert {file_of(module) for module in imported} <= DECISIVE
 
 

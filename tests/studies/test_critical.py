@@ -17,7 +17,8 @@ from support.kernels import kernel
 import sweep
 from sweep.cli import main
 from sweep.kernels.kernel import Kernel
-from sweep.models import MODELS, linear, stability
+from sweep.models import MODELS
+from sweep.models.theory import linear, stability
 from sweep.results.dataset import REASONS
 from sweep.results.memory import Memory
 from sweep.results.store import Running

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from sweep.jit import exactly_compiled
-from sweep.models import slip
+from sweep.models.ladder import slip
 from sweep.models.model import stack, take
 
 

@@ -19,7 +19,8 @@ from sweep.kernels import measures
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import make_kernel
-from sweep.models import MODELS, stability
+from sweep.models import MODELS
+from sweep.models.theory import stability
 
 
 def kernel(

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from sweep.models import laws
+from sweep.models.general import laws
 
 Vector = np.ndarray
 

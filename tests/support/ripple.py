@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.models import noslip
+from sweep.models.ladder import noslip
 from sweep.models.model import take
 
 

@@ -43,10 +43,10 @@ from sweep.kernels.kernel import Kernel, steps_to
 from sweep.kernels.layout import BLOCK, LANES, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
 from sweep.kernels.status import DIVERGED, RUNNING
-from sweep.models import linear
 from sweep.models.model import Array, Columns, stack
-from sweep.models.modes import bending
-from sweep.models.split import Split
+from sweep.models.stiff.form import StiffForm
+from sweep.models.stiff.modes import bending
+from sweep.models.theory import linear
 
 _PREDICT = tuple(f"predict{j}" for j in range(len(PREDICTOR_NODES)))
 _CORRECT = tuple(f"correct{j}" for j in range(len(CORRECTOR_NODES)))
@@ -67,17 +67,17 @@ class AdamsKernel(Kernel):
     # right to the tolerance.
     energy_gain = 1e-2
 
-    def __init__(self, split: Split, measurements: Sequence[Measurement], tolerance: float) -> None:
-        self.split, self.tolerance = split, tolerance
+    def __init__(self, form: StiffForm, measurements: Sequence[Measurement], tolerance: float) -> None:
+        self.form, self.tolerance = form, tolerance
         powers = stretches.POWERS if any(each.follows_work for each in measurements) else ()
-        looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if split.resolves_modes else ()
+        looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if form.resolves_modes else ()
         method = ("gamma", "per_weight", *_PREDICT, *_CORRECT, *MATRIX)
-        self._lay_out(split.model, measurements, (*looks, "begin", "spin", *powers, *method, *_HISTORY))
+        self._lay_out(form.model, measurements, (*looks, "begin", "spin", *powers, *method, *_HISTORY))
         self._compile_with(self._make_run_block())
 
     def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
         """As `Kernel.images`, but the images are those at the end of start-up, at the time in `begin`."""
-        levels = count_levels(self.split.slip_decay(columns), step)
+        levels = count_levels(self.form.slip_decay(columns), step)
         lead = duration(levels)
         steps = np.maximum(steps_to(t_end, step), lead + 1)
         goal, step = steps - lead, t_end / steps
@@ -85,17 +85,17 @@ class AdamsKernel(Kernel):
         table = self.table(images)
         self._set_method(table, self.unpack(images)[1])
         constants = table.columns(self.constants)
-        starts = stack(self.split.full.start(columns)).T
-        self._set_started(table, start_up.start_up(self.split, step, constants, starts, levels))
-        if self.split.resolves_modes:
+        starts = stack(self.form.full.start(columns)).T
+        self._set_started(table, start_up.start_up(self.form, step, constants, starts, levels))
+        if self.form.resolves_modes:
             self._set_looks(table, columns)
         return images
 
     def _image_functions(self) -> tuple[Cached, ...]:
-        return (start_up.compiled_start_up(self.split),)
+        return (start_up.compiled_start_up(self.form),)
 
     def model_states(self, images: Array) -> Array:
-        return self.split.velocities(*self.unpack(images))
+        return self.form.velocities(*self.unpack(images))
 
     def _reached(self, table: Table, t_end: float | Array) -> Array:
         reached = table["begin"] + table["done"] * table["step"]
@@ -104,11 +104,11 @@ class AdamsKernel(Kernel):
     def _set_method(self, table: Table, constants: Any) -> None:
         """Set the weights of the formulas and the matrix P."""
         step = table["step"]
-        phase = self.split.fastest_rocking(constants) * step
+        phase = self.form.fastest_rocking(constants) * step
         correct = step[:, None] * weights.fitted_weights(CORRECTOR_NODES, phase)
         table.set_columns(_PREDICT, step[:, None] * weights.fitted_weights(PREDICTOR_NODES, phase))
         table.set_columns(_CORRECT, correct)
-        table.set_columns(MATRIX, stack(self.split.implicit(correct[:, 0], constants)).T)
+        table.set_columns(MATRIX, stack(self.form.implicit(correct[:, 0], constants)).T)
         table["per_weight"] = 1 / correct[:, 0]
         table["gamma"] = BDF_GAMMA * step
 
@@ -140,7 +140,7 @@ class AdamsKernel(Kernel):
 
     def carry(self, images: Array) -> None:
         """As `Kernel.carry`."""
-        if self.split.resolves_modes:
+        if self.form.resolves_modes:
             stretches.carry(self, images, self.tolerance)
 
     def _make_run_block(self) -> Any:
@@ -150,7 +150,7 @@ class AdamsKernel(Kernel):
         compiled, not one for each place in a ring of eight.  The history is not part of the group: LLVM sees then that
         no step reads from one what it has written to the other.
         """
-        known = names(self.split) | {"watch": self._make_watch(), "work_of": self._make_work()}
+        known = names(self.form) | {"watch": self._make_watch(), "work_of": self._make_work()}
         known |= {"full_width": full_width(), "np": np}
         first, size = self.layout.at(_HISTORY[0]), len(POINT) * LANES
         lines = [
@@ -183,11 +183,11 @@ class AdamsKernel(Kernel):
             return f"group[{self.layout.at(name)} + lane]"
 
         return [
-            *load_lines(self.split, at),
+            *load_lines(self.form, at),
             f"status, done, h, old = {at('status')}, {at('done')}, {at('step')}, {at('spin')}",
             f"active = (status == {RUNNING}) & (done < {at('goal')})",
             *step_lines(at, range(HISTORY)[::-1]),
-            *accept_lines(self.split, at),
+            *accept_lines(self.form, at),
             *store_lines(at, HISTORY),
             f"{at('done')} = done + (1.0 if accepted else 0.0)",
             f"{at('spin')} = spin if accepted else old",

@@ -10,8 +10,9 @@ from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.adams.stretches import WORTHWHILE
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.method import Method
-from sweep.models import linear, splits
 from sweep.models.model import Array, Columns, Model
+from sweep.models.stiff import forms
+from sweep.models.theory import linear
 
 # Two bounds on the error in spin at t = 400.  The first is that of the Adams formulas, the second that of BDF5, which
 # matters where the slip does not relax fast.  θ is the phase of the fastest motion in a step, ρ the share by which the
@@ -33,20 +34,20 @@ def accurate_step(model: Model, columns: Columns, motion: Array, tolerance: floa
     ----------
     motion : the `fastest_motion`, shape (cells,)
     """
-    split = splits.of(model)
-    assert split is not None
-    rise = np.maximum(split.rise(columns), 1e-6)
-    reach = np.maximum(linear.fastest_spin(split.full, columns) * split.time_unit(columns), 1e-6)
+    form = forms.of(model)
+    assert form is not None
+    rise = np.maximum(form.rise(columns), 1e-6)
+    reach = np.maximum(linear.fastest_spin(form.full, columns) * form.time_unit(columns), 1e-6)
     adams = 7.6 * rise**1.54 * (1 + rise) ** 1.6 * reach**0.45
-    bdf = 0.074 * rise**0.81 * reach**1.01 * np.minimum(1, 30 / np.maximum(split.resistance(columns), 30)) ** 2
+    bdf = 0.074 * rise**0.81 * reach**1.01 * np.minimum(1, 30 / np.maximum(form.resistance(columns), 30)) ** 2
     phase = np.minimum((tolerance / adams) ** (1 / 7), (tolerance / bdf) ** (1 / 4))
-    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, split.damping(columns)))
+    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, form.damping(columns)))
 
 
 def _kernel(model: Model, measurements: Sequence[Measurement], tolerance: float) -> AdamsKernel:
-    split = splits.of(model)
-    assert split is not None
-    return AdamsKernel(split, measurements, tolerance)
+    form = forms.of(model)
+    assert form is not None
+    return AdamsKernel(form, measurements, tolerance)
 
 
 METHOD = Method(
@@ -55,7 +56,7 @@ METHOD = Method(
     "friction does not limit its step",
     kernel=_kernel,
     accurate_step=accurate_step,
-    runs=lambda model: splits.of(model) is not None,
+    runs=lambda model: forms.of(model) is not None,
     # On one thread start-up takes 4.6 to 6.4 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
     start_up_cost=390.0,

@@ -38,7 +38,7 @@ from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5
 from sweep.models.model import Array
-from sweep.models.split import Split
+from sweep.models.stiff.form import StiffForm
 
 # Steps of dopri5, in widths of the layer, and their number: after them the slip differs from its slow value by only
 # e^-14 of what it did at first.  Every second one of the last steps is a point of the history.  BDF5 would lose more
@@ -56,10 +56,10 @@ _POINT_SIZE = len(_POINT.names) * LANES
 
 
 @cache
-def layout(split: Split) -> Layout:
+def layout(form: StiffForm) -> Layout:
     """The quantities that a group keeps of a trajectory."""
     more = ("spacing", "h", "status", "ticks", "work", "per_weight", *MATRIX)
-    return Layout((*split.model.states, *constants(split), *more))
+    return Layout((*form.model.states, *constants(form), *more))
 
 
 class Started(NamedTuple):
@@ -69,7 +69,7 @@ class Started(NamedTuple):
     """
 
     states: Array
-    """States of the split model, shape (cells, 7)."""
+    """States of the form model, shape (cells, 7)."""
     history: Array
     """The eight points, newest last, each with the quantities of `POINT`, shape (cells, 56)."""
     powers: Array
@@ -108,13 +108,13 @@ def duration(levels: Array) -> Array:
     return np.asarray(np.array([_duration(count) for count in range(1, levels.max() + 1)])[levels - 1])
 
 
-def start_up(split: Split, step: Array, constants: Array, starts: Array, levels: Array) -> Started:
+def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, levels: Array) -> Started:
     """Take trajectories through start-up, from t = 0 to `duration(levels)` steps.
 
     Parameters
     ----------
     step : the final step, in sqrt(c/g), shape (cells,)
-    constants : constants of the split model, shape (cells, constants)
+    constants : constants of the form model, shape (cells, constants)
     starts : states of the full model at t = 0, shape (cells, 7)
     levels : number of levels, from `count_levels`, shape (cells,)
     """
@@ -124,9 +124,9 @@ def start_up(split: Split, step: Array, constants: Array, starts: Array, levels:
         for rows in [np.flatnonzero(levels == count)]
         for begin in range(0, len(rows), LANES)
     ]
-    kept, begins = layout(split), np.concatenate([starts, constants], axis=1)
+    kept, begins = layout(form), np.concatenate([starts, constants], axis=1)
     started = Started(
-        *(np.empty((len(step), n)) for n in (len(split.model.states), HISTORY * len(POINT), 3)),
+        *(np.empty((len(step), n)) for n in (len(form.model.states), HISTORY * len(POINT), 3)),
         *(np.empty(len(step)) for _ in range(3)),
     )
 
@@ -141,7 +141,7 @@ def start_up(split: Split, step: Array, constants: Array, starts: Array, levels:
         run(group.ravel(), points.ravel(), steps)
         _store(started, cells, kept, group[:, : len(cells)], points[:HISTORY, :, : len(cells)])
 
-    run = compiled_start_up(split)
+    run = compiled_start_up(form)
     on_all_threads(take, groups)
     return started
 
@@ -155,9 +155,9 @@ def _store(started: Started, cells: Array, kept: Layout, group: Array, points: A
     started.status[cells], started.work[cells] = group[kept.row("status")], group[kept.row("work")]
 
 
-def _places(split: Split) -> At:
+def _places(form: StiffForm) -> At:
     """The place at which the loops below keep a quantity of one lane; point 0 of the history is the oldest."""
-    kept = layout(split)
+    kept = layout(form)
 
     def at(name: str) -> str:
         if name in _POINTS:
@@ -188,9 +188,9 @@ def _weights() -> dict[str, float]:
     }
 
 
-def _begin_step(split: Split, at: At) -> list[str]:
+def _begin_step(form: StiffForm, at: At) -> list[str]:
     return [
-        *load_lines(split, at),
+        *load_lines(form, at),
         f"h, status, work = {at('h')}, {at('status')}, {at('work')}",
         f"active = status == {RUNNING}",
     ]
@@ -200,26 +200,26 @@ def _end_step(at: At, ticks: str) -> list[str]:
     return [f"{at('ticks')} += {ticks} if accepted else 0.0", f"{at('work')} = work + (done if accepted else 0.0)"]
 
 
-def _dopri5(split: Split, at: At) -> list[str]:
+def _dopri5(form: StiffForm, at: At) -> list[str]:
     return [
-        *_begin_step(split, at),
+        *_begin_step(form, at),
         "new, _, done, sound, airborne, jammed = step(y, p, h)",
         "accepted = active & sound",
-        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(split.model.states)),
+        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(form.model.states)),
         f"failure = {PARADOX} if jammed else ({LIFT_OFF} if airborne else {DIVERGED})",
         f"{at('status')} = failure if active & (not sound) else status",
         *_end_step(at, "0.5"),
     ]
 
 
-def _to_split(split: Split, at: At) -> list[str]:
-    return [*load_lines(split, at), "s = momentum(y, p)"]
+def _to_split(form: StiffForm, at: At) -> list[str]:
+    return [*load_lines(form, at), "s = momentum(y, p)"]
 
 
-def _record(split: Split, at: At) -> list[str]:
+def _record(form: StiffForm, at: At) -> list[str]:
     """Make point 0 of the history from a state of the full model."""
     return [
-        *_to_split(split, at),
+        *_to_split(form, at),
         "f, geometry = slow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)",
         "_, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, p, 0.0, 0.0, 0.0)",
         *(f"{at(name.format(0))} = f[{i}]" for i, name in enumerate(SLOPES)),
@@ -228,13 +228,13 @@ def _record(split: Split, at: At) -> list[str]:
     ]
 
 
-def _replace(split: Split, at: At) -> list[str]:
-    return [*_to_split(split, at), *(f"{at(name)} = s[{i}]" for i, name in enumerate(split.model.states))]
+def _replace(form: StiffForm, at: At) -> list[str]:
+    return [*_to_split(form, at), *(f"{at(name)} = s[{i}]" for i, name in enumerate(form.model.states))]
 
 
-def _set_step(split: Split, at: At) -> list[str]:
+def _set_step(form: StiffForm, at: At) -> list[str]:
     return [
-        *load_lines(split, at),
+        *load_lines(form, at),
         f"h = ticks * {at('spacing')}",
         f"{at('h')} = h",
         f"{at('per_weight')} = 1.0 / {at('correct0')}",
@@ -243,31 +243,31 @@ def _set_step(split: Split, at: At) -> list[str]:
     ]
 
 
-def _advance(split: Split, at: At) -> list[str]:
+def _advance(form: StiffForm, at: At) -> list[str]:
     """Steps from points 0 … 7 to point 8; the work follows from the Adams-Moulton formula of order four."""
     return [
-        *_begin_step(split, at),
+        *_begin_step(form, at),
         *step_lines(at, range(HISTORY)[::-1]),
         *store_lines(at, HISTORY),
         f"{at('power8')} = power",
         f"done = h / 24.0 * (9.0 * power + 19.0 * {at('power7')} - 5.0 * {at('power6')} + {at('power5')})",
-        *accept_lines(split, at),
+        *accept_lines(form, at),
         *_end_step(at, "ticks"),
     ]
 
 
 @cache
-def compiled_start_up(split: Split) -> Cached:
+def compiled_start_up(form: StiffForm) -> Cached:
     """Compiled (group, points, steps) -> None: takes a group through all its levels."""
-    at = _places(split)
-    known = names(split) | {"slow": split.slow, "newton": split.newton, "power": split.power}
-    known |= {"momentum": split.momentum, "implicit": split.implicit}
-    known["step"] = make_step(DOPRI5, split.full.rhs, len(split.model.states))
-    record = compile_lanes("record", "group, points", _record(split, at), known)
-    replace = compile_lanes("replace", "group", _replace(split, at), known)
-    dopri5 = compile_lanes("dopri5", "group", _dopri5(split, at), known)
-    set_step = compile_lanes("set_step", "group, ticks", _set_step(split, at), known)
-    advance = compile_lanes("advance", "group, points, ticks", _advance(split, at), known)
+    at = _places(form)
+    known = names(form) | {"slow": form.slow, "newton": form.newton, "power": form.power}
+    known |= {"momentum": form.momentum, "implicit": form.implicit}
+    known["step"] = make_step(DOPRI5, form.full.rhs, len(form.model.states))
+    record = compile_lanes("record", "group, points", _record(form, at), known)
+    replace = compile_lanes("replace", "group", _replace(form, at), known)
+    dopri5 = compile_lanes("dopri5", "group", _dopri5(form, at), known)
+    set_step = compile_lanes("set_step", "group, ticks", _set_step(form, at), known)
+    advance = compile_lanes("advance", "group, points, ticks", _advance(form, at), known)
     size, dopri5_steps = _POINT_SIZE, _DOPRI5_STEPS
 
     def run(group: Any, points: Any, steps: Any) -> None:
@@ -287,4 +287,4 @@ def compiled_start_up(split: Split) -> Cached:
                 for i in range(size):
                     points[j * size + i] = points[(steps[level] - HISTORY + 1 + 2 * j) * size + i]
 
-    return serial(run, f"start-up-{split.full.name}")
+    return serial(run, f"start-up-{form.full.name}")

@@ -11,7 +11,7 @@ from typing import Any
 
 from sweep.jit import inline
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
-from sweep.models.split import Split
+from sweep.models.stiff.form import StiffForm
 
 HISTORY = 8
 PREDICTOR_NODES = tuple(-j for j in range(8))
@@ -30,7 +30,7 @@ POINT = (*SLOPES, *SLIPS)
 """Quantities of a point of the history, to be formatted with its slot: the slopes of (u, M), and the slip."""
 
 MATRIX = tuple(f"P{i}{j}" for i in range(4) for j in range(4))
-"""Elements of P, the implicit part of the corrector (see `Split.implicit`)."""
+"""Elements of P, the implicit part of the corrector (see `StiffForm.implicit`)."""
 
 At = Callable[[str], str]
 """Tells where a quantity of one lane is kept: (name) -> an expression that can be read and assigned to."""
@@ -48,7 +48,7 @@ def correct(q: Any, g: Any, f: Any, weight: Any, P: Any) -> Any:
     return (r0, r1, r2, r3), (d0, d1, d2, d3)
 
 
-def make_solve(split: Split) -> Any:
+def make_solve(form: StiffForm) -> Any:
     """Inline (q, g, e, b, p, weight, per_weight, gamma, P) -> (states, slopes, spin, (num, den) of R, power).
 
     This is the new point, from the sums over the history.
@@ -58,14 +58,14 @@ def make_solve(split: Split) -> Any:
     q : predicted (u, M), five numbers
     g : the corrector for (u, M) without the term of the new slope, five numbers
     e, b : extrapolated slip, and the BDF formula without the term of the new slope, two numbers each
-    p : constants of the split model
+    p : constants of the form model
     weight, per_weight : weight of the new slope in the corrector, and 1/weight
     gamma : weight of the new slope in the BDF formula
     P : the implicit part of the corrector, row by row, sixteen numbers
 
     The slopes returned are those that the corrected states imply, and the power is that of friction.
     """
-    slow, newton, power = split.slow, split.newton, split.power
+    slow, newton, power = form.slow, form.newton, form.power
 
     @inline
     def solve(q: Any, g: Any, e: Any, b: Any, p: Any, weight: Any, per_weight: Any, gamma: Any, P: Any) -> Any:
@@ -89,19 +89,19 @@ def make_solve(split: Split) -> Any:
     return solve
 
 
-def constants(split: Split) -> tuple[str, ...]:
+def constants(form: StiffForm) -> tuple[str, ...]:
     """The quantities of an image that hold the constants."""
-    return tuple(f"constant.{name}" for name in split.model.constants._fields)
+    return tuple(f"constant.{name}" for name in form.model.constants._fields)
 
 
-def names(split: Split) -> dict[str, Any]:
+def names(form: StiffForm) -> dict[str, Any]:
     """What the generated lines refer to."""
-    return {"solve": make_solve(split), "Constants": split.model.constants}
+    return {"solve": make_solve(form), "Constants": form.model.constants}
 
 
-def load_lines(split: Split, at: At) -> list[str]:
+def load_lines(form: StiffForm, at: At) -> list[str]:
     """Lines that load the constants p and the states y."""
-    values, states = (" ".join(f"{at(name)}," for name in names) for names in (constants(split), split.model.states))
+    values, states = (" ".join(f"{at(name)}," for name in names) for names in (constants(form), form.model.states))
     return [f"p = Constants({values})", f"y = ({states})"]
 
 
@@ -139,10 +139,10 @@ def store_lines(at: At, slot: int) -> list[str]:
     ]
 
 
-def accept_lines(split: Split, at: At) -> list[str]:
+def accept_lines(form: StiffForm, at: At) -> list[str]:
     """Lines that write the new states if `accepted`, and the status of a failure if `active` but not `sound`."""
     return [
-        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(split.model.states)),
+        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(form.model.states)),
         f"failure = {PARADOX} if den <= 0.0 else ({LIFT_OFF} if num <= 0.0 else {DIVERGED})",
         f"{at('status')} = failure if active & (not sound) else status",
     ]

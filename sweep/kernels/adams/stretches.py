@@ -1,4 +1,4 @@
-"""Carries trajectories across stretches of small rattle by its modes (`sweep.models.modes`), without steps.
+"""Carries trajectories across stretches of small rattle by its modes (`sweep.models.stiff.modes`), without steps.
 
 While one mode, A, grows and reverses the spin, the other, B, decays, often to less than the round-off of A.  B would
 then grow again from noise, and the reversal that it causes would come too early (by 5 % at μ = 200).  Therefore:
@@ -29,10 +29,10 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import Table
 from sweep.kernels.measures.measurement import Stretch
 from sweep.kernels.status import QUIET, RUNNING
-from sweep.models import friction
+from sweep.models.ladder import friction
 from sweep.models.model import Array, Columns
-from sweep.models.modes import RATTLE, Rattle, fastest_growth
-from sweep.models.slip_split import SPLIT, Constants
+from sweep.models.stiff.modes import RATTLE, Rattle, fastest_growth
+from sweep.models.stiff.slip import STIFF_MODEL, Constants
 
 # Largest size of the modes of a rattle that leaps, which is where a leap ends, and of a lifted mode.  The second value
 # of each pair is for rattles whose fast mode decays far more quickly than the slow one grows: the ratio of their
@@ -68,7 +68,7 @@ POWERS = ("power0", "power1", "power2")
 """Quantities of an image that hold the power of friction at the last three points, newest first; they exist only if a
 measurement needs the work of friction."""
 
-_RATTLE = tuple(SPLIT.states[i] for i in RATTLE)
+_RATTLE = tuple(STIFF_MODEL.states[i] for i in RATTLE)
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ def move(kernel: Kernel, images: Array, rattle: Rattle, steps: Array, lifts: Arr
     _move_history(table, rattle, factors)
     if kernel.follows_work:
         _move_powers(table, kernel.unpack(images)[1])
-    spin, energy, inertia = SPLIT.energy(*kernel.unpack(images))
+    spin, energy, inertia = STIFF_MODEL.energy(*kernel.unpack(images))
     table["spin"] = spin
     before = table["energy"].copy()
     table["energy"] = energy + 0.5 * inertia * spin**2

@@ -117,7 +117,7 @@ class Measurement:
 
         accepted : whether the step counts; if not, no quantity may change
         spin : before the step
-        steady : ripple-free spin before the step (`sweep.models.ripple`); the spin itself unless some measurement
+        steady : ripple-free spin before the step (`theory.ripple`); the spin itself unless some measurement
             has `follows_ripple`
         work : work of friction in the step; may be zero unless some measurement has `follows_work`
         h : length of the step

@@ -22,9 +22,10 @@ from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
 from sweep.kernels.stability import growth_rates
-from sweep.models import friction, linear, slip
-from sweep.models.coefficients import coefficients, normal_coordinates
+from sweep.models.ladder import friction, slip
 from sweep.models.model import MODES, Array, Columns, Model, stack
+from sweep.models.theory import linear
+from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.variables import Variable
 
 # Ratio of amplitudes below which a mode counts as round-off of the other.

@@ -1,8 +1,8 @@
 """The spin at which a settled trajectory comes to rest, when what is left of its rattle has decayed.
 
 A trajectory settles, and is left, while its rattle can still change its spin by a third: of 60 settled cells, the spin
-at the end was off by more than 0.1 % in 55.  The slow equations (`sweep.models.rest`) give where it goes: of the same
-cells this was off by more than 0.1 % in five, by 0.8 % at most.
+at the end was off by more than 0.1 % in 55.  The slow equations (`sweep.models.stiff.final_spin`) give where it goes:
+of the same cells this was off by more than 0.1 % in five, by 0.8 % at most.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 from sweep.kernels.layout import Table
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.status import SETTLED
-from sweep.models import slip
+from sweep.models.ladder import slip
 from sweep.models.model import MODES, Array, stack
-from sweep.models.rest import resting_spin
-from sweep.models.slip_split import SPLIT, Constants, momentum
+from sweep.models.stiff.final_spin import resting_spin
+from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum
 from sweep.variables import Variable
 
 
@@ -46,9 +46,9 @@ class RestingSpin(Measurement):
 
 
 def _split(table: Table) -> tuple[Array, Constants]:
-    """States and constants of `slip_split`, from images of either set of variables."""
+    """States and constants of `stiff.slip`, from images of either set of variables."""
     kept = {name: table[f"constant.{name}"] for name in slip.Constants._fields}
     constants = Constants(*(1 / kept[f"inv_{name}"] for name in ("I1", "I2", "I3")), **kept)
-    if SPLIT.states[2] in table.layout:
-        return table.columns(SPLIT.states).T, constants
+    if STIFF_MODEL.states[2] in table.layout:
+        return table.columns(STIFF_MODEL.states).T, constants
     return stack(momentum(tuple(table.columns(slip.MODEL.states).T), constants)), constants

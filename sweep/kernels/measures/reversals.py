@@ -1,7 +1,7 @@
 """Reversals: changes of sign of the ripple-free spin, averaged over successive windows of one period of the rattle.
 
-The ripple-free spin n* (`sweep.models.ripple`) is the spin without the ripple that the rattle imposes on it.  A window
-is as long as a period of the slower rocking, and the first begins at t = 0.  The time of a reversal is where the
+The ripple-free spin n* (`sweep.models.theory.ripple`) is the spin without the ripple that the rattle imposes on it.  A
+window is as long as a period of the slower rocking, and the first begins at t = 0.  The time of a reversal is where the
 straight line between two successive averages, each placed at the centre of its window, crosses zero.
 
 The same is counted in windows that begin half a period later.  If the two counts differ, that of the trajectory is

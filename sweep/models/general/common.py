@@ -1,0 +1,62 @@
+"""What the variants with slip and without share: their constants, what they offer, what a trajectory shows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from sweep.models.general import rigid_body
+from sweep.models.general.bounds import still_energy
+from sweep.models.general.couples import Couple
+from sweep.models.general.laws import Law
+from sweep.models.general.surfaces import Surface
+from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, nothing
+
+STILL = "still"
+"""The constant `Model.still` of variants with a couple that stops the body."""
+
+
+def record(surface: Surface, constants: Sequence[str], more: Any) -> type[Any]:
+    """The constants of a variant: shape, inertia, its inverse, and `more`, a function of the columns."""
+    shape = rigid_body.shape_names(surface)
+    inverse = tuple(name.replace("J", "inv_J") for name in rigid_body.INERTIA)
+
+    class Constants(named(*shape, *rigid_body.INERTIA, *inverse, *constants)):  # type: ignore[misc]
+        @classmethod
+        def of(cls, columns: Columns) -> Constants:
+            J = rigid_body.inertia(columns)
+            return cls(*rigid_body.shape(columns, surface), *J, *rigid_body.inverse(J), *more(columns))
+
+    return Constants
+
+
+def couple_constants(couples: Sequence[Couple], law: Law | None = None) -> tuple[tuple[str, ...], Any]:
+    names = tuple(name for couple in couples for name in couple.constants)
+    stopping = [couple.stops_below for couple in couples if couple.stops_below]
+    stopping = [law.stops_below] if law and law.stops_below else stopping
+
+    def values(columns: Columns) -> tuple[Array, ...]:
+        still = (still_energy(stops_below(columns), columns) for stops_below in stopping)
+        return (*(value for couple in couples for value in couple.of(columns)), *still)
+
+    return (*names, *(STILL for _ in stopping)), values
+
+
+def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
+    """A couple that is not linear has no Jacobian that is quadratic in the spin, which the linear theory needs."""
+    theory = {LINEAR} if dissipates and all(couple.linear for couple in couples) else set()
+    return frozenset({COUNT, SPIN, ENERGY} | theory)
+
+
+def turned(columns: Columns) -> Array:
+    """`Model.turned`: x and y are the axes of inertia of a body given by δ, and those of the surface otherwise."""
+    return np.asarray(columns.get("delta", nothing(columns)))
+
+
+def seen(contact: Any, rhs: Any, y: Array, p: Any) -> dict[str, Array]:
+    """The contact point and the normal force."""
+    _, point, _, _ = contact(*y[:5], p)
+    _, (_, _, R, _) = rhs(y, p)
+    return {"contact_x": point[0], "contact_y": point[1], "normal_force": R}

@@ -1,0 +1,199 @@
+"""Laws of slip friction beside the paper's: what a general body may slip on.
+
+All laws are isotropic.  The friction force on the body is F = -N k(v²) v, with the slip velocity v of the contact point
+and the normal force N; a law is its resistance k.  It is a smooth function of v², also at v = 0, and is written without
+branches, so that it can be vectorised and differentiated by complex steps.  To the linear theory every law is viscous,
+with the coefficient k(0).  One law depends on the spin too, and resists it (`Law.coupled`).
+
+To add a law, write its resistance and enter a `Law` in `LAWS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models.model import Array, Columns
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law of friction."""
+
+    name: str
+    """As in the names of models: the `law` of a configuration and, after a hyphen, its `regularisation`."""
+    parameters: tuple[str, ...]
+    """Names of its physical parameters, which are its constants too."""
+    resistance: Callable[..., Any]
+    """Inline, (v², constants) -> k, the friction force per unit of normal force and of slip velocity."""
+    strongest: Callable[[Columns], Array]
+    """(columns) -> bound on the derivative of k v with respect to v, shape (cells,).  It bounds k too."""
+    coupled: Callable[..., Any] | None = None
+    """Inline, (v², n², constants) -> (k, m), for a law that depends on the spin n too, with the couple -m n u per unit
+    of normal force; `resistance` is its k without spin then."""
+    strongest_couple: Callable[[Columns], Array] | None = None
+    """(columns) -> bound on the derivative of m n with respect to n, shape (cells,)."""
+    stops_below: Callable[[Columns], Array] | None = None
+    """As of a `sweep.models.general.couples.Couple`."""
+    linear_to: Callable[[Columns], Array] | None = None
+    """(columns) -> slip velocity up to which k is constant to a few per cent, shape (cells,); None if k is constant."""
+    pure: frozenset[str] = frozenset()
+    """Parameters that are pure numbers here although `sweep.parameters` gives them a unit."""
+
+
+_TINY = 1e-20
+"""Added to the square of a relative velocity, so that its root can be divided by; far below what a double resolves."""
+
+
+@inline
+def tanh_ratio(square: Any) -> Any:
+    """tanh(x)/x from x², to 1e-15; x is real or has a tiny imaginary part.
+
+    A call of the C library's tanh would keep the loop over lanes from being vectorised.  So tanh(x/32) is taken from
+    its continued fraction and doubled five times, tanh(2 y) = 2 N D / (N² + D²) for tanh(y) = N/D.
+    """
+    x = np.sqrt(square + _TINY)
+    y = np.minimum(x, 20.0) * 0.03125
+    q = y * y
+    N = y * (1.0 + q * (17325.0 + q * (378.0 + q)) / 135135.0)
+    D = 1.0 + q * (62370.0 + q * (3150.0 + 28.0 * q)) / 135135.0
+    N, D = 2.0 * N * D, N * N + D * D
+    N, D = 2.0 * N * D, N * N + D * D
+    N, D = 2.0 * N * D, N * N + D * D
+    N, D = 2.0 * N * D, N * N + D * D
+    N, D = 2.0 * N * D, N * N + D * D
+    return N / (D * x)
+
+
+@inline
+def rounded(x: Any, width: Any) -> Any:
+    """x from `width` on; below it a cubic, x²/s (1 - x/(3 s)) + s/3, that keeps away from zero."""
+    t = np.minimum(x / width, 1.0)
+    return np.maximum(x, width) + width * (t * t * (1.0 - t / 3.0) - 2.0 / 3.0)
+
+
+@inline
+def _viscous(square: Any, p: Any) -> Any:  # noqa: ARG001
+    return p.mu
+
+
+@inline
+def _none(square: Any, p: Any) -> Any:  # noqa: ARG001
+    return 0.0
+
+
+@inline
+def _sqrt(square: Any, p: Any) -> Any:
+    return p.mu / np.sqrt(square + p.speed * p.speed)
+
+
+@inline
+def _tanh(square: Any, p: Any) -> Any:
+    return p.mu / p.speed * tanh_ratio(square / (p.speed * p.speed))
+
+
+@inline
+def _cubic(square: Any, p: Any) -> Any:
+    return p.mu / rounded(np.sqrt(square), p.speed)
+
+
+@inline
+def _stribeck(square: Any, p: Any) -> Any:
+    """From the static to the kinetic coefficient by the quintic 10 t³ - 15 t⁴ + 6 t⁵ of t = v / speed."""
+    t = np.minimum(np.sqrt(square) / p.speed, 1.0)
+    fallen = t * t * t * (10.0 - t * (15.0 - 6.0 * t))
+    coefficient = p.mu_static - (p.mu_static - p.mu) * fallen
+    return coefficient / np.sqrt(square + p.speed_stick * p.speed_stick) + p.mu_viscous
+
+
+_C = 3 * np.pi / 8
+"""Force over a circle where d is small, over d."""
+
+
+@inline
+def over_circle(slip: Any, turn: Any) -> Any:
+    """Force and couple of dry friction over a circle under the pressure of Hertz, as shares of μ N and of μ N ε.
+
+    Where the circle, of radius ε, slips by v and turns by ε n at its rim, each of its points slips by itself.  The
+    force is the gradient of Φ(d), the mean distance of its points, weighed with their pressure, from the one at rest,
+    at d = v/(ε n); the couple is Φ - d Φ'.  As ∇²|x| = 1/|x|, ∇²Φ is the potential of the pressure, which inside the
+    circle is 3π/8 (2 - d²).  So, with C = 3π/8,
+
+        d <= 1:  force C (d - d³/4),  couple C/16 (8 - 8 d² + 3 d⁴);
+        d >= 1:  force 1 - 1/(10 d²) - …,  couple 1/(5 d) + ….
+
+    Polynomials in x = 1/d², of exact value and slope at both ends, stand for the two series, with errors of 1.2e-4.  Of
+    t = min(d, 1) and x = min(1/d², 1) one is 1 always; what is made of it is then zero or constant.
+
+    Returns
+    -------
+    force; couple divided by `turn`
+    """
+    near = np.minimum(slip, turn)
+    t, e = near / turn, near / slip
+    square, x = t * t, e * e
+    left = 1.0 - x
+    force = 1.0 - 0.75 * _C + x * (0.875 * _C - 1.0 - left * (0.01184809 + 0.02038007 * x))
+    couple = 0.2 - 0.1875 * _C + x * (0.15625 * _C - 0.2 + left * (0.00719663 + 0.01579856 * x))
+    return (
+        _C * t * (1.0 - 0.25 * square) + left * force,
+        0.0625 * _C * (1.0 - square) * (5.0 - 3.0 * square) / turn + t / slip * (0.1875 * _C + left * couple),
+    )
+
+
+@inline
+def _contensou(square: Any, spin_square: Any, p: Any) -> Any:
+    """Dry friction over a circle of radius ε, with sqrt(v² + s²) in place of v."""
+    slip, turn = np.sqrt(square + p.speed * p.speed), p.radius_contact * np.sqrt(spin_square + _TINY)
+    force, couple = over_circle(slip, turn)
+    return p.mu * force / slip, p.mu * p.radius_contact * p.radius_contact * couple
+
+
+_LINEAR = 0.1
+"""Share of its own speed up to which a law counts as linear: the cubic is off by 0.03 there, the others by 0.01."""
+
+
+def _below_speed(columns: Columns) -> Array:
+    return np.asarray(_LINEAR * columns["speed"])
+
+
+def _below_both_speeds(columns: Columns) -> Array:
+    return np.asarray(_LINEAR * np.minimum(columns["speed"], columns["speed_stick"]))
+
+
+LAWS: dict[str, Law] = {
+    law.name: law
+    for law in (
+        Law("viscous", ("mu",), _viscous, lambda columns: columns["mu"]),
+        Law("none", (), _none, lambda columns: np.zeros_like(columns["a"])),
+        Law(
+            "coulomb-sqrt", ("mu", "speed"), _sqrt,
+            lambda columns: columns["mu"] / columns["speed"], linear_to=_below_speed, pure=frozenset({"mu"}),
+        ),
+        Law(
+            "coulomb-tanh", ("mu", "speed"), _tanh,
+            lambda columns: columns["mu"] / columns["speed"], linear_to=_below_speed, pure=frozenset({"mu"}),
+        ),
+        Law(
+            "coulomb-cubic", ("mu", "speed"), _cubic,
+            lambda columns: 3 * columns["mu"] / columns["speed"], linear_to=_below_speed, pure=frozenset({"mu"}),
+        ),
+        Law(
+            "stribeck", ("mu", "mu_static", "speed", "speed_stick", "mu_viscous"), _stribeck,
+            lambda columns: columns["mu_static"] / columns["speed_stick"] + columns["mu_viscous"],
+            linear_to=_below_both_speeds, pure=frozenset({"mu"}),
+        ),
+        Law(
+            "contensou", ("mu", "radius_contact", "speed"), _sqrt, lambda columns: columns["mu"] / columns["speed"],
+            coupled=_contensou,
+            # The couple falls with d most steeply where d² = 0.8.
+            strongest_couple=lambda columns: 0.338 * columns["mu"] * columns["radius_contact"] ** 2 / columns["speed"],
+            stops_below=lambda columns: _LINEAR * columns["speed"] / columns["radius_contact"],
+            pure=frozenset({"mu"}),
+        ),
+    )
+}  # fmt: skip

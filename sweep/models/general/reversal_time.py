@@ -1,0 +1,126 @@
+"""The time of the first reversal by Garcia and Hubbard (1988), for any rigid body that does not slip.
+
+To lowest order in rattle and spin, and averaged over the rattle, three quantities change: the spin n and the energies
+E_k of the two modes of rocking, all per unit mass.  With J = J33,
+
+    J n' = -2 Σ σ_k E_k,   E_k' = 2 σ_k n E_k.
+
+These are Takano's (ndotab) and (abdot) without friction (2 σ_1 = k1 and 2 σ_2 = -k4 up to the order of the modes), and
+Garcia and Hubbard's equations as Kondo and Nakanishi (2017, arXiv:1704.06717) rederive them, with their asymmetric
+torque coefficients -2 σ_k.
+
+The σ_k.  About the contact point the contact force has no torque, so that at n = 0 the spin changes by the term of
+second order in the motion of that point, with the height h of G and the radii of curvature R1 and R2,
+
+    J n' = h (R1 - R2) u1' u2'   on average (compare H in `sweep.models.theory.ripple`).
+
+A mode u = e q of u1, u2 with the matrix of inertia M (`rigid_body.frequencies`) has E = q'² eᵀ M e on average, hence
+2 σ_k = -h (R1 - R2) e1 e2 / (eᵀ M e).  Summed over both modes e eᵀ / (eᵀ M e) is M⁻¹; divided by ν_k² first, it is the
+inverse of the stiffness, which is diagonal.  These two sums give e1 e2 for each mode, and for any misalignment
+
+    2 σ_k = ± h (R1 - R2) (M⁻¹)_12 ν_k² / (ν_2² - ν_1²),   + for the lower mode, - for the higher,
+
+with the (M⁻¹)_12 = (1/M_1 - 1/M_2) sin(2 ξ)/2 of the moments of inertia M_1, M_2 of the two oscillations and the
+angle ξ between their axes and those of the curvature.  So it is a product of misalignment, difference of the inverse
+moments, difference of the radii and squared frequency, as Kondo and Nakanishi say of theirs; and the σ are as the
+squared frequencies, with opposite signs.
+
+The time.  Where only the growing mode counts, (n - n_c)² + 2 E/J = N² is conserved, n_c being the spin at which the
+mode neither grows nor decays: zero without friction, the critical spin of (abdot) with it.  So
+
+    n - n_c = N tanh(|σ| N (t_0 - t)),
+    t_r = [asinh((n0 - n_c)/sqrt(2 E0/J)) + artanh(n_c/N)] / (|σ| N)
+
+for n0 > 0, and by reflection for n0 < 0.  With n_c = 0 this is Garcia and Hubbard's time, log((N + n0)/(N - n0)) over
+2 |σ| N.  Neglected are the other mode, which decays, and all that is of higher order in n0/ν and in the rattle.
+
+Only the abstracts of the two papers were at hand, not their numbered equations: the derivation is ours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.models.general import rigid_body, starts
+from sweep.models.general.surfaces import ELLIPSOID, Surface
+from sweep.models.model import Array, Columns
+
+PREDICTED, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL, NOT_KNOWN = range(6)
+REASONS = {
+    PREDICTED: "predicted",
+    NO_COUPLING: "no_coupling",
+    NO_SPIN: "no_spin",
+    NO_RATTLE: "no_rattle",
+    NO_REVERSAL: "no_reversal",
+    NOT_KNOWN: "not_known",
+}
+"""Whether there is a time, and why not: nothing couples spin and rattle; there is no spin to reverse; the mode that
+would grow has no energy; friction stops the reversal; or body or friction have what the formula does not know."""
+
+
+def growth(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
+    """σ of the slower and of the faster mode, half the rate per spin at which its energy grows, shape (cells,)."""
+    height, M11, M22, M12 = _inertia(columns)
+    k1, k2 = rigid_body.stiffness(columns, surface)  # R1 - height and R2 - height
+    lower, higher = rigid_body.frequencies(columns, surface)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shared = -height * (k1 - k2) * M12 / (M11 * M22 - M12**2) / (2 * (higher**2 - lower**2))
+    # Of a body that is round both ways the modes are arbitrary, and nothing is coupled.
+    shared = np.where((k1 == k2) | (M12 == 0), 0.0, shared)
+    return shared * lower**2, -shared * higher**2
+
+
+def energies(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
+    """Energies of the slower and of the faster mode at the start, per unit mass, shape (cells,)."""
+    _, M11, M22, M12 = _inertia(columns)
+    k1, k2 = (np.sqrt(rigid_body.gravity(columns) * k) for k in rigid_body.stiffness(columns, surface))
+    # In the coordinates (k1 u1, k2 u2) the stiffness is one, and the eigenvalues of the inertia are 1/ν².
+    rows = ((M11 / k1**2, M12 / (k1 * k2)), (M12 / (k1 * k2), M22 / k2**2))
+    values, modes = np.linalg.eigh(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2))
+    u1, u2, w1, w2, w3 = starts.rolling(columns, surface)
+    u3 = -np.sqrt(1 - u1**2 - u2**2)
+    moves = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3  # u' = u × ω
+    q, p = (np.einsum("...i,...ik->...k", np.stack([k1 * x, k2 * y], axis=-1), modes) for x, y in ((u1, u2), moves))
+    found = 0.5 * (q**2 + values * p**2)
+    return found[..., 1], found[..., 0]
+
+
+def _inertia(columns: Columns) -> tuple[Array, Array, Array, Array]:
+    """The height of G at rest, and M11, M22 and M12, as in `rigid_body.frequencies` for J13 = J23 = 0."""
+    J11, J22, _, J12, _, _ = rigid_body.inertia(columns)
+    height = rigid_body.height(columns)
+    return height, J22 + height**2, J11 + height**2, -J12
+
+
+def first_reversal(columns: Columns, n_c: tuple[Array, Array], surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
+    """The time of the first reversal, in the model's units, and the reason (`REASONS`), each of shape (cells,).
+
+    Parameters
+    ----------
+    n_c : the critical spins n_c1+ and n_c1-, shape (cells,): zero without slip, NaN where they are not known
+    """
+    n0 = starts.spin(columns, surface)
+    side = np.sign(n0)
+    slower, faster = growth(columns, surface)
+    grows_slower = slower * side > 0
+    sigma = np.abs(np.where(grows_slower, slower, faster))
+    e = 2 * np.where(grows_slower, *energies(columns, surface)) / rigid_body.inertia(columns)[2]
+    critical = np.abs(np.where(side > 0, *n_c))
+    beyond = np.abs(n0) - critical
+    N = np.sqrt(beyond**2 + e)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time = (np.arcsinh(beyond / np.sqrt(e)) + np.arctanh(critical / N)) / (sigma * N)
+    reason = np.select(
+        [_unknown(columns) | np.isnan(critical), sigma == 0, n0 == 0, e == 0, critical >= N],
+        [NOT_KNOWN, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL], PREDICTED,
+    )  # fmt: skip
+    return np.where(reason == PREDICTED, time, np.nan), reason
+
+
+def _unknown(columns: Columns) -> Array:
+    """Where a couple resists the motion, or upright spin is no steady motion, shape (cells,)."""
+    names = ("sigma", "mu_rolling", "mu_spinning", "Ixz", "Iyz")
+    found = np.zeros(len(columns["a"]), bool)
+    for name in names:
+        found |= columns.get(name, 0) != 0
+    return found

@@ -1,0 +1,147 @@
+"""Any body that slips on the plane, with any law of friction.
+
+All forces are per unit mass: R is the acceleration N/m by the normal force.  Gravity, the contact force R (u + f) with
+f = -k v_p, and the couple τ0 + R τ1 give
+
+    v_g' + ω × v_g = R (u + f) - g u,   v_g = v_p + v_0,   v_0 = x_p × ω,
+    J ω' = x_p × R (u + f) + τ0 + R τ1 - ω × J ω.
+
+So ω' = α + R β with α = J⁻¹ (τ0 - ω × J ω) and β = J⁻¹ (x_p × (u + f) + τ1), and
+
+    v_p' = R (u + f) - g u - x_p × ω' - ω × (v_p + v_0 - x_p').
+
+The contact point stays in the plane, v_p · u = 0.  With u' = u × ω the derivative of that is v_p' · u =
+-u · (ω × v_p), which cancels the same term on the right.  With q = u × x_p,
+
+    R = (g + (v_0 - x_p') · u' + q · α) / (1 - q · β).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models.general import rigid_body, starts, validity
+from sweep.models.general import ripple as ripples
+from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
+from sweep.models.general.common import STILL, couple_constants, offers, record, seen, turned
+from sweep.models.general.couples import Couple, nothing
+from sweep.models.general.laws import Law
+from sweep.models.general.resistance import drag_of, isotropic_drag, resistance_of, resistances
+from sweep.models.general.rigid_body import gyroscopic
+from sweep.models.general.surfaces import Surface
+from sweep.models.ladder import slip
+from sweep.models.model import REVERSAL_TIME, Array, Columns, Model, Ripple
+
+
+def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
+    """The variant of `slip` of this name; `parameters` are those of the body and the start."""
+    contact, general_energy = surface.contact, rigid_body.energy_on(surface)
+    resistance, (plain, loaded), drag = resistance_of(law), resistances(couples), drag_of(couples, law)
+    # A product with 0.0 would remain: the compiler has to allow for infinity.  A branch on these does not.
+    damps, drags = plain is not nothing, loaded is not nothing or drag is not isotropic_drag
+    names, values = couple_constants(couples, law)
+
+    @inline
+    def rhs(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3, v1, v2 = y
+        (u3, inv_u3), (x, y_, z), (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
+
+        v3 = -(v1 * u1 + v2 * u2) * inv_u3
+        slip_square = v1 * v1 + v2 * v2 + v3 * v3
+        k = resistance(slip_square, w1, w2, w3, u1, u2, u3, p)
+        # f = u - k v, the contact force per unit of R
+        f1, f2, f3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
+        # s = v_0 - x_p'
+        s1, s2, s3 = y_ * w3 - z * w2 - dx, z * w1 - x * w3 - dy, x * w2 - y_ * w1 - dz
+        q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
+        turn_square = w1 * w1 + w2 * w2 + w3 * w3
+        k0, k1 = plain(turn_square, p), loaded(turn_square, p)
+        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, slip_square, p)
+        m1, m2, m3 = gyroscopic(w1, w2, w3, p)
+        if damps:
+            m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
+        al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
+        al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
+        al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
+        t1, t2, t3 = y_ * f3 - z * f2, z * f1 - x * f3, x * f2 - y_ * f1
+        if drags:
+            t1, t2, t3 = t1 - k1 * d1, t2 - k1 * d2, t3 - k1 * d3
+        be1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
+        be2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
+        be3 = p.inv_J13 * t1 + p.inv_J23 * t2 + p.inv_J33 * t3
+
+        denominator = 1.0 - (q1 * be1 + q2 * be2 + q3 * be3)
+        R = (p.g + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)) / denominator
+
+        dw1, dw2, dw3 = al1 + R * be1, al2 + R * be2, al3 + R * be3
+        s1, s2, s3 = s1 + v1, s2 + v2, s3 + v3
+        dv1 = R * f1 - p.g * u1 - (y_ * dw3 - z * dw2) - (w2 * s3 - w3 * s2)
+        dv2 = R * f2 - p.g * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
+
+        spin = u1 * w1 + u2 * w2 + u3 * w3
+        per_load = k * slip_square
+        if drags:
+            per_load = per_load + k1 * (d1 * w1 + d2 * w2 + d3 * w3)
+        power = R * per_load
+        if damps:
+            power = power + k0 * turn_square
+        return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, power, R, denominator)
+
+    @inline
+    def energy(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3, v1, v2 = y
+        return general_energy(u1, u2, w1, w2, w3, v1, v2, p)
+
+    def observe(y: Array, p: Any) -> dict[str, Array]:
+        return {**seen(contact, rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
+
+    def fastest_decay(columns: Columns) -> Array:
+        grip = strongest_grip(columns, surface)
+        decay = law.strongest(columns) * grip + couples_decay(couples, columns, surface)
+        if law.strongest_couple:
+            decay = decay + law.strongest_couple(columns) * hardest_turn(columns, surface)
+        return np.asarray(decay)
+
+    def more(columns: Columns) -> tuple[Array, ...]:
+        faint = () if law.linear_to is None else (faint_energy(law.linear_to(columns), columns, surface),)
+        return (*(columns[each] for each in law.parameters), *values(columns), *faint)
+
+    fields = (*law.parameters, *names, *(() if law.linear_to is None else ("faint",)))
+    return Model(
+        name=name,
+        summary=f"{slip.MODEL.summary}, for any body",
+        states=slip.MODEL.states,
+        spin_state=slip.MODEL.spin_state,
+        parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
+        offers=offers(couples, dissipates=law.coupled is None) | ({REVERSAL_TIME} if law.name == "viscous" else set()),
+        constants=record(surface, fields, more),
+        start=lambda columns: starts.slipping(columns, surface),
+        slower_period=lambda columns: rigid_body.slower_period(columns, surface),
+        fastest_decay=fastest_decay,
+        upright=slip.MODEL.upright,
+        rhs=rhs,
+        energy=energy,
+        ripple=Ripple(ripples.NAMES, lambda columns: ripples.form(columns, surface), ripples.slipping),
+        tilt=slip.MODEL.tilt,
+        observe=observe,
+        turned=turned,
+        spin_unit=rigid_body.spin_unit,
+        impossible=lambda columns: validity.impossible(columns, surface),
+        faint="" if law.linear_to is None else "faint",
+        still=STILL if STILL in names else "",
+        extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
+    )
+
+
+def _with_and_without(law: Law) -> Any:
+    """As a law that saturates leaves the body free when it slips fast, motions without friction matter as well."""
+
+    def extremes(columns: Columns) -> tuple[Columns, ...]:
+        free = {name: 0 * columns[name] for name in law.parameters if name.startswith("mu")}
+        return columns, {**columns, **free}
+
+    return extremes

@@ -1,0 +1,200 @@
+"""The surfaces on which a rigid body rolls and slips: the ellipsoid, and the elliptic paraboloid.
+
+The axes are those of the surface, x and y along its principal curvatures at the lowest point of the body at rest, z
+down; they begin at the centre of mass G, at the height h = c - offset above that point.  u is the upward normal of the
+plane.  A variant of the equations is made for one surface and has no instruction of the other.
+
+Ellipsoid with the semi-axes a, b and c, its centre `offset` above G.  With A = diag(a², b², c²) and r = sqrt(uᵀ A u),
+
+    x_p = -A u / r - offset ẑ,   -x_p · u = r + offset u3.
+
+Paraboloid z = c (1 - a (x/c)² - b (y/c)²), its origin `offset` above G: c is the length in which it is measured, and a
+and b are pure numbers.  With the radii of curvature at its lowest point, s1 = c/(2 a) and s2 = c/(2 b), and t = u/u3,
+
+    x_p = (s1 t1, s2 t2, h - (s1 t1² + s2 t2²)/2),   -x_p · u = -u3 (h + (s1 t1² + s2 t2²)/2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models.model import Array, Columns
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface.  Heights are those of G above the plane; lengths are in any unit."""
+
+    name: str
+    """As in the configuration."""
+    constants: tuple[str, ...]
+    of: Callable[[Columns], tuple[Array, ...]]
+    """(columns) -> values of `constants`, each of shape (cells,)."""
+    radii: Callable[[Columns], tuple[Array, Array]]
+    """(columns) -> radii of curvature along x and y at the lowest point of the body at rest, each of shape (cells,)."""
+    excess: Callable[[Columns], tuple[Array, Array]]
+    """(columns) -> these radii less c, without loss of digits, each of shape (cells,)."""
+    contact: Callable[..., Any]
+    """Inline, (u1, u2, ω1, ω2, ω3, constants) -> (u3, 1/u3), the contact point x_p, u' = u × ω, and x_p', the velocity
+    of the contact point in the body."""
+    elevation: Callable[..., Any]
+    """Inline, (u1, u2, u3, constants) -> the height above that at rest, quadratic in u1 and u2 and precise however
+    small they are, and x, y and z of x_p."""
+    height: Callable[[tuple[Array, ...], Any, Any, Array], Array]
+    """(values of `constants`, cos ψ, sin ψ, φ) -> the height if the body is tilted by φ towards the azimuth ψ."""
+    normal: Callable[[Columns, Array, Array], tuple[Array, Array, Array]]
+    """(columns, x, y) -> u for the contact point at x and y, which has to be one."""
+    homogeneous: bool
+    """Whether the inertia is that of a homogeneous body unless it is given."""
+    interior: str
+    """What the centre of mass has to lie in, in words, with the offsets that are allowed."""
+    outside: Callable[[Columns], Array]
+    """(columns) -> whether it lies elsewhere, shape (cells,)."""
+    bounds: str
+    """For which offsets upright rest is stable, in words."""
+
+
+def offset(columns: Columns) -> Array:
+    """How far G lies below the ellipsoid's centre or the paraboloid's origin, shape (cells,)."""
+    return columns["offset"] if "offset" in columns else np.zeros_like(columns["a"])
+
+
+def _semi_axes(columns: Columns) -> tuple[Array, ...]:
+    a, b, c = columns["a"], columns["b"], columns["c"]
+    return a**2, b**2, c**2, offset(columns)
+
+
+def _ellipsoid_radii(columns: Columns) -> tuple[Array, Array]:
+    return columns["a"] ** 2 / columns["c"], columns["b"] ** 2 / columns["c"]
+
+
+def _ellipsoid_excess(columns: Columns) -> tuple[Array, Array]:
+    a, b, c = columns["a"], columns["b"], columns["c"]
+    return (a**2 - c**2) / c, (b**2 - c**2) / c
+
+
+@inline
+def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+    """As `Surface.contact`, of the ellipsoid."""
+    a2, b2, c2 = p.a2, p.b2, p.c2
+    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
+    au1, au2, au3 = a2 * u1, b2 * u2, c2 * u3
+    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
+    # One division is enough for both 1/r and 1/u3.
+    shared = 1.0 / (r * u3)
+    inv_r, inv_u3 = shared * u3, shared * r
+    x, y, below = -au1 * inv_r, -au2 * inv_r, -au3 * inv_r
+
+    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
+    s = (du1 * au1 + du2 * au2 + du3 * au3) * inv_r
+    dx, dy, dz = -inv_r * (a2 * du1 + x * s), -inv_r * (b2 * du2 + y * s), -inv_r * (c2 * du3 + below * s)
+    return (u3, inv_u3), (x, y, below - p.offset), (du1, du2, du3), (dx, dy, dz)
+
+
+@inline
+def _ellipsoid_elevation(u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+    au1, au2, au3 = p.a2 * u1, p.b2 * u2, p.c2 * u3
+    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
+    # r - c = (r² - c²) / (r + c) and 1 + u3 = (u1² + u2²) / (1 - u3)
+    c = np.sqrt(p.c2)
+    height = ((p.a2 - p.c2) * u1 * u1 + (p.b2 - p.c2) * u2 * u2) / (r + c)
+    height = height + p.offset * (u1 * u1 + u2 * u2) / (1.0 - u3)
+    x, y, z = -au1 / r, -au2 / r, -au3 / r - p.offset
+    return height, x, y, z
+
+
+def _ellipsoid_height(shape: tuple[Array, ...], cos: Any, sin: Any, phi: Array) -> Array:
+    a2, b2, c2, below = shape[:4]
+    flat = a2 * cos**2 + b2 * sin**2
+    return np.asarray(np.sqrt(flat * np.sin(phi) ** 2 + c2 * np.cos(phi) ** 2) - below * np.cos(phi))
+
+
+def _ellipsoid_normal(columns: Columns, x: Array, y: Array) -> tuple[Array, Array, Array]:
+    """The point has to lie within the outline of the body seen from above."""
+    a, b, c = columns["a"], columns["b"], columns["c"]
+    w1, w2 = x / a**2, y / b**2
+    w3 = np.sqrt(1 - (x * w1 + y * w2)) / c
+    norm = np.sqrt(w1**2 + w2**2 + w3**2)
+    return -w1 / norm, -w2 / norm, -w3 / norm
+
+
+def _paraboloid_radii(columns: Columns) -> tuple[Array, Array]:
+    return columns["c"] / (2 * columns["a"]), columns["c"] / (2 * columns["b"])
+
+
+def _paraboloid_excess(columns: Columns) -> tuple[Array, Array]:
+    a, b, c = columns["a"], columns["b"], columns["c"]
+    return c * (0.5 - a) / a, c * (0.5 - b) / b
+
+
+@inline
+def _paraboloid_contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
+    inv_u3 = 1.0 / u3
+    t1, t2 = u1 * inv_u3, u2 * inv_u3
+    x, y = p.radius1 * t1, p.radius2 * t2
+    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
+    dt1, dt2 = (du1 - t1 * du3) * inv_u3, (du2 - t2 * du3) * inv_u3
+    z = p.h - 0.5 * (x * t1 + y * t2)
+    return (u3, inv_u3), (x, y, z), (du1, du2, du3), (p.radius1 * dt1, p.radius2 * dt2, -(x * dt1 + y * dt2))
+
+
+@inline
+def _paraboloid_elevation(u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+    t1, t2 = u1 / u3, u2 / u3
+    x, y = p.radius1 * t1, p.radius2 * t2
+    # 1 + u3 = (u1² + u2²) / (1 - u3)
+    height = -0.5 * (x * u1 + y * u2) - p.h * (u1 * u1 + u2 * u2) / (1.0 - u3)
+    return height, x, y, p.h - 0.5 * (x * t1 + y * t2)
+
+
+def _paraboloid_height(shape: tuple[Array, ...], cos: Any, sin: Any, phi: Array) -> Array:
+    radius1, radius2, h = shape[:3]
+    return np.asarray(h * np.cos(phi) + 0.5 * (radius1 * cos**2 + radius2 * sin**2) * np.sin(phi) * np.tan(phi))
+
+
+def _paraboloid_normal(columns: Columns, x: Array, y: Array) -> tuple[Array, Array, Array]:
+    radius1, radius2 = _paraboloid_radii(columns)
+    t1, t2 = x / radius1, y / radius2
+    norm = np.sqrt(1 + t1**2 + t2**2)
+    return -t1 / norm, -t2 / norm, -1 / norm
+
+
+ELLIPSOID = Surface(
+    name="ellipsoid",
+    constants=("a2", "b2", "c2", "offset"),
+    of=_semi_axes,
+    radii=_ellipsoid_radii,
+    excess=_ellipsoid_excess,
+    contact=contact,
+    elevation=_ellipsoid_elevation,
+    height=_ellipsoid_height,
+    normal=_ellipsoid_normal,
+    homogeneous=True,
+    interior="the ellipsoid; allowed: |offset| < c",
+    outside=lambda columns: np.abs(offset(columns)) >= columns["c"],
+    bounds="offset > c - a²/c and offset > c - b²/c",
+)
+
+PARABOLOID = Surface(
+    name="paraboloid",
+    constants=("radius1", "radius2", "h"),
+    of=lambda columns: (*_paraboloid_radii(columns), columns["c"] - offset(columns)),
+    radii=_paraboloid_radii,
+    excess=_paraboloid_excess,
+    contact=_paraboloid_contact,
+    elevation=_paraboloid_elevation,
+    height=_paraboloid_height,
+    normal=_paraboloid_normal,
+    homogeneous=False,
+    interior="the paraboloid; allowed: offset < c",
+    outside=lambda columns: offset(columns) >= columns["c"],
+    bounds="offset > c - c/(2 a) and offset > c - c/(2 b)",
+)
+
+SURFACES: dict[str, Surface] = {surface.name: surface for surface in (ELLIPSOID, PARABOLOID)}

@@ -1,0 +1,35 @@
+"""Which bodies of `sweep.models.general.rigid_body` cannot be, or do not stand upright at rest, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sweep.models.general import rigid_body
+from sweep.models.general.surfaces import ELLIPSOID, Surface
+from sweep.models.model import Array, Columns
+
+_ROUNDING = 1e-12
+
+
+def impossible(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
+    """Whether a body cannot be or does not stand, shape (cells,)."""
+    return np.asarray(np.any([bad for bad, _ in wrongs(columns, surface)], axis=0))
+
+
+def wrongs(columns: Columns, surface: Surface = ELLIPSOID) -> Iterator[tuple[Array, str]]:
+    """Everything that may be wrong: for which bodies it is, shape (cells,), and in words, with what is allowed."""
+    yield surface.outside(columns), f"centre of mass outside {surface.interior}"
+    moments = np.linalg.eigvalsh(rigid_body.matrix(rigid_body.inertia(columns)))
+    yield moments[:, 0] <= 0, "matrix of inertia not positive definite; allowed: three positive principal moments"
+    least, middle, largest = moments.T
+    yield (
+        largest > (least + middle) * (1 + _ROUNDING),
+        "no body has such moments of inertia; allowed: no principal moment above the sum of the other two",
+    )
+    k1, k2 = rigid_body.stiffness(columns, surface)
+    yield (
+        np.minimum(k1, k2) <= 0,
+        f"upright rest is unstable; allowed: the centre of mass below both centres of curvature, {surface.bounds}",
+    )

@@ -1,0 +1,1 @@
+"""The paper's ladder of models, one file each: slip, noslip, effective, averaged, and the formulas."""

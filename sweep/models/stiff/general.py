@@ -1,0 +1,268 @@
+"""The equations of `general` with slip, in variables in which only the slip is stiff: `stiff.slip` for any body.
+
+With M = J ω - x_p × v_g and gravity g,
+
+    u' = u × ω,   M' = s × v_g - ω × M - g u × x_p + τ0,   s = v_0 - x_p',   v_g = v_p + v_0,
+
+where ω = J_P⁻¹ (M + x_p × v_p), J_P = J + |x_p|² - x_p x_pᵀ.  The slip obeys
+
+    v_p' = R G - rest,   G = T (u - k v_p),   T = 1 - [x_p] J⁻¹ [x_p],   R = num / den,   den = u · G.
+
+A couple in proportion to the normal force would make M' stiff too: there is no stiff form then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models.general import rigid_body, variants
+from sweep.models.general import ripple as general_ripple
+from sweep.models.general.bounds import couples_decay, strongest_grip
+from sweep.models.general.couples import Couple, nothing
+from sweep.models.general.laws import LAWS, Law
+from sweep.models.general.resistance import resistances
+from sweep.models.general.rigid_body import gyroscopic
+from sweep.models.general.surfaces import Surface
+from sweep.models.model import Array, Columns, Model, Ripple, named
+from sweep.models.stiff.form import StiffForm
+from sweep.models.stiff.slip import Geometry
+
+ROCKING = ("B11", "B12", "B21", "B22", "C12", "C21")
+"""Elements of B and C in u' = B M, M' = C u: rocking about upright rest without slip.  C has no others."""
+
+STATES = ("u1", "u2", "M1", "M2", "M3", "v1", "v2")
+
+
+def form_of(model: Model) -> StiffForm | None:
+    """The stiff form of a variant with slip; None for other models, and for those that have none.
+
+    The law has to be viscous.  A step that may be long compared with the decay of the slip is of use only where the
+    slip remains at the value that follows from the slow motion.  With the other laws slip sets in and ends within times
+    that dopri5's steps are short enough for.
+    """
+    base, law, couples, surface = variants.parts(model.name)
+    if (base, law) != ("slip", "viscous") or any(couple.needs_normal_force for couple in couples):
+        return None
+    return _form_of(model, LAWS[law], tuple(couples), surface)
+
+
+@cache
+def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface) -> StiffForm:
+    resistance, contact, general_energy = law.resistance, surface.contact, rigid_body.energy_on(surface)
+    couple, _ = resistances(couples)
+    damps = couple is not nothing
+    fields = (*full.constants._fields, *ROCKING)
+
+    class Constants(named(*fields)):  # type: ignore[misc]
+        """The constants of the full model, and `ROCKING`."""
+
+        @classmethod
+        def of(cls, columns: Columns) -> Constants:
+            return cls(*full.constants.of(columns), *_rocking(columns, surface))
+
+    @inline
+    def momentum(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3, v1, v2 = y
+        (_, inv_u3), (x, y_, z), _, _ = contact(u1, u2, 0.0, 0.0, 0.0, p)
+        v3 = -(v1 * u1 + v2 * u2) * inv_u3
+        g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
+        M1 = p.J11 * w1 + p.J12 * w2 + p.J13 * w3 - (y_ * g3 - z * g2)
+        M2 = p.J12 * w1 + p.J22 * w2 + p.J23 * w3 - (z * g1 - x * g3)
+        M3 = p.J13 * w1 + p.J23 * w2 + p.J33 * w3 - (x * g2 - y_ * g1)
+        return u1, u2, M1, M2, M3, v1, v2
+
+    @inline
+    def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) -> Any:
+        # What is computed twice the compiler computes once.
+        (u3, inv_u3), (x, y, z), _, _ = contact(u1, u2, 0.0, 0.0, 0.0, p)
+        t1, t2 = u1 * inv_u3, u2 * inv_u3
+        v3 = -(v1 * t1 + v2 * t2)
+        w1, w2, w3 = _turn(M1 + (y * v3 - z * v2), M2 + (z * v1 - x * v3), M3 + (x * v2 - y * v1), x, y, z, p)
+        _, _, (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
+        s1, s2, s3 = y * w3 - z * w2, z * w1 - x * w3, x * w2 - y * w1
+        g1, g2, g3 = s1 + v1, s2 + v2, s3 + v3
+        s1, s2, s3 = s1 - dx, s2 - dy, s3 - dz
+        q1, q2, q3 = u2 * z - u3 * y, u3 * x - u1 * z, u1 * y - u2 * x
+        k0 = couple(w1 * w1 + w2 * w2 + w3 * w3, p)
+        dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - p.g * q1
+        dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - p.g * q2
+        dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - p.g * q3
+        if damps:
+            dM1, dM2, dM3 = dM1 - k0 * w1, dM2 - k0 * w2, dM3 - k0 * w3
+        geometry = Geometry(u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
+        return (du1, du2, dM1, dM2, dM3), geometry
+
+    @inline
+    def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
+        u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3 = geometry
+        m1, m2, m3 = gyroscopic(w1, w2, w3, p)
+        k0 = couple(w1 * w1 + w2 * w2 + w3 * w3, p)
+        if damps:
+            m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
+        al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
+        al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
+        al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
+        (T11, T12, T13), (T21, T22, T23), (T31, T32, T33) = _compliance(x, y, z, p)
+        k = resistance(v1 * v1 + v2 * v2 + v3 * v3, p)
+        f1, f2, f3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
+        G1, G2 = T11 * f1 + T12 * f2 + T13 * f3, T21 * f1 + T22 * f2 + T23 * f3
+        G3 = T31 * f1 + T32 * f2 + T33 * f3
+        den = u1 * G1 + u2 * G2 + u3 * G3
+        num = p.g + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)
+        e1, e2, e3 = s1 + v1, s2 + v2, s3 + v3
+        rest1 = p.g * u1 + (y * al3 - z * al2) + (w2 * e3 - w3 * e2)
+        rest2 = p.g * u2 + (z * al1 - x * al3) + (w3 * e1 - w1 * e3)
+
+        # With v3 = -(t1 v1 + t2 v2): dG_i/dv_j = -k S_ij and d den/dv_j = -k e_j.
+        S11, S12 = T11 - T13 * t1, T12 - T13 * t2
+        S21, S22 = T21 - T23 * t1, T22 - T23 * t2
+        S31, S32 = T31 - T33 * t1, T32 - T33 * t2
+        e1, e2 = u1 * S11 + u2 * S21 + u3 * S31, u1 * S12 + u2 * S22 + u3 * S32
+        gn = gamma * num
+        k, dd = gn * k, den * den
+        m11, m12 = dd + k * (den * S11 - G1 * e1), k * (den * S12 - G1 * e2)
+        m21, m22 = k * (den * S21 - G2 * e1), dd + k * (den * S22 - G2 * e2)
+        r1 = den * (den * ((b1 - v1) - gamma * rest1) + gn * G1)
+        r2 = den * (den * ((b2 - v2) - gamma * rest2) + gn * G2)
+        d = 1.0 / (m11 * m22 - m12 * m21)
+        return v1 + d * (m22 * r1 - m12 * r2), v2 + d * (m11 * r2 - m21 * r1), num, den
+
+    @inline
+    def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
+        v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
+        slip_square = v1 * v1 + v2 * v2 + v3 * v3
+        turn_square = geometry.w1 * geometry.w1 + geometry.w2 * geometry.w2 + geometry.w3 * geometry.w3
+        lost = R * resistance(slip_square, p) * slip_square
+        if damps:
+            lost = lost + couple(turn_square, p) * turn_square
+        return lost
+
+    @inline
+    def energy(y: Any, p: Any) -> Any:
+        u1, u2, M1, M2, M3, v1, v2 = y
+        _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
+        return general_energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
+
+    def velocities(y: Array, p: Any) -> Array:
+        _, geometry = slow(*y, p)
+        return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))
+
+    def full_constants(p: Any) -> Any:
+        return full.constants(*(getattr(p, name) for name in full.constants._fields))
+
+    def start(columns: Columns) -> tuple[Array, ...]:
+        states: tuple[Array, ...] = momentum(full.start(columns), Constants.of(columns))
+        return states
+
+    return StiffForm(
+        full=full,
+        model=replace(
+            full,
+            states=STATES,
+            constants=Constants,
+            start=start,
+            energy=energy,
+            observe=lambda y, p: full.observe(velocities(y, p), full_constants(p)),
+            ripple=Ripple(general_ripple.NAMES, lambda columns: general_ripple.form(columns, surface), _ripple),
+        ),
+        momentum=momentum,
+        velocities=velocities,
+        slow=slow,
+        newton=newton,
+        power=power,
+        implicit=implicit,
+        fastest_rocking=_fastest_rocking,
+        time_unit=lambda columns: 1 / rigid_body.spin_unit(columns),
+        slip_decay=lambda columns: full.fastest_decay(columns) + 2.2 * rigid_body.spin_unit(columns),
+        rise=lambda columns: _rise(columns, surface),
+        resistance=lambda columns: law.strongest(columns) * np.sqrt(rigid_body.gravity(columns) * columns["c"]),
+        damping=lambda columns: couples_decay(couples, columns, surface),
+        resolves_modes=False,
+    )
+
+
+@inline
+def _turn(K1: Any, K2: Any, K3: Any, x: Any, y: Any, z: Any, p: Any) -> Any:
+    """ω = J_P⁻¹ K, by the adjugate."""
+    P11, P22, P33 = p.J11 + y * y + z * z, p.J22 + z * z + x * x, p.J33 + x * x + y * y
+    P12, P13, P23 = p.J12 - x * y, p.J13 - x * z, p.J23 - y * z
+    C11, C22, C33 = P22 * P33 - P23 * P23, P11 * P33 - P13 * P13, P11 * P22 - P12 * P12
+    C12, C13, C23 = P13 * P23 - P12 * P33, P12 * P23 - P13 * P22, P12 * P13 - P11 * P23
+    inv = 1.0 / (P11 * C11 + P12 * C12 + P13 * C13)
+    w1 = inv * (C11 * K1 + C12 * K2 + C13 * K3)
+    w2 = inv * (C12 * K1 + C22 * K2 + C23 * K3)
+    return w1, w2, inv * (C13 * K1 + C23 * K2 + C33 * K3)
+
+
+@inline
+def _compliance(x: Any, y: Any, z: Any, p: Any) -> Any:
+    """T = 1 - [x_p] J⁻¹ [x_p], row by row: the acceleration of the contact point by a force on it."""
+    i11, i22, i33, i12, i13, i23 = p.inv_J11, p.inv_J22, p.inv_J33, p.inv_J12, p.inv_J13, p.inv_J23
+    # N = J⁻¹ [x_p], with [x_p] = ((0, -z, y), (z, 0, -x), (-y, x, 0))
+    N12, N13 = i13 * x - i11 * z, i11 * y - i12 * x
+    N21, N22, N23 = i22 * z - i23 * y, i23 * x - i12 * z, i12 * y - i22 * x
+    N31, N32, N33 = i23 * z - i33 * y, i33 * x - i13 * z, i13 * y - i23 * x
+    T11, T12, T13 = 1.0 + z * N21 - y * N31, z * N22 - y * N32, z * N23 - y * N33
+    T22, T23 = 1.0 + x * N32 - z * N12, x * N33 - z * N13
+    T33 = 1.0 + y * N13 - x * N23
+    return (T11, T12, T13), (T12, T22, T23), (T13, T23, T33)
+
+
+def _rocking(columns: Columns, surface: Surface) -> tuple[Array, ...]:
+    """Values of `ROCKING`, each of shape (cells,), at zero angular momentum about the vertical."""
+    J11, J22, J33, J12, J13, J23 = rigid_body.inertia(columns)
+    h2, g = rigid_body.height(columns) ** 2, rigid_body.gravity(columns)
+    P11, P22, P12 = J11 + h2 - J13**2 / J33, J22 + h2 - J23**2 / J33, J12 - J13 * J23 / J33
+    det = P11 * P22 - P12**2
+    k1, k2 = rigid_body.stiffness(columns, surface)
+    # u1' = ω2, u2' = -ω1
+    return -P12 / det, P11 / det, -P22 / det, P12 / det, g * k2, -g * k1
+
+
+@inline
+def _ripple(y: Any, p: Any, k: Any) -> Any:
+    """As `general_ripple.slipping`, with ω1 and ω2 from M to first order in the rattle."""
+    u1, u2, M1, M2, M3, v1, v2 = y
+    w3 = M3 / p.J33
+    m1, m2 = M1 - k[7] * v2 - k[8] * w3 * u1 - k[10] * M3, M2 + k[7] * v1 - k[9] * w3 * u2 - k[11] * M3
+    w1, w2 = -(p.B21 * m1 + p.B22 * m2), p.B11 * m1 + p.B12 * m2
+    return (k[0] * u1 + k[2] * u2) * M1 + (k[1] * u1 + k[3] * u2) * M2 + k[10] * w1 + k[11] * w2
+
+
+def _fastest_rocking(p: Any) -> Array:
+    """By -ν² the eigenvalues of B C."""
+    trace = p.B12 * p.C21 + p.B21 * p.C12
+    determinant = (p.B11 * p.B22 - p.B12 * p.B21) * -p.C12 * p.C21
+    square = -0.5 * trace + np.sqrt(np.maximum(0.25 * trace**2 - determinant, 0.0))
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+
+
+def _rise(columns: Columns, surface: Surface) -> Array:
+    h2 = rigid_body.height(columns) ** 2
+    i11, i22, _, i12, _, _ = rigid_body.inverse(rigid_body.inertia(columns))
+    largest = 0.5 * (i11 + i22) + np.sqrt(0.25 * (i11 - i22) ** 2 + i12**2)
+    return np.asarray(strongest_grip(columns, surface) / (rigid_body.gravity(columns) * (1 + h2 * largest)) - 1)
+
+
+@inline
+def implicit(weight: Any, p: Any) -> Any:
+    """As `StiffForm.implicit`."""
+    square = weight * weight
+    # E = (1 - w² B C)⁻¹; the other blocks are w E B, w C E and 1 + w² C E B.  C has only C12 and C21.
+    N11, N12 = 1.0 - square * p.B12 * p.C21, -square * p.B11 * p.C12
+    N21, N22 = -square * p.B22 * p.C21, 1.0 - square * p.B21 * p.C12
+    inv_det = 1.0 / (N11 * N22 - N12 * N21)
+    E11, E12, E21, E22 = N22 * inv_det, -N12 * inv_det, -N21 * inv_det, N11 * inv_det
+    F11, F12, F21, F22 = weight * p.C12 * E21, weight * p.C12 * E22, weight * p.C21 * E11, weight * p.C21 * E12
+    b11, b12, b21, b22 = weight * p.B11, weight * p.B12, weight * p.B21, weight * p.B22
+    return (
+        E11, E12, E11 * b11 + E12 * b21, E11 * b12 + E12 * b22,
+        E21, E22, E21 * b11 + E22 * b21, E21 * b12 + E22 * b22,
+        F11, F12, 1.0 + F11 * b11 + F12 * b21, F11 * b12 + F12 * b22,
+        F21, F22, F21 * b11 + F22 * b21, 1.0 + F21 * b12 + F22 * b22,
+    )  # fmt: skip

@@ -1,0 +1,197 @@
+"""Small rattle about upright spin as a sum of its two rocking modes, in the variables of `stiff.slip`.
+
+At a constant spin n, and to first order in the rattle x = (u1, u2, M1, M2, v1, v2),
+
+    x = 2 Re Σ_k R_k z_k,   z_k' = λ_k z_k.
+
+To second order the rattle changes the spin: M3' = Σ B_jk z_j z_k, summed over the modes and their conjugates.  So
+M3 - Σ B_jk z_j z_k / (λ_j + λ_k) remains constant, whatever becomes of the z_k.
+
+By the averaged equations (ndotab, abdot), a mode of energy E_k changes the spin by d α²/2 in total while it decays or
+grows, where d is the distance of n from the critical spin of the mode, and α = sqrt(2 E_k / I3)/d is called the *size*
+of the mode.  Neglected are terms of order α⁴ d in spin, and terms of order α_j³ by which mode j changes the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+
+from sweep.models import ellipsoid
+from sweep.models.ladder import averaged, slip
+from sweep.models.model import Array, Columns, stack, take
+from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum, slip_constants, slow
+from sweep.models.theory import linear
+
+RATTLE = (0, 1, 2, 3, 5, 6)
+"""Indices of the states that vanish in upright spin; the remaining one is then M3 = -I3 n."""
+
+# Decay rate of the slip, in sqrt(g/c), above which friction counts as stopping the slip fast compared with the rattle.
+_SLIP_DECAY = 0.3
+
+# Amplitude at which quadratic forms are evaluated: the terms that they leave out are 1e-16 of them.
+_SMALL = 1e-8
+
+
+@dataclass(frozen=True)
+class Rattle:
+    """Rattles resolved into modes, the one of lower frequency first; arrays over the cells."""
+
+    sound: Array
+    """Whether there are two rocking modes into which the rattle can be resolved, shape (cells,)."""
+    rates: Array
+    """Eigenvalues λ with positive imaginary part, in sqrt(g/c), shape (cells, 2)."""
+    modes: Array
+    """Right eigenvectors R as columns, shape (cells, 6, 2)."""
+    readings: Array
+    """The matrix in z = readings (u1, u2, M1, M2), shape (cells, 2, 4).  It does without the slip, because it is also
+    applied to derivatives, and a history has none of the slip."""
+    amplitudes: Array
+    """Amplitudes z, shape (cells, 2)."""
+    unit_energies: Array
+    """2 E_k / I3 for z_k = 1, averaged over a period, in units of spin², shape (cells, 2)."""
+    slopes: Array
+    """d Re λ_k / dn from the effect of the mode on the spin alone (the form that (abdot) gives), shape (cells, 2)."""
+    upright: Array
+    """M3 in upright spin with the same n, shape (cells,)."""
+    constants: Constants
+    """Constants of the model."""
+
+    @classmethod
+    def of(cls, states: Array, constants: Constants) -> Rattle:
+        """Resolve states of `stiff.slip`, shape (7, cells), all of which except the spin have to be small."""
+        spin, _, inertia = STIFF_MODEL.energy(states, constants)
+        rates, modes, sound = _rocking(constants, spin)
+        pairs = np.concatenate([modes[:, :4], modes[:, :4].conj()], axis=2)
+        sound &= np.abs(np.linalg.det(pairs)) > 0
+        pairs[~sound] = np.eye(4)
+        readings = np.linalg.inv(pairs)[:, :2]
+        amplitudes = (readings @ states[list(RATTLE[:4])].T[..., None])[..., 0]
+        upright = -inertia * spin
+        unit, turn = _unit_energies_and_turns(modes, upright, constants)
+        slopes = turn / (unit * inertia[:, None])
+        return cls(sound, rates, modes, readings, amplitudes, unit, slopes, upright, constants)
+
+    def select(self, cells: Array) -> Rattle:
+        """The rattles of the cells given by a mask or by indices."""
+        arrays = {f.name: getattr(self, f.name)[cells] for f in fields(self) if f.name != "constants"}
+        return Rattle(constants=take(self.constants, cells), **arrays)
+
+    @cached_property
+    def turning(self) -> Array:
+        """B over the modes and their conjugates, in the order R_1, R_2, R_1*, R_2*, shape (cells, 4, 4)."""
+        return _turning(self.modes, self.upright, self.constants)
+
+    def distances(self) -> Array:
+        """Distance d of the spin from the critical spin of each mode, in sqrt(g/c), shape (cells, 2).
+
+        It is infinite for a mode that has no effect on the spin.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.slopes == 0, np.inf, np.abs(self.rates.real / self.slopes))
+
+    def sizes(self, bending: Array) -> Array:
+        """Sizes α of the modes (see the module), shape (cells, 2).
+
+        Where the other nonlinearities (see `bending`) change a mode more than its effect on the spin does, the size
+        is a measure of these instead.
+        """
+        with np.errstate(divide="ignore"):
+            steepest = np.maximum(1 / self.distances(), np.sqrt(bending)[:, None])
+        return np.asarray(np.abs(self.amplitudes) * np.sqrt(self.unit_energies) * steepest)
+
+    def changes(self, factors: Array, amplitudes: Array) -> Array:
+        """Change of the rattle x, shape (cells, 6), when `amplitudes` grow by `factors`, both of shape (cells, 2)."""
+        return np.asarray(2 * (self.modes @ ((factors - 1) * amplitudes)[..., None])[..., 0].real)
+
+    def turn(self, amplitudes: Array) -> Array:
+        """M3' of a rattle with these amplitudes, shape (cells,)."""
+        return _form(self.turning, amplitudes)
+
+    def rippled(self, amplitudes: Array) -> Array:
+        """The part of M3 that ripples with a rattle of these amplitudes, shape (cells,): without the slow change."""
+        rates = np.concatenate([self.rates, self.rates.conj()], axis=1)
+        slow = np.roll(np.eye(4, dtype=bool), 2, axis=1)  # a mode and its own conjugate
+        return _form(np.where(slow, 0, self.turning / (rates[:, :, None] + rates[:, None, :])), amplitudes)
+
+    def turned(self, amplitudes: Array) -> Array:
+        """The part of M3 that comes and goes with a rattle of these amplitudes, shape (cells,)."""
+        rates = np.concatenate([self.rates, self.rates.conj()], axis=1)
+        return _form(self.turning / (rates[:, :, None] + rates[:, None, :]), amplitudes)
+
+
+def growth_rates(constants: Constants, spin: Array) -> Array:
+    """Re λ of the two rocking modes at a spin, the one of lower frequency first, in sqrt(g/c), shape (cells, 2)."""
+    return _rocking(constants, spin)[0].real
+
+
+def bending(columns: Columns) -> Array:
+    """Bound on how strongly a rattle of e = 2 E / I3 = 1 makes the motion nonlinear, shape (cells,).
+
+    The measure is its part in the normal force.  For rocking about one axis, at the height c,
+    R - 1 = (a² - c²)/c φ'² with φ'² = I3 e / (I + c²).
+    """
+    a, b, c = columns["a"], columns["b"], columns["c"]
+    I1, I2, I3 = ellipsoid.inertia(columns)
+    return np.asarray(I3 / c * np.maximum((a**2 - c**2) / (I2 + c**2), (b**2 - c**2) / (I1 + c**2)))
+
+
+def fastest_growth(columns: Columns, reach: Array) -> Array:
+    """Largest |Re λ| of the modes, by (abdot), at spins up to `reach`; in sqrt(g/c), shape (cells,)."""
+    k = averaged.Constants.of(columns)
+    first, second = np.abs(k.half_k1) * reach + np.abs(k.half_m1), np.abs(k.half_k4) * reach + np.abs(k.half_m4)
+    return np.asarray(np.maximum(first, second))
+
+
+def _rocking(constants: Constants, spin: Array) -> tuple[Array, Array, Array]:
+    """Rates and modes, as in `Rattle`, and whether there are two rocking modes, shape (cells,)."""
+    rates, modes = np.linalg.eig(linear.jacobian(slip.MODEL, slip_constants(constants), spin))
+    # With little friction the slip is not stopped fast, but oscillates slowly, and these two modes do not describe
+    # that: at μ = 1e-3 leaving it out cost 3e-7 in spin.
+    falling = np.argsort(-rates.imag, axis=1)
+    gone = (np.take_along_axis(rates.real, falling[:, 2:4], axis=1) < -_SLIP_DECAY).all(axis=1)
+    order = falling[:, 1::-1]
+    rates = np.take_along_axis(rates, order, axis=1)
+    modes = np.take_along_axis(modes, order[:, None, :], axis=2).astype(complex)
+    return rates, _to_momentum(constants, spin) @ modes, np.asarray(gone & (rates.imag > 0).all(axis=1))
+
+
+def _to_momentum(constants: Constants, spin: Array) -> Array:
+    """Jacobian of `momentum` with respect to the rattle, at upright spin, shape (cells, 6, 6)."""
+    upright = stack(slip.upright(spin)).astype(complex)
+    columns = []
+    for i in RATTLE:
+        shifted = upright.copy()
+        shifted[i] += 1e-30j
+        columns.append(stack(momentum(shifted, constants))[list(RATTLE)].imag / 1e-30)
+    return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
+
+
+def _turning(modes: Array, upright: Array, constants: Constants) -> Array:
+    """B by polarisation: B(x, y) = (M3'(x + y) - M3'(x - y))/4."""
+    both = np.moveaxis(np.concatenate([modes, modes.conj()], axis=2), 0, -1) * _SMALL
+    one, other = both[:, :, None], both[:, None, :]
+    forms = []
+    for rattle in (one + other, one - other):
+        slopes, _ = slow(*np.insert(rattle, 4, upright, axis=0), constants)
+        forms.append(slopes[4])
+    return np.asarray(np.moveaxis((forms[0] - forms[1]) / (4 * _SMALL**2), -1, 0))
+
+
+def _unit_energies_and_turns(modes: Array, upright: Array, constants: Constants) -> tuple[Array, Array]:
+    """2 E / I3 and M3' of each mode at z = 1, averaged over a period, each of shape (cells, 2)."""
+    energies = turns = np.zeros((modes.shape[2], len(upright)))
+    for part in (modes.real, modes.imag):
+        states = np.insert(np.moveaxis(part, 0, -1) * _SMALL, 4, upright, axis=0)
+        _, rattle, inertia = STIFF_MODEL.energy(states, constants)
+        energies = energies + 4 * rattle / inertia / _SMALL**2
+        turns = turns + 2 * slow(*states, constants)[0][4] / _SMALL**2
+    return energies.T, turns.T
+
+
+def _form(matrix: Array, amplitudes: Array) -> Array:
+    """The quadratic form of `matrix` over the amplitudes and their conjugates, shape (cells,)."""
+    z = np.concatenate([amplitudes, amplitudes.conj()], axis=1)
+    return np.asarray((z[:, None, :] @ matrix @ z[:, :, None])[:, 0, 0].real)

@@ -1,0 +1,271 @@
+"""The slip model in variables in which only the slip is stiff.
+
+The angular momentum about the contact point, M = I ω - x_p × v_g, takes the place of ω.  Neither friction
+nor the normal force appears in
+
+    u' = u × ω,   M' = s × v_g - ω × M - u × x_p,   s = v_0 - x_p',   v_g = v_p + v_0,
+
+because forces at the contact point have no torque about it.  Here ω = I_P⁻¹ (M + x_p × v_p) with
+I_P = I + |x_p|² - x_p x_pᵀ.  Friction appears only in the equation for the slip,
+
+    v_p' = R G - rest,   G = T (u - μ v_p),   T = 1 - [x_p] I⁻¹ [x_p],   R = num / den,   den = u · G,
+
+where [x_p] is the matrix of the cross product.  This is a 2 × 2 system, which an implicit formula solves by one
+Newton step.  The motion is the same as in `slip`.
+
+With a = A u, r² = u · a and D_i = I_i r² + |a|², one has r² I_P = D - a aᵀ.  The Sherman-Morrison formula inverts this
+without a root or a quotient, so that a single division yields 1/r, 1/u3 and I_P⁻¹.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models import ellipsoid
+from sweep.models.ladder import friction, slip
+from sweep.models.model import Array, Columns, Ripple, named, nothing_decays
+from sweep.models.stiff.form import StiffForm
+from sweep.models.theory.ripple import FORM, form, ripple
+from sweep.models.theory.rocking import frequencies, rocking
+
+
+class Constants(named("I1", "I2", "I3", *slip.Constants._fields)):  # type: ignore[misc]
+    """The moments of inertia and the constants of the slip model."""
+
+    @classmethod
+    def of(cls, columns: Columns) -> Constants:
+        return cls(*ellipsoid.inertia(columns), *slip.Constants.of(columns))
+
+
+class Geometry(NamedTuple):
+    """What `slow` computes on its way and `newton` needs as well; components along the body axes."""
+
+    u3: Any
+    x: Any
+    """Contact point x_p."""
+    y: Any
+    z: Any
+    t1: Any
+    """u1/u3; t2 is u2/u3, so that v3 = -(t1 v1 + t2 v2)."""
+    t2: Any
+    v3: Any
+    w1: Any
+    """ω."""
+    w2: Any
+    w3: Any
+    du1: Any
+    """u'."""
+    du2: Any
+    du3: Any
+    s1: Any
+    """s = v_0 - x_p'."""
+    s2: Any
+    s3: Any
+    q1: Any
+    """u × x_p."""
+    q2: Any
+    q3: Any
+
+
+@inline
+def momentum(y: Any, p: Any) -> Any:
+    """The states (u1, u2, M1, M2, M3, v1, v2) from those of the slip model; `p` are `Constants`."""
+    u1, u2, w1, w2, w3, v1, v2 = y
+    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
+    a1, a2, a3 = p.A11 * u1 + p.A12 * u2, p.A12 * u1 + p.A22 * u2, p.A33 * u3
+    r = np.sqrt(u1 * a1 + u2 * a2 + u3 * a3)
+    x, y_, z = -a1 / r, -a2 / r, -a3 / r
+    v3 = -(v1 * u1 + v2 * u2) / u3
+    g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
+    M1, M2, M3 = p.I1 * w1 - (y_ * g3 - z * g2), p.I2 * w2 - (z * g1 - x * g3), p.I3 * w3 - (x * g2 - y_ * g1)
+    return u1, u2, M1, M2, M3, v1, v2
+
+
+def start(columns: Columns) -> tuple[Array, ...]:
+    """The start of the slip model: ω = n0 u, v_p = 0, contact point at (x0, y0)."""
+    states: tuple[Array, ...] = momentum(slip.start(columns), Constants.of(columns))
+    return states
+
+
+@inline
+def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) -> Any:
+    """The slow derivatives (u1', u2', M1', M2', M3'), and the `Geometry` that `newton` needs."""
+    A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
+    c3 = 1.0 - (u1 * u1 + u2 * u2)
+    u3 = -np.sqrt(c3)
+    a1, a2, a3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
+    r2 = u1 * a1 + u2 * a2 + A33 * c3
+    r = np.sqrt(r2)
+    b1, b2, b3 = a1 * a1, a2 * a2, a3 * a3
+    square = b1 + b2 + b3
+    D1, D2, D3 = p.I1 * r2 + square, p.I2 * r2 + square, p.I3 * r2 + square
+    E1, E2, E3 = D2 * D3, D1 * D3, D1 * D2
+    DD = D1 * E1
+    det = DD - (b1 * E1 + b2 * E2 + b3 * E3)
+    ru, Z = r * u3, det * DD
+    shared = 1.0 / (ru * Z)
+    inv_Z, of_Z = shared * ru, shared * Z
+    minus_inv_r, inv_u3 = -(of_Z * u3), of_Z * r
+    x, y, z = a1 * minus_inv_r, a2 * minus_inv_r, a3 * minus_inv_r
+
+    t1, t2 = u1 * inv_u3, u2 * inv_u3
+    v3 = -(v1 * t1 + v2 * t2)
+    K1, K2, K3 = M1 + (y * v3 - z * v2), M2 + (z * v1 - x * v3), M3 + (x * v2 - y * v1)
+    aEK = a1 * (E1 * K1) + a2 * (E2 * K2) + a3 * (E3 * K3)
+    k = r2 * inv_Z
+    w1, w2, w3 = (k * E1) * (det * K1 + a1 * aEK), (k * E2) * (det * K2 + a2 * aEK), (k * E3) * (det * K3 + a3 * aEK)
+
+    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
+    dux = du1 * x + du2 * y + du3 * z
+    s1, s2, s3 = y * w3 - z * w2, z * w1 - x * w3, x * w2 - y * w1
+    g1, g2, g3 = s1 + v1, s2 + v2, s3 + v3
+    s1 = s1 - minus_inv_r * ((A11 * du1 + A12 * du2) - x * dux)
+    s2 = s2 - minus_inv_r * ((A12 * du1 + A22 * du2) - y * dux)
+    s3 = s3 - minus_inv_r * (A33 * du3 - z * dux)
+    q1, q2, q3 = u2 * z - u3 * y, u3 * x - u1 * z, u1 * y - u2 * x
+    dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - q1
+    dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - q2
+    dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - q3
+    geometry = Geometry(u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
+    return (du1, du2, dM1, dM2, dM3), geometry
+
+
+@inline
+def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
+    """One Newton step, starting from v, for the equation v = b + γ v_p'(v).
+
+    The Jacobian is that of R G, with dR/dv included.  The gyroscopic terms of v_p' are left out of it, because they
+    are not stiff.  Everything is multiplied by den², so that R itself is never computed.  Returns the new v1 and v2,
+    and num and den of R at the old v.
+    """
+    u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3 = geometry
+    i1, i2, i3 = p.inv_I1, p.inv_I2, p.inv_I3
+    al1, al2, al3 = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
+    # `friction.contact_force` and its derivative, written out: called as functions they change the last bits.
+    mu = p.mu
+    g1, g2, g3 = u1 - mu * v1, u2 - mu * v2, u3 - mu * v3
+    xx, yy, zz = x * x, y * y, z * z
+    T11, T22, T33 = 1.0 + zz * i2 + yy * i3, 1.0 + zz * i1 + xx * i3, 1.0 + yy * i1 + xx * i2
+    T12, T13, T23 = -(x * i3) * y, -(z * i2) * x, -(y * z) * i1
+    G1, G2, G3 = T11 * g1 + T12 * g2 + T13 * g3, T12 * g1 + T22 * g2 + T23 * g3, T13 * g1 + T23 * g2 + T33 * g3
+    den = u1 * G1 + u2 * G2 + u3 * G3
+    num = 1.0 + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)
+    e1, e2, e3 = s1 + v1, s2 + v2, s3 + v3
+    rest1 = u1 + (y * al3 - z * al2) + (w2 * e3 - w3 * e2)
+    rest2 = u2 + (z * al1 - x * al3) + (w3 * e1 - w1 * e3)
+
+    # With v3 = -(u1 v1 + u2 v2)/u3: dG_i/dv_j = -μ S_ij and d den/dv_j = -μ e_j.
+    S11, S12 = T11 - T13 * t1, T12 - T13 * t2
+    S21, S22 = T12 - T23 * t1, T22 - T23 * t2
+    S31, S32 = T13 - T33 * t1, T23 - T33 * t2
+    e1, e2 = u1 * S11 + u2 * S21 + u3 * S31, u1 * S12 + u2 * S22 + u3 * S32
+    gn = gamma * num
+    k, dd = gn * mu, den * den
+    m11, m12 = dd + k * (den * S11 - G1 * e1), k * (den * S12 - G1 * e2)
+    m21, m22 = k * (den * S21 - G2 * e1), dd + k * (den * S22 - G2 * e2)
+    r1 = den * (den * ((b1 - v1) - gamma * rest1) + gn * G1)
+    r2 = den * (den * ((b2 - v2) - gamma * rest2) + gn * G2)
+    d = 1.0 / (m11 * m22 - m12 * m21)
+    return v1 + d * (m22 * r1 - m12 * r2), v2 + d * (m11 * r2 - m21 * r1), num, den
+
+
+@inline
+def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
+    """Power of friction at a point with slip (v1, v2) and normal force R."""
+    v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
+    return friction.dissipation(R, v1, v2, v3, p)
+
+
+@inline
+def energy(y: Any, p: Any) -> Any:
+    """(spin, energy of the rattle, I3), as in the slip model."""
+    u1, u2, M1, M2, M3, v1, v2 = y
+    _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
+    return ellipsoid.energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
+
+
+@inline
+def implicit(weight: Any, p: Any) -> Any:
+    """(1 - weight J)⁻¹ row by row, sixteen numbers, where J is the matrix of `rocking` in (u1, u2, M1, M2)."""
+    B12, B21, C11, C12, C21, C22 = rocking(p)
+    square = weight * weight
+    # E = (1 - w² B C)⁻¹; the other blocks are w E B, w C E and 1 + w² C E B.
+    E11, E12 = 1.0 - square * B21 * C12, square * B12 * C22
+    E21, E22 = square * B21 * C11, 1.0 - square * B12 * C21
+    inv_det = 1.0 / (E11 * E22 - E12 * E21)
+    E11, E12, E21, E22 = E11 * inv_det, E12 * inv_det, E21 * inv_det, E22 * inv_det
+    F11, F12 = weight * (C11 * E11 + C12 * E21), weight * (C11 * E12 + C12 * E22)
+    F21, F22 = weight * (C21 * E11 + C22 * E21), weight * (C21 * E12 + C22 * E22)
+    b12, b21 = weight * B12, weight * B21
+    return (
+        E11, E12, E12 * b21, E11 * b12,
+        E21, E22, E22 * b21, E21 * b12,
+        F11, F12, 1.0 + F12 * b21, F11 * b12,
+        F21, F22, F22 * b21, 1.0 + F21 * b12,
+    )  # fmt: skip
+
+
+def velocities(y: Array, p: Constants) -> Array:
+    """The states of the slip model from these, shape (7, cells): the inverse of `momentum`."""
+    _, geometry = slow(*y, p)
+    return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))
+
+
+def slip_constants(p: Constants) -> slip.Constants:
+    """The constants of the slip model from these."""
+    return slip.Constants(*(getattr(p, name) for name in slip.Constants._fields))
+
+
+def observe(y: Array, p: Constants) -> dict[str, Array]:
+    """What a trajectory shows, as in the slip model."""
+    return slip.observe(velocities(y, p), slip_constants(p))
+
+
+@inline
+def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
+    return ripple(y[0], y[1], y[2], y[3], k)
+
+
+STIFF_MODEL = replace(
+    slip.MODEL,
+    states=("u1", "u2", "M1", "M2", "M3", "v1", "v2"),
+    constants=Constants,
+    start=start,
+    energy=energy,
+    observe=observe,
+    ripple=Ripple(FORM, form, _ripple),
+)
+"""The slip model in these variables, for methods that use `slow` and `newton` in place of a right-hand side."""
+
+
+def _fastest_rocking(p: Constants) -> Array:
+    _, fastest = frequencies(p)
+    return fastest
+
+
+def _rise(columns: Columns) -> Array:
+    I1, I2, _ = ellipsoid.inertia(columns)
+    return np.asarray(slip.strongest_grip(columns) / (1 + columns["c"] ** 2 / np.minimum(I1, I2)) - 1)
+
+
+PAPER_FORM = StiffForm(
+    full=slip.MODEL,
+    model=STIFF_MODEL,
+    momentum=momentum,
+    velocities=velocities,
+    slow=slow,
+    newton=newton,
+    power=power,
+    implicit=implicit,
+    fastest_rocking=_fastest_rocking,
+    time_unit=lambda columns: np.sqrt(columns["c"]),
+    slip_decay=lambda columns: 2.2 * friction.strongest_resistance(columns) + 2.2,
+    rise=_rise,
+    resistance=lambda columns: friction.strongest_resistance(columns) * np.sqrt(columns["c"]),
+    damping=nothing_decays,
+    resolves_modes=True,
+)

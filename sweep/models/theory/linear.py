@@ -1,0 +1,61 @@
+"""A small rattle about steady upright spin, from the right-hand side of a model itself.
+
+At constant n it obeys a linear system.  At which spins it grows is in `sweep.models.theory.stability`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sweep.models.model import Array, Columns, Model, stack
+
+
+def jacobian(model: Model, constants: Any, spin: Array) -> Array:
+    """Jacobian of the rattle at upright spin, shape (cells, m, m), where m is the number of states without the spin.
+
+    Computed by complex steps of 1e-30: accurate to the last digit, because no difference is taken, and without
+    deriving the equations a second time.
+    """
+    states = stack(model.upright(spin)).astype(complex)
+    rattle = [i for i in range(len(model.states)) if i != model.spin_state]
+    columns = []
+    for i in rattle:
+        shifted = states.copy()
+        shifted[i] += 1e-30j
+        slopes, _ = model.rhs(shifted, constants)
+        columns.append(np.stack(np.broadcast_arrays(*slopes))[rattle].imag / 1e-30)
+    return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
+
+
+def growth_rate(model: Model, constants: Any, spin: Array) -> Array:
+    """Largest real part of the rattle's eigenvalues, in sqrt(g/c), shape (cells,): positive where the rattle grows."""
+    return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)).real.max(axis=-1))
+
+
+def fastest_motion(model: Model, columns: Columns) -> Array:
+    """Largest |λ| of the rattle at the fastest spins within reach, leaving out the fast decay due to friction.
+
+    This is the motion that an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.  A model
+    may tell it itself.
+    """
+    if model.fastest_motion:
+        return model.fastest_motion(columns)
+    reach = fastest_spin(model, columns)
+    values = np.concatenate(
+        [
+            np.linalg.eigvals(jacobian(model, model.constants.of(extreme), spin))
+            for extreme in model.extremes(columns)
+            for spin in (reach, -reach)
+        ],
+        axis=-1,
+    )
+    moving = -values.real <= np.abs(values.imag)
+    return np.asarray(np.where(moving, np.abs(values), 0.0).max(axis=-1))
+
+
+def fastest_spin(model: Model, columns: Columns) -> Array:
+    """The |spin| that a trajectory would reach if all its energy went into it, in sqrt(g/c), shape (cells,)."""
+    spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
+    return np.asarray(np.sqrt(spin**2 + 2 * rattle / inertia))
