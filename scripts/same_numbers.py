@@ -1,0 +1,86 @@
+"""Compare the datasets of all configurations with those of another revision, bit for bit.
+
+    python scripts/same_numbers.py REVISION [--keep FOLDER] [CONFIG …]
+
+Runs each configuration with the sources of the revision and with those of this checkout, in processes of their own, and
+compares every variable, coordinate and attribute, but for those that tell when, where and from which sources a dataset
+was made.  Exits with 1 if anything differs.  All of them take about twenty minutes on two cores, less where FOLDER
+holds results already.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import netCDF4
+
+ROOT = Path(__file__).parent.parent
+ORIGIN = {
+    "source_hash", "versions", "sweep_version", "git_commit", "created", "history", "wall_time",
+    "trajectories_per_second", "model_place", "model_sha256", "cpu", "threads",
+}  # fmt: skip
+
+
+def differences(one: Path, other: Path) -> Iterator[str]:
+    """Name what differs between two datasets, the first as the measure."""
+    with netCDF4.Dataset(one) as before, netCDF4.Dataset(other) as after:
+        before.set_auto_maskandscale(False)
+        after.set_auto_maskandscale(False)
+        yield from _attributes("", before, after)
+        yield from sorted(before.variables.keys() ^ after.variables.keys())
+        for name in before.variables.keys() & after.variables.keys():
+            theirs, ours = before[name], after[name]
+            yield from _attributes(f"{name}:", theirs, ours)
+            if (theirs.dtype, theirs.dimensions, theirs.shape) != (ours.dtype, ours.dimensions, ours.shape):
+                yield f"{name} (type or shape)"
+            elif _bits(theirs) != _bits(ours):
+                yield f"{name} ({int((theirs[...] != ours[...]).sum())} of {theirs.size} values)"
+
+
+def _bits(variable: netCDF4.Variable) -> bytes:
+    values = variable[...]
+    return "\n".join(values.ravel()).encode() if variable.dtype is str else values.tobytes()
+
+
+def _attributes(place: str, before: netCDF4.Dataset, after: netCDF4.Dataset) -> Iterator[str]:
+    for name in sorted({*before.ncattrs(), *after.ncattrs()} - ORIGIN):
+        if str(getattr(before, name, None)) != str(getattr(after, name, None)):
+            yield f"{place}{name}"
+
+
+def run(checkout: Path, config: str, folder: Path) -> Path:
+    """Run a configuration of a checkout, unless the folder has its dataset; return that."""
+    name = Path(config).stem
+    dataset = folder / name / f"{name}.nc"
+    if not dataset.exists():
+        command = [sys.executable, "-m", "sweep", "run", f"configs/{name}.yaml", "--output", str(dataset.parent)]
+        subprocess.run([*command, "--quiet"], cwd=checkout, check=True, stderr=subprocess.DEVNULL)
+    return dataset
+
+
+def main() -> int:
+    """Compare, and return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("revision")
+    parser.add_argument("configs", nargs="*", default=sorted(path.stem for path in (ROOT / "configs").glob("*.yaml")))
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="where the revision's datasets are, or will be")
+    asked, different = parser.parse_intermixed_args(), False
+    with tempfile.TemporaryDirectory() as folder:
+        scratch = Path(folder)
+        subprocess.run(["git", "clone", "-q", str(ROOT), str(scratch / "other")], check=True)
+        subprocess.run(["git", "-C", str(scratch / "other"), "checkout", "-q", asked.revision], check=True)
+        for config in asked.configs:
+            theirs = run(scratch / "other", config, (asked.keep or scratch / "theirs").resolve())
+            found = list(differences(theirs, run(ROOT, config, scratch / "ours")))
+            different |= bool(found)
+            print(f"{Path(config).stem}: {', '.join(found) or 'the same'}", flush=True)
+    return int(different)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
