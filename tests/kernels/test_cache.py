@@ -59,7 +59,7 @@ def test_kernels_are_found_again_kept_apart_and_compiled_anew_after_an_edit(copy
     assert process(copy, "reversals", "") == [("found", reversals), ("found", nothing)]
 
     # An edit of another file than the kernel's, of the same length, its times kept.
-    edit(copy / "sweep" / "models" / "averaged.py", "p.half_m4 + n", "p.half_m4 - n")
+    edit(copy / "sweep" / "models" / "ladder" / "averaged.py", "p.half_m4 + n", "p.half_m4 - n")
     ((how, changed),) = process(copy, "")
     assert how == "compiled"
     assert changed != nothing
