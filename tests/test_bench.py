@@ -21,7 +21,7 @@ from sweep.cli import main
 from sweep.kernels import methods
 from sweep.kernels.status import DIVERGED, LIFT_OFF, TIME_LIMIT
 from sweep.models import MODELS
-from sweep.report.cells import Ends, make_kernel, simulate, standard
+from sweep.report.direct import Ends, make_kernel, simulate, standard
 from sweep.report.rows import Row, Section, states
 
 TIMES = (25.0, 50.0)

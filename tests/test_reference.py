@@ -15,7 +15,7 @@ from support.kernels import default_measures
 import sweep
 from sweep.bench.counts import T_END
 from sweep.bench.reference import read_counts
-from sweep.report.cells import simulate
+from sweep.report.direct import simulate
 
 
 def test_reversal_counts_agree_with_the_reference(tmp_path: Path) -> None:

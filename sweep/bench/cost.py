@@ -26,7 +26,7 @@ from sweep.bench.timing import (
 from sweep.kernels import methods
 from sweep.kernels.method import TOLERANCE
 from sweep.models import MODELS
-from sweep.report.cells import make_kernel, standard
+from sweep.report.direct import make_kernel, standard
 from sweep.report.rows import Section
 
 MU = 60.0

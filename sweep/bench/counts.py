@@ -11,7 +11,7 @@ from sweep.grid import Array
 from sweep.kernels import methods
 from sweep.kernels.methods import METHODS
 from sweep.models import MODELS
-from sweep.report.cells import simulate
+from sweep.report.direct import simulate
 from sweep.report.rows import Section
 
 T_END = 30_000.0

@@ -14,7 +14,7 @@ from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import Columns, stack
 from sweep.models.theory import linear
-from sweep.report.cells import Ends, simulate, standard
+from sweep.report.direct import Ends, simulate, standard
 from sweep.report.rows import Row, Section, against, below, states
 from sweep.results.dataset import STATUSES
 

@@ -27,7 +27,7 @@ from sweep.kernels.runge_kutta import step_source
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.stiff.slip import STIFF_MODEL, newton, slow
-from sweep.report.cells import MEASURE, make_kernel, standard
+from sweep.report.direct import MEASURE, make_kernel, standard
 from sweep.report.rows import Section
 
 WIDTH = 128

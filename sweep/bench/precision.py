@@ -15,7 +15,7 @@ from sweep.grid import Array
 from sweep.kernels import methods
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
-from sweep.report.cells import make_kernel
+from sweep.report.direct import make_kernel
 from sweep.report.rows import Section
 
 LOOSEST = 1e-3

@@ -24,7 +24,7 @@ from sweep.bench.whole import whole
 from sweep.kernels import methods
 from sweep.models import MODELS
 from sweep.report import page
-from sweep.report.cells import MEASURE, simulate, standard
+from sweep.report.direct import MEASURE, simulate, standard
 from sweep.report.rows import Row, Section
 from sweep.results.writing import replacing
 

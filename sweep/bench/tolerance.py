@@ -14,7 +14,7 @@ from sweep.bench.timing import MARKERS, Effort, Measurement, Part, Spread, runs_
 from sweep.grid import Array
 from sweep.kernels import measures, methods
 from sweep.models import MODELS
-from sweep.report.cells import MEASURE, make_kernel
+from sweep.report.direct import MEASURE, make_kernel
 from sweep.report.rows import Section
 
 

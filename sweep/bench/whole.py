@@ -26,7 +26,7 @@ from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
-from sweep.report.cells import simulate, standard
+from sweep.report.direct import simulate, standard
 from sweep.report.rows import Section
 
 PLACES: dict[Place, str] = {

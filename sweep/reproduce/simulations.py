@@ -17,7 +17,7 @@ from sweep.models import MODELS, TIERS
 from sweep.models.ladder import analytic
 from sweep.parameters import PARAMETERS
 from sweep.plots.trajectories import draw_spin
-from sweep.report.cells import standard
+from sweep.report.direct import standard
 from sweep.report.rows import Section, against, states
 from sweep.reproduce.rows import against_paper
 from sweep.studies.trajectory import trajectory

@@ -11,15 +11,15 @@ from sweep.models.model import Columns, stack
 from sweep.models.theory import stability
 from sweep.models.theory.coefficients import coefficients
 from sweep.models.theory.rocking import slower_period
-from sweep.report import cells
-from sweep.report.cells import standard
+from sweep.report import direct
+from sweep.report.direct import standard
 from sweep.report.rows import Row, Section, against, below
 from sweep.reproduce.rows import against_paper
 
 
 def simulate(name: str, columns: Columns, t_end: float, step: float | None = None) -> tuple[Array, Array, Array]:
     """Final states of shape (states, cells), spins, and largest relative violations of the energy balance."""
-    ends = cells.simulate(columns, t_end, model=name, step=step, ranges=False)
+    ends = direct.simulate(columns, t_end, model=name, step=step, ranges=False)
     violation = ends["energy_error"] if "energy_error" in ends.kernel.measure else np.zeros(len(ends.images))
     return ends.states, ends["spin_final"], violation
 

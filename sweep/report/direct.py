@@ -1,4 +1,4 @@
-"""Trajectories straight from columns of parameters, without configuration, labels or files."""
+"""Trajectories directly from columns of parameters, without configuration, labels or files."""
 
 from __future__ import annotations
 
