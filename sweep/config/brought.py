@@ -16,7 +16,8 @@ from sweep.config.document import Document
 from sweep.config.faults import ConfigError, Fault, brief
 from sweep.models import TIERS
 from sweep.models.origin import ModelError, Origin
-from sweep.models.user import loading, trial_run
+from sweep.models.user import loading, trial
+from sweep.models.user.blame import blamed
 
 LIMIT = 1 * files.MIB
 
@@ -67,7 +68,7 @@ def of_file(source: Document, name: str) -> Origin:
 def explained(origin: Origin | None) -> Iterator[None]:
     """Turn errors of the code of a user's model into a `ConfigError` that tells its file and line."""
     try:
-        with loading.blamed(origin):
+        with blamed(origin):
             yield
     except ModelError as error:
         raise ConfigError([Fault(error.place, error.line, None, (), error.message)]) from None
@@ -79,4 +80,4 @@ def try_out(config: Config) -> None:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
         ends |= {name: np.array([column[0], column[-1]]) for name, column in (config.cases or {}).items()}
         with explained(config.origin):
-            trial_run.try_out(config.equations, ends, config.own_law)
+            trial.try_out(config.equations, ends, config.own_law)

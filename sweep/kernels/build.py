@@ -37,6 +37,7 @@ from sweep.models import find
 from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.models.user import loading
+from sweep.models.user.blame import blamed
 from sweep.parameters import PAPER
 
 Piece = tuple[str, ...]
@@ -74,7 +75,7 @@ def try_compiling(model: Model) -> None:
     """Compile the inline functions of a model one by one, so that a fault is known by its line; `ModelError` if any."""
     numba, states = load_numba(), (0.0,) * len(model.states)
     constants = model.constants(*(0.0 for _ in model.constants._fields))
-    with loading.blamed(model.origin):
+    with blamed(model.origin):
         for function, arguments in ((model.rhs, (states, constants)), (model.energy, (states, constants)),
                                     (model.tilt, (states,))):  # fmt: skip
             compiled(function).compile(tuple(map(numba.typeof, arguments)))

@@ -6,7 +6,9 @@ A model of this package has no origin: it is one of its sources.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -26,9 +28,30 @@ class Origin:
     def of_file(cls, name: str, place: str, text: str) -> Origin:
         return cls(name, place, text, hashlib.sha256(text.encode()).hexdigest())
 
+    @classmethod
+    def of_package(cls, name: str, place: str) -> Origin:
+        """The origin of an entry point; nothing is imported."""
+        digest = hashlib.sha256()
+        for path in map(Path, _sources(place)):
+            digest.update(path.name.encode() + b"\0" + path.read_bytes())
+        return cls(name, place, "", digest.hexdigest())
+
     @property
     def is_file(self) -> bool:
         return self.place.endswith(".py")
+
+    @property
+    def files(self) -> list[str]:
+        """The file, or all Python files of the package."""
+        return [self.place] if self.is_file else _sources(self.place)
+
+
+def _sources(place: str) -> list[str]:
+    spec = importlib.util.find_spec(place.partition(":")[0].partition(".")[0])
+    if spec is None:
+        return []
+    found = [path for folder in spec.submodule_search_locations or () for path in Path(folder).rglob("*.py")]
+    return sorted(map(str, found)) or [str(spec.origin)]
 
 
 class ModelError(Exception):

@@ -43,11 +43,11 @@ def ran(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     loading.load.cache_clear()
 
 
-def after(text: str, old: str, new: str, message: str, at: str = "MODEL =") -> tuple[str, int, str]:
-    """A model with an edit, the line that has `at`, and what is said of it."""
+def after(text: str, old: str, new: str, message: str, at: str = "") -> tuple[str, int, str]:
+    """A model with an edit, the line that has `at` if the fault has one, and what is said of it."""
     assert text.count(old) >= 1, old
     edited = text.replace(old, new, 1)
-    line = next((i for i, each in enumerate(edited.splitlines(), 1) if each.startswith(at)), 0)
+    line = next((i for i, each in enumerate(edited.splitlines(), 1) if at and each.startswith(at)), 0)
     return edited, line, message
 
 
@@ -56,54 +56,49 @@ def line_of(text: str, part: str) -> int:
 
 
 RHS = "    angle, rate, phase = y\n"
+NO_MODEL = "MODEL is of the type NoneType; it has to be Model(…), or with_law(Law(…), …)"
 BROKEN = {
-    "no model": after(PENDULUM, "MODEL =", "OTHER =", "defines no MODEL; allowed: MODEL = Model(…)"),
-    "empty": ("", 0, "defines no MODEL"),
+    "no model": after(PENDULUM, "MODEL =", "OTHER =", NO_MODEL),
+    "empty": ("", 0, NO_MODEL),
     "syntax": after(PENDULUM, "def start(columns):", "def start(columns:", "not Python: ", "def start"),
     "a NUL": (PENDULUM + "\0", 0, "not Python: "),
     "import": after(PENDULUM, MARK, "import nowhere\n", "ModuleNotFoundError: No module named 'nowhere'", "import now"),
     "exception": after(PENDULUM, MARK, "1 / 0\n" + MARK, "ZeroDivisionError", "1 / 0"),
     "exit": after(PENDULUM, MARK, "raise SystemExit(0)\n" + MARK, "it ends the program", "raise"),
-    "not a model": (PENDULUM.split("MODEL =")[0] + "MODEL = 3\n", line_of(PENDULUM, "MODEL ="),
-                    "MODEL is of the type int; allowed: Model(…), or with_law(…)"),
-    "no rhs": after(PENDULUM, "    rhs=rhs,\n", "", "missing 1 required keyword-only argument: 'rhs'"),
-    "arity": after(PENDULUM, "def rhs(y, p)", "def rhs(y)", "rhs(y); allowed: rhs(states, constants)", "@inline"),
-    "branch": after(PENDULUM, RHS, RHS + "    if rate > 0: rate = 0.0\n", "a branch on arrays; allowed: plain arith",
+    "no rhs": after(PENDULUM, "    rhs=rhs,\n", "", "missing 1 required keyword-only argument: 'rhs'", "MODEL ="),
+    "arity": after(PENDULUM, "def rhs(y, p)", "def rhs(y)", "rhs() takes 1 positional argument but 2 were given"),
+    "branch": after(PENDULUM, RHS, RHS + "    if rate > 0: rate = 0.0\n", "a branch on arrays; inline functions are",
                     "    if"),
-    "derivatives": after(PENDULUM, "(rate, turning, 2 / 3)", "(rate, turning)", "rhs: derivatives has 2 values; allo",
-                         "@inline"),
-    "a list": after(PENDULUM, "(rate, turning, 2 / 3)", "[rate, turning, 2 / 3]", "of the type list; allowed: a tuple",
+    "derivatives": after(PENDULUM, "(rate, turning, 2 / 3)", "(rate, turning)",
+                         "rhs, of derivatives, gives 2 values; it has to give a tuple of 3", "@inline"),
+    "a list": after(PENDULUM, "(rate, turning, 2 / 3)", "[rate, turning, 2 / 3]", "gives list; it has to give a tuple",
                     "@inline"),
     "energy": (PENDULUM.replace("return y[1], 0.0, 1.0", "return y[1]"), line_of(PENDULUM, "@inline\ndef energy"),
-               "energy is of the type ndarray; allowed: a tuple"),
-    "a constant": after(PENDULUM, 'columns["torque"])', "1.0)", "constant torque has the shape (); allowed: (2,)",
+               "energy gives ndarray; it has to give a tuple of 3"),
+    "a constant": after(PENDULUM, 'columns["torque"])', "1.0)", "torque has the shape (); it has to be (2,)",
                         "    @classmethod"),
-    "a column": after(PENDULUM, 'cls(columns["damping"]', 'cls(columns["dampng"]', "KeyError: 'dampng'; allowed: names",
+    "a column": after(PENDULUM, 'cls(columns["damping"]', 'cls(columns["dampng"]', "KeyError: 'dampng'",
                       "        return cls"),
-    "start": after(PENDULUM, 'return columns["angle"], nothing', "return nothing", "start has 2 values; allowed: 3",
+    "start": after(PENDULUM, 'return columns["angle"], nothing', "return nothing", "start gives 2 values; it has",
                    "def start"),
-    "name": after(PENDULUM, 'name="pendulum"', 'name="slip"', "name 'slip'; allowed: letters, digits and _, and none"),
-    "states": after(PENDULUM, '("angle", "rate"', '("rate", "rate"', "allowed: a tuple of distinct names"),
-    "spin_state": after(PENDULUM, "spin_state=1", "spin_state=3", "spin_state 3; allowed: 0 to 2"),
-    "offers": after(PENDULUM, "COUNT, SPIN})", 'COUNT, "modes"})', "offers modes; allowed: COUNT, SPIN, ENERGY, L"),
-    "units": after(PENDULUM, "spin_state=1,", 'spin_state=1, units="CGS",', "units 'CGS'; allowed: paper, SI, own"),
-    "default": after(PENDULUM, "0.5, at_least=0", "-1.0, at_least=0", "body.damping: default -1; allowed: a finite"),
-    "taken": after(PENDULUM, 'Parameter("torque"', 'Parameter("step"', "drive.step: 'step' is taken or no word"),
-    "unknown": after(PENDULUM, "spin_state=1,", 'spin_state=1, parameters=("nu",),', "unknown parameter 'nu'; allowed"),
+    "name": after(PENDULUM, 'name="pendulum"', 'name="slip"', "the name 'slip' is no word of letters, digits"),
+    "states": after(PENDULUM, '("angle", "rate"', '("rate", "rate"', "need distinct names"),
+    "spin_state": after(PENDULUM, "spin_state=1", "spin_state=3", "and spin_state the index of one of them"),
+    "offers": after(PENDULUM, "COUNT, SPIN})", 'COUNT, "modes"})', "cannot offer modes; it may offer COUNT, SPIN, EN"),
+    "units": after(PENDULUM, "spin_state=1,", 'spin_state=1, units="CGS",', "units 'CGS' are unknown; choose paper, "),
+    "default": after(PENDULUM, "0.5, at_least=0", "-1.0, at_least=0", "damping: its default -1 is out of its bounds"),
+    "taken": after(PENDULUM, 'Parameter("torque"', 'Parameter("step"', "drive.step: 'step' means something else"),
+    "unknown": after(PENDULUM, "spin_state=1,", 'spin_state=1, parameters=("nu",),', "parameter 'nu' is unknown"),
+    "no period": after(PENDULUM, "    slower_period=", "    # ", "give it slower_period, or do not offer COUNT"),
     "no motion": (PENDULUM.replace("2 + columns", "0 * columns").replace("0.5 + 0 * columns", "np.inf + columns"),
-                  line_of(PENDULUM, "    fastest_motion"), "the fastest motion is 0, by which steps are chosen"),
+                  line_of(PENDULUM, "    fastest_motion"), "the fastest motion is 0, from which steps follow"),
     "decided": (PENDULUM.replace("MODEL =", "@inline\ndef decided(y, p):\n    return y[1]\n\n\nMODEL =")
                 .replace("spin_state=1,", "spin_state=1, decided=decided,"), line_of(PENDULUM, "MODEL ="),
-                "decided is of the type float64 and the shape (2,); allowed: comparisons, joined by & and |"),
-    "decided's arity": after(PENDULUM, "spin_state=1,", "spin_state=1, decided=start,",
-                             "decided(columns); allowed: decided(states, constants)", "def start"),
-    "decided of a tuple": (PENDULUM.replace("spin_state=1,", "spin_state=1, decided=energy,"),
-                           line_of(PENDULUM, "@inline\ndef energy"), "decided is of the type tuple"),
-    "law": after(FADING, "resistance,\n", "3,\n", "resistance is no function; allowed: resistance(square, p)"),
-    "law's arity": after(FADING, "def resistance(square, p)", "def resistance(p)", "resistance(p); allowed", "@inline"),
+                "decided is neither true nor false; it has to be comparisons, joined by & and |"),
+    "law": after(FADING, "resistance,\n", "3,\n", "'int' object is not callable"),
     "law without linear_to": (re.sub("        linear_to=.*\n", "", FADING), line_of(FADING, "@inline"),
-                              "the resistance depends on the slip velocity; allowed: linear_to"),
-    "law's section": after(FADING, '"fading", "friction"', '"fading", "body"', "body.fading; allowed: of the section"),
+                              "the resistance depends on the slip velocity; say by linear_to"),
+    "law's section": after(FADING, '"fading", "friction"', '"fading", "body"', "give it the section 'friction'"),
 }  # fmt: skip
 
 

@@ -5,19 +5,12 @@ Their code runs when they are loaded.  So nothing here is called with a name tha
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
 import linecache
-import re
 import sys
-import traceback
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
 from importlib import metadata
-from os.path import abspath
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -28,7 +21,8 @@ from sweep.models.general.surfaces import ELLIPSOID
 from sweep.models.general.variants import SlipWith
 from sweep.models.model import Model
 from sweep.models.origin import ModelError, Origin
-from sweep.models.user import checks
+from sweep.models.user import trial
+from sweep.models.user.blame import blamed
 from sweep.parameters import PARAMETERS, Parameter
 
 GROUP = "sweep.models"
@@ -40,28 +34,12 @@ def entry_point(name: str) -> Origin | None:
     found = metadata.entry_points(group=GROUP, name=name)
     if not found:
         return None
-    place = next(iter(found)).value
-    digest = hashlib.sha256()
-    for path in _sources(_package(place)):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return Origin(name, place, "", digest.hexdigest())
+    return Origin.of_package(name, next(iter(found)).value)
 
 
 def entry_points() -> tuple[str, ...]:
     """Names of all models that installed packages offer."""
     return tuple(sorted(each.name for each in metadata.entry_points(group=GROUP)))
-
-
-def _package(place: str) -> str:
-    return place.partition(":")[0].partition(".")[0]
-
-
-def _sources(package: str) -> list[Path]:
-    spec = importlib.util.find_spec(package)
-    if spec is None:
-        return []
-    folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
-    return sorted(path for folder in folders for path in folder.rglob("*.py")) or [Path(str(spec.origin))]
 
 
 @cache
@@ -76,7 +54,7 @@ def load(origin: Origin) -> Model | SlipWith:
     made: Model | SlipWith
     with blamed(origin):
         made = _file(origin) if origin.is_file else _imported(origin)
-        checks.inspect(made, origin)
+        trial.check(made, origin)
     if isinstance(made, SlipWith):
         return replace(made, origin=origin)
     # The states of an image lie beside other quantities, whose names nobody has to know.
@@ -139,52 +117,3 @@ def compiled_as(origin: Origin, name: str) -> Model:
     """The model whose compiled code has the key "name@digest"."""
     made = load(origin)
     return made if isinstance(made, Model) else replace(variants.variant(name, (), made.law), origin=origin)
-
-
-@contextmanager
-def blamed(origin: Origin | None) -> Iterator[None]:
-    """Turn errors that come from the code of a user's model into a `ModelError` that says where."""
-    try:
-        yield
-    except ModelError:
-        raise
-    except Exception as error:
-        if origin is None or not (found := _place(error, origin)):
-            raise
-        raise ModelError(*found, _words(error, found[0])) from None
-
-
-def _place(error: Exception, origin: Origin) -> tuple[str, int] | None:
-    """File and line of the user's code from which an error comes."""
-    ours = [origin.place] if origin.is_file else list(map(str, _sources(_package(origin.place))))
-    known = {abspath(file): file for file in ours}
-    chain = [error, *filter(None, [error.__cause__])]
-    frames = (frame for each in chain for frame in traceback.walk_tb(each.__traceback__))
-    lines = [(frame.f_code.co_filename, line) for frame, line in frames]
-    if where := getattr(error, "loc", None):  # of Numba's errors
-        lines.append((where.filename, where.line))
-    lines += [(file, int(line)) for file, line in _FILE.findall(str(error))]
-    found = [(known[abspath(file)], line) for file, line in lines if abspath(file) in known]
-    return found[-1] if found else None
-
-
-_FILE = re.compile(r'File "(.+?)", line (\d+)')
-
-
-_ARITHMETIC = "plain arithmetic and NumPy's functions of numbers, such as np.sqrt and np.minimum"
-
-
-def _words(error: Exception, place: str) -> str:
-    """What an error of the user's code in the file `place` says, and what is allowed where that is known."""
-    text = str(error)
-    if isinstance(error, KeyError):
-        return f"KeyError: {text}; allowed: names of the model's parameters"
-    if "truth value of an array" in text:
-        return f"a branch on arrays; allowed: {_ARITHMETIC}"
-    if type(error).__module__.startswith("numba"):
-        # Numba tells, from the outermost function inwards: that it failed, why, and where.
-        ends = [match.start() for match in _FILE.finditer(text) if abspath(match[1]) == abspath(place)]
-        lines = [line.strip() for line in text[: ends[-1] if ends else None].splitlines() if line.strip()]
-        begin = max((i + 1 for i, line in enumerate(lines[:-1]) if "Failed in" in line), default=0)
-        return f"does not compile: {lines[begin]}; allowed: {_ARITHMETIC}, functions marked with sweep.jit.inline"
-    return f"{type(error).__name__}: {text}".splitlines()[0]

@@ -1,0 +1,159 @@
+"""Checks a model that a user brings: what it declares, and what its functions return for some cells.
+
+Only what would give wrong numbers in silence, or an error far from its cause, is looked for.  Errors of the code itself
+are left to Python, which knows their line (`sweep.models.user.blame`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import Any
+
+import numpy as np
+
+from sweep.models.general.laws import LAWS, Law
+from sweep.models.general.variants import SlipWith
+from sweep.models.model import COUNT, ENERGY, LINEAR, OWN, SPIN, Columns, Model, never_rocks, never_upright
+from sweep.models.origin import ModelError, Origin
+from sweep.models.theory.linear import fastest_motion
+from sweep.models.theory.stability import stable_ranges
+from sweep.models.user.blame import blamed
+from sweep.parameters import PARAMETERS, Parameter
+
+_OFFERS = {COUNT: "COUNT", SPIN: "SPIN", ENERGY: "ENERGY", LINEAR: "LINEAR"}
+
+_TAKEN = frozenset({
+    "name", "model", "model_sha256", "units", "cases", "integrator", "measure", "verify", "refine",
+    "max_failed_fraction", "method", "step", "tolerance", "t_end", "stop_when_settled", "case", "trajectory", "time",
+    "every", "reporter", "progress", "config", "output", "fresh", "rerun", "cluster",
+})  # fmt: skip
+"""Names that mean something else in a configuration, as an argument or as a dimension."""
+
+Faults = Iterator[tuple[Any, str]]
+"""The function at fault, or None, and what is wrong and what to do."""
+
+
+def check(made: Any, origin: Origin) -> None:
+    """Raise a `ModelError` for the first fault of what a file or an entry point defines as its MODEL."""
+    _refuse(_declared(made), origin)
+
+
+def try_out(model: Model, columns: Columns, law: Law | None = None) -> None:
+    """Call the functions of a user's model for some cells.
+
+    Parameters
+    ----------
+    columns : physical parameters by name, each of shape (cells,)
+    law : the law of friction, if that is all that the user brings
+
+    Raises
+    ------
+    ModelError
+        if one of them returns something else than it has to.
+    """
+    assert model.origin
+    with np.errstate(all="ignore"), blamed(model.origin, always=True):
+        _refuse(_values(model, columns), model.origin)
+        _refuse(_settling_too_early(model, columns, law), model.origin)
+
+
+def _refuse(faults: Faults, origin: Origin) -> None:
+    for function, message in faults:
+        code = getattr(function, "__code__", None)
+        raise ModelError(
+            origin.place, code.co_firstlineno if code and code.co_filename == origin.place else None, message
+        )
+
+
+def _declared(made: Any) -> Faults:
+    from sweep.models import TIERS
+
+    if isinstance(made, SlipWith) and isinstance(made.law, Law):
+        yield from _names(made.law.name, LAWS, made.own_parameters, made.law.parameters)
+        for p in made.own_parameters:
+            if p.section != "friction":
+                yield None, f"parameter {p.path} is of a law of friction; give it the section 'friction'"
+        return
+    if not isinstance(made, Model):
+        yield None, f"MODEL is of the type {type(made).__name__}; it has to be Model(…), or with_law(Law(…), …)"
+    yield from _names(made.name, TIERS, made.own_parameters, made.parameters)
+    if not (made.own_parameters or made.parameters):
+        yield None, "the model has no parameter; give it own_parameters=(Parameter(…), …)"
+    if len(set(made.states)) < len(made.states) or made.spin_state not in range(len(made.states)):
+        yield None, f"the states {made.states} need distinct names, and spin_state the index of one of them"
+    if unknown := made.offers - set(_OFFERS):
+        yield None, f"a model cannot offer {', '.join(sorted(unknown))}; it may offer {', '.join(_OFFERS.values())}"
+    if made.units not in ("paper", "SI", OWN):
+        yield None, f"units {made.units!r} are unknown; choose paper, SI or {OWN}"
+    if made.upright is never_upright and (LINEAR in made.offers or made.fastest_motion is None):
+        yield None, "nothing tells how fast it moves, for the length of its steps; give it upright or fastest_motion"
+    if COUNT in made.offers and made.slower_period is never_rocks:
+        yield None, "reversals are counted of an averaged spin; give it slower_period, or do not offer COUNT"
+
+
+def _names(name: str, taken: Collection[str], own: tuple[Parameter, ...], used: tuple[str, ...]) -> Faults:
+    if not name.isidentifier() or name in taken:
+        yield None, f"the name {name!r} is no word of letters, digits and _, or taken ({', '.join(taken)}); change it"
+    for p in own:
+        if wrong := [word for word in filter(None, (p.name, p.section)) if not word.isidentifier() or word in _TAKEN]:
+            yield None, f"parameter {p.path}: {wrong[0]!r} means something else in a configuration; rename it"
+        if p.default is not None and not p.allows(p.default):
+            yield None, f"parameter {p.path}: its default {p.default:g} is out of its bounds; it has to be {p.allowed}"
+    known = [p.name for p in own]
+    if len(set(known)) < len(known):
+        yield None, f"the parameters {', '.join(known)} need distinct names"
+    if unknown := [each for each in used if each not in known and each not in PARAMETERS]:
+        yield (
+            None,
+            f"parameter {unknown[0]!r} is unknown; add a Parameter for it, or use one of {', '.join(PARAMETERS)}",
+        )
+
+
+def _values(model: Model, columns: Columns) -> Faults:
+    cells = np.shape(next(iter(columns.values())))
+
+    def tuples(function: Any, name: str, value: Any, length: int) -> Faults:
+        if not isinstance(value, tuple) or len(value) != length:
+            given = f"{len(value)} values" if isinstance(value, tuple) else type(value).__name__
+            yield function, f"{name} gives {given}; it has to give a tuple of {length}"
+
+    def one_a_cell(function: Any, name: str, value: Any) -> Faults:
+        if np.shape(value) != cells:
+            yield function, f"{name} has the shape {np.shape(value)}; it has to be {cells}, as the columns are"
+
+    constants, start = model.constants.of(columns), model.start(columns)
+    for name, value in zip(model.constants._fields, constants, strict=True):
+        yield from one_a_cell(model.constants.of, f"the constant {name}", value)
+    yield from tuples(model.start, "start", start, len(model.states))
+    yield from one_a_cell(model.start, "the start", sum(start))
+    y = tuple(np.broadcast_to(value, cells) for value in start)
+    slopes, told = model.rhs(y, constants)
+    yield from tuples(model.rhs, "rhs, of derivatives,", slopes, len(y))
+    yield from tuples(model.rhs, "rhs, of spin, power, normal force and denominator,", told, 4)
+    yield from tuples(model.energy, "energy", model.energy(y, constants), 3)
+    decided = np.asarray(model.decided(y, constants))
+    if decided.dtype != bool or decided.shape not in ((), cells):
+        yield model.decided, "decided is neither true nor false; it has to be comparisons, joined by & and |"
+    if model.upright is not never_upright:
+        yield from tuples(model.upright, "upright", model.upright(np.zeros(cells)), len(y))
+    for name in ("slower_period", "fastest_decay", "spin_unit", "fastest_motion"):
+        if function := getattr(model, name):
+            yield from one_a_cell(function, name, function(columns))
+    fastest = np.asarray(fastest_motion(model, columns))
+    if not ((fastest > 0) & np.isfinite(fastest) | np.isfinite(model.slower_period(columns))).all():
+        where = model.fastest_motion or model.slower_period
+        yield where, f"the fastest motion is {fastest[0]:g}, from which steps follow; it has to be a number > 0"
+
+
+def _settling_too_early(model: Model, columns: Columns, law: Law | None) -> Faults:
+    """Faults that would make trajectories settle too early."""
+    if law and law.linear_to is None:
+        at_rest, fast = (np.asarray(law.resistance(square, model.constants.of(columns))) for square in (0.0, 1.0))
+        if not np.array_equal(at_rest, fast):
+            words = "the resistance depends on the slip velocity; say by linear_to up to which it is nearly constant"
+            yield law.resistance, words
+    if not law and LINEAR in model.offers:
+        try:
+            stable_ranges(model, columns)
+        except ValueError as error:
+            yield model.rhs, f"{error}, so that nothing settles by its theory; do not offer LINEAR"
