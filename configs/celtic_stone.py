@@ -21,7 +21,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models.general import rigid_body
 from sweep.models.general.variants import variant
-from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, nothing_decays
+from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, zeros
 from sweep.parameters import Parameter
 
 GRAVITY = 100.0
@@ -96,7 +96,7 @@ MODEL = replace(
     slower_period=lambda columns: NOSLIP.slower_period(body(columns)),
     rhs=rhs,
     ripple=replace(NOSLIP.ripple, of=lambda columns: NOSLIP.ripple.of(body(columns))),
-    fastest_decay=nothing_decays,
+    fastest_decay=zeros,
     spin_unit=lambda columns: rigid_body.spin_unit(body(columns)),
     impossible=lambda columns: NOSLIP.impossible(body(columns)) | ~(attitude(columns)[1] > 0),
     radians_a_step=0.07,

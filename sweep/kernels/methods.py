@@ -11,7 +11,7 @@ from sweep.kernels.adams import method as adams
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method
 from sweep.kernels.stability import fastest_motion
-from sweep.models.model import Array, Columns, Model, nothing
+from sweep.models.model import Array, Columns, Model, zeros
 
 METHODS: dict[str, Method] = {method.name: method for method in (runge_kutta.DOPRI5_METHOD, adams.METHOD)}
 """The first is the plain one, which runs every model."""
@@ -39,8 +39,8 @@ def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> 
             step, rule = _step(method, model, columns, motion, tolerance)
             costs.append(method.step_cost * (t_end / step + method.start_up_cost))
         else:
-            step = rule = nothing(columns)
-            costs.append(nothing(columns) + np.inf)
+            step = rule = zeros(columns)
+            costs.append(zeros(columns) + np.inf)
         steps.append(step)
         rules.append(rule)
     chosen, cells = np.argmin(costs, axis=0), np.arange(len(motion))

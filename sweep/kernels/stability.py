@@ -24,7 +24,7 @@ import numpy as np
 from sweep.jit import Cached, called, compiled, on_all_threads, serial
 from sweep.kernels.quartic import compiled_modes, has_fast_slip, make_jacobian, quartic
 from sweep.models.ladder import analytic
-from sweep.models.model import Array, Columns, Model, nothing, stack, take
+from sweep.models.model import Array, Columns, Model, stack, take, zeros
 from sweep.models.theory import linear, stability
 
 # Samples of the coefficients, at Chebyshev points; the last two terms of their Chebyshev series must be below this
@@ -53,7 +53,7 @@ def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
     array, shape (bodies,), which is infinite where the eigenvalues were asked.
     """
     if not has_fast_slip(model):
-        return stability.stable_ranges(model, columns), nothing(columns) + np.inf
+        return stability.stable_ranges(model, columns), zeros(columns) + np.inf
     usual = _USUAL / np.sqrt(columns["c"])
     limits = [np.fmax(usual, _BEYOND * np.abs(n_c1)) for n_c1 in analytic.critical_spins(columns)]
     limits = np.minimum(np.stack(limits, axis=-1), stability.SPIN_LIMIT)

@@ -6,11 +6,13 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 
 1. Choose the states, in such a way that all but one vanish in upright spin; the remaining one carries the spin
    (`states`, `spin_state`).  A rattle then keeps its relative precision however small it becomes.
-2. Compute the coefficients, the starts and the period of the slower rocking of many cells at once, from arrays of
-   parameters (`constants`, `start`, `slower_period`).
-3. Write `rhs`, `energy` and `upright` for one trajectory, on scalars.
+2. Compute the coefficients and the starts of many cells at once, from arrays of parameters (`constants`, `start`).
+3. Write `rhs` and `energy` for one trajectory, on scalars.
 4. Say what the model depends on and what can be asked of it (`parameters`, `offers`).
-5. If friction or anything else makes the model stiff, bound its fastest decay (`fastest_decay`).
+5. Add what the `Theory` needs for it: `slower_period` for counts, `upright` or `fastest_motion` for steps, and
+   `fastest_decay` if friction or anything else makes the model stiff.
+
+The other groups, `Settling` and `Shown`, have defaults that leave no instruction in a kernel.
 
 A model of a user (`sweep.models.user`) may be of any body.  Where that has no upright spin, no state need vanish: the
 model does not offer `LINEAR`, tells its `fastest_motion`, and settles where it says that its spin is `decided`.
@@ -56,41 +58,9 @@ OWN = "own"
 """Units of a model that knows neither the paper's nor SI: the labels of the dataset then name none."""
 
 
-def nothing(columns: Columns) -> Array:
+def zeros(columns: Columns) -> Array:
     """Zeros, shape (cells,)."""
     return np.zeros_like(next(iter(columns.values())))
-
-
-@inline
-def never_tilts(y: Any) -> float:  # noqa: ARG001
-    """The default `tilt`: the equations know of no right angle."""
-    return 0.0
-
-
-def never_upright(spin: Any) -> tuple[Any, ...]:
-    """The default `upright`: there is no such motion."""
-    raise NotImplementedError
-
-
-@inline
-def never_decided(y: Any, p: Any) -> bool:  # noqa: ARG001
-    """The default `decided`: nothing is known beside the linear theory."""
-    return False
-
-
-def nothing_decays(columns: Columns) -> Array:
-    """The default `fastest_decay`: no mode is stiff."""
-    return nothing(columns)
-
-
-def never_rocks(columns: Columns) -> Array:
-    """The default `slower_period`: there is none."""
-    return nothing(columns) + np.inf
-
-
-def nothing_is_impossible(columns: Columns) -> Array:
-    """The default `impossible`."""
-    return nothing(columns).astype(bool)
 
 
 @dataclass(frozen=True)
@@ -106,12 +76,34 @@ class Ripple:
 
 
 @inline
-def _nothing(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
+def _no_ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
     return 0.0
 
 
-NO_RIPPLE = Ripple((), lambda columns: (), _nothing)  # noqa: ARG005
+NO_RIPPLE = Ripple((), lambda columns: (), _no_ripple)  # noqa: ARG005
 """For a model whose spin does not ripple."""
+
+
+@inline
+def never_tilts(y: Any) -> float:  # noqa: ARG001
+    """The default `tilt`: the equations know of no right angle."""
+    return 0.0
+
+
+@inline
+def never_decided(y: Any, p: Any) -> bool:  # noqa: ARG001
+    """The default `decided`: nothing is known beside the linear theory."""
+    return False
+
+
+def never_upright(spin: Any) -> tuple[Any, ...]:
+    """The default `upright`: there is no such motion."""
+    raise NotImplementedError
+
+
+def never_rocks(columns: Columns) -> Array:
+    """The default `slower_period`: there is none."""
+    return zeros(columns) + np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,8 +123,8 @@ class Tier:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Model(Tier):
-    """A rung that is simulated.
+class Equations:
+    """The equations of motion, which every model has.
 
     The functions called "inline" are marked `sweep.jit.inline`.  They become part of the kernel, where they work on
     the scalars of one trajectory.  Called from Python they also take arrays, real or complex, so that energies and
@@ -149,12 +141,6 @@ class Model(Tier):
     from columns of parameters, each coefficient of shape (cells,)."""
     start: Callable[[Columns], tuple[Array, ...]]
     """(columns) -> the states at t = 0, each of shape (cells,)."""
-    slower_period: Callable[[Columns], Array] = never_rocks
-    """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none.  The
-    spin is averaged over it before its changes of sign are counted."""
-    upright: Callable[..., tuple[Any, ...]] = never_upright
-    """Inline, (spin) -> the states of steady upright spin without rattle.  A model that does not offer `LINEAR` may
-    have `fastest_motion` instead."""
     rhs: Callable[..., tuple[Any, ...]]
     """Inline, (states, constants) -> (derivatives, (spin, dissipated power, normal force, Painlevé denominator)).
     Of the last three, a model that lacks them returns the literals 0.0, 1.0 and 1.0."""
@@ -165,47 +151,77 @@ class Model(Tier):
     tilt: Callable[..., Any] = never_tilts
     """Inline, (states) -> sin² of the angle by which the body is tilted from upright spin.  The variables of a model
     that has it end at a right angle, where the body has toppled."""
-    fastest_decay: Callable[[Columns], Array] = nothing_decays
-    """(columns) -> bound on |λ| of the fastest damped mode anywhere on the trajectory, in sqrt(g/c), shape (cells,).
-    It limits the step of an explicit method.  By default nothing is stiff."""
+    impossible: Callable[[Columns], Array] = lambda columns: zeros(columns).astype(bool)
+    """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
+    function is called for such a body."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Theory:
+    """How fast a model moves, rocks and decays: steps, the average of the spin, and predictions follow from it."""
+
+    slower_period: Callable[[Columns], Array] = never_rocks
+    """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none.  The
+    spin is averaged over it before its changes of sign are counted."""
+    upright: Callable[..., tuple[Any, ...]] = never_upright
+    """Inline, (spin) -> the states of steady upright spin without rattle.  A model that does not offer `LINEAR` may
+    have `fastest_motion` instead."""
+    fastest_motion: Callable[[Columns], Array] | None = None
+    """(columns) -> bound on the rate of the fastest motion that steps have to follow, in sqrt(g/c), shape (cells,); by
+    default the largest eigenvalue about upright spin."""
+    extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
+    """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
     radians_a_step: float = 0.07
     """Phase through which the fastest motion advances in one step of a fifth-order method at the default
     tolerance.  On the slip model 0.07 gives errors in spin at t = 400 of 3e-9 and 1e-8 (a = 10, b = 3, n0 = 0.05 and
     0.1, μ = 20, where accuracy determines the step); they fall as its fifth power."""
+    fastest_decay: Callable[[Columns], Array] = zeros
+    """(columns) -> bound on |λ| of the fastest damped mode anywhere on the trajectory, in sqrt(g/c), shape (cells,).
+    It limits the step of an explicit method.  By default nothing is stiff."""
     ripple: Ripple = NO_RIPPLE
     """How the spin ripples with the rattle, for the ripple-free spin whose changes of sign are counted."""
-    impossible: Callable[[Columns], Array] = nothing_is_impossible
-    """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
-    function is called for such a body."""
-    spin_unit: Callable[[Columns], Array] = lambda columns: nothing(columns) + 1
-    """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
-    largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settling:
+    """When a trajectory may end because its spin can reverse no more, beside what the linear theory tells."""
+
+    decided: Callable[..., Any] = never_decided
+    """Inline, (states, constants) -> whether the spin can reverse no more, so that the trajectory settles, whatever the
+    linear theory says; by default it leaves no instruction.  It is asked at every look."""
     faint: str = ""
     """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
     rattle below it may settle."""
     still: str = ""
     """Name of the constant that is the energy above rest below which a body counts as at rest, so that the trajectory
     settles; "" if there is none."""
-    decided: Callable[..., Any] = never_decided
-    """Inline, (states, constants) -> whether the spin can reverse no more, so that the trajectory settles, whatever the
-    linear theory says; by default it leaves no instruction.  It is asked at every look."""
-    extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
-    """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """What trajectories and labels show of a model, and in which units."""
+
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
     shows beside spin and energy, by names that `sweep.studies.trajectory` or `series` explains."""
-    turned: Callable[[Columns], Array] = nothing
-    """(columns) -> angle from the axes of the states to x and y, along which a trajectory shows vectors, of shape
-    (cells,)."""
-    fastest_motion: Callable[[Columns], Array] | None = None
-    """(columns) -> bound on the rate of the fastest motion that steps have to follow, in sqrt(g/c), shape (cells,); by
-    default the largest eigenvalue about upright spin."""
-    own_parameters: tuple[Parameter, ...] = ()
-    """Parameters that are not in `sweep.parameters`, of a model that a user brings."""
     series: tuple[tuple[str, str, str], ...] = ()
     """Name, CF unit and meaning of what only this model can `observe`."""
+    turned: Callable[[Columns], Array] = zeros
+    """(columns) -> angle from the axes of the states to x and y, along which a trajectory shows vectors, of shape
+    (cells,)."""
+    spin_unit: Callable[[Columns], Array] = lambda columns: zeros(columns) + 1
+    """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
+    largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""
     units: str = OWN
     """What the numbers of a model that a user brings are in, for the labels: "paper", "SI" or "own"."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model(Shown, Settling, Theory, Equations, Tier):
+    """A rung that is simulated: its `Equations`, and what else is known of it, by groups that may be left out."""
+
+    own_parameters: tuple[Parameter, ...] = ()
+    """Parameters that are not in `sweep.parameters`, of a model that a user brings."""
     origin: Origin | None = None
     """Where the model comes from, if a user brings it."""
 

@@ -12,7 +12,7 @@ from sweep.models.general.bounds import still_energy
 from sweep.models.general.couples import Couple
 from sweep.models.general.laws import Law
 from sweep.models.general.surfaces import Surface
-from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, nothing
+from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, zeros
 
 STILL = "still"
 """The constant `Model.still` of variants with a couple that stops the body."""
@@ -52,7 +52,7 @@ def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
 
 def turned(columns: Columns) -> Array:
     """`Model.turned`: x and y are the axes of inertia of a body given by δ, and those of the surface otherwise."""
-    return np.asarray(columns.get("delta", nothing(columns)))
+    return np.asarray(columns.get("delta", zeros(columns)))
 
 
 def seen(contact: Any, rhs: Any, y: Array, p: Any) -> dict[str, Array]:

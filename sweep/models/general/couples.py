@@ -60,7 +60,7 @@ _CREEPING = 0.1
 
 
 @inline
-def nothing(square: Any, p: Any) -> Any:  # noqa: ARG001
+def no_resistance(square: Any, p: Any) -> Any:  # noqa: ARG001
     """The resistance of no couple."""
     return 0.0
 

@@ -17,7 +17,7 @@ from sweep.models.general import rigid_body, starts, validity
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay
 from sweep.models.general.common import STILL, couple_constants, offers, record, seen, turned
-from sweep.models.general.couples import Couple, nothing
+from sweep.models.general.couples import Couple, no_resistance
 from sweep.models.general.resistance import drag_of, isotropic_drag, resistances
 from sweep.models.general.rigid_body import gyroscopic
 from sweep.models.general.surfaces import Surface
@@ -29,7 +29,7 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
     """The variant of `noslip` of this name; `parameters` are those of the body and the start."""
     contact, general_energy = surface.contact, rigid_body.energy_on(surface)
     (plain, loaded), drag = resistances(couples), drag_of(couples)
-    damps, drags = plain is not nothing, loaded is not nothing or drag is not isotropic_drag
+    damps, drags = plain is not no_resistance, loaded is not no_resistance or drag is not isotropic_drag
     names, values = couple_constants(couples)
 
     @inline

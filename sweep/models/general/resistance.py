@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from sweep.jit import inline
-from sweep.models.general.couples import Couple, nothing
+from sweep.models.general.couples import Couple, no_resistance
 from sweep.models.general.laws import Law
 
 
 def resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
     """The resistance by itself and the one per unit of the normal force."""
-    found: list[Any] = [nothing, nothing]
+    found: list[Any] = [no_resistance, no_resistance]
     for couple in couples:
         if not couple.about_normal:
             found[couple.needs_normal_force] = couple.resistance
@@ -50,7 +50,7 @@ def drag_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
     coupled = law.coupled if law else None
     if not about_normal and coupled is None:
         return isotropic_drag
-    spinning = about_normal[0] if about_normal else nothing
+    spinning = about_normal[0] if about_normal else no_resistance
     of_slip = coupled or _no_couple
 
     @inline

@@ -28,7 +28,7 @@ from sweep.models.general import rigid_body, starts, validity
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
 from sweep.models.general.common import STILL, couple_constants, offers, record, seen, turned
-from sweep.models.general.couples import Couple, nothing
+from sweep.models.general.couples import Couple, no_resistance
 from sweep.models.general.laws import Law
 from sweep.models.general.resistance import drag_of, isotropic_drag, resistance_of, resistances
 from sweep.models.general.rigid_body import gyroscopic
@@ -42,7 +42,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
     contact, general_energy = surface.contact, rigid_body.energy_on(surface)
     resistance, (plain, loaded), drag = resistance_of(law), resistances(couples), drag_of(couples, law)
     # A product with 0.0 would remain: the compiler has to allow for infinity.  A branch on these does not.
-    damps, drags = plain is not nothing, loaded is not nothing or drag is not isotropic_drag
+    damps, drags = plain is not no_resistance, loaded is not no_resistance or drag is not isotropic_drag
     names, values = couple_constants(couples, law)
 
     @inline

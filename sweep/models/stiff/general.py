@@ -23,7 +23,7 @@ from sweep.jit import inline
 from sweep.models.general import rigid_body, variants
 from sweep.models.general import ripple as general_ripple
 from sweep.models.general.bounds import couples_decay, strongest_grip
-from sweep.models.general.couples import Couple, nothing
+from sweep.models.general.couples import Couple, no_resistance
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.resistance import resistances
 from sweep.models.general.rigid_body import gyroscopic
@@ -55,7 +55,7 @@ def form_of(model: Model) -> StiffForm | None:
 def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface) -> StiffForm:
     resistance, contact, general_energy = law.resistance, surface.contact, rigid_body.energy_on(surface)
     couple, _ = resistances(couples)
-    damps = couple is not nothing
+    damps = couple is not no_resistance
     fields = (*full.constants._fields, *ROCKING)
 
     class Constants(named(*fields)):  # type: ignore[misc]

@@ -27,7 +27,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.ladder import friction, slip
-from sweep.models.model import Array, Columns, Ripple, named, nothing_decays
+from sweep.models.model import Array, Columns, Ripple, named, zeros
 from sweep.models.stiff.form import StiffForm
 from sweep.models.theory.ripple import FORM, form, ripple
 from sweep.models.theory.rocking import frequencies, rocking
@@ -266,6 +266,6 @@ PAPER_FORM = StiffForm(
     slip_decay=lambda columns: 2.2 * friction.strongest_resistance(columns) + 2.2,
     rise=_rise,
     resistance=lambda columns: friction.strongest_resistance(columns) * np.sqrt(columns["c"]),
-    damping=nothing_decays,
+    damping=zeros,
     resolves_modes=True,
 )
