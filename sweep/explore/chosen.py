@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, Spinner
 
-from sweep.explore.cells import Curve
 from sweep.explore.colours import CURVES
 from sweep.explore.controls import BARE, escaped, on
+from sweep.explore.runner import Curve
 from sweep.explore.slices import Axis, Source
 from sweep.explore.state import MAX_CELLS, Cell
 from sweep.parameters import Parameter

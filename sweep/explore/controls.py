@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from bokeh.models import Column, CustomJS, Div, RadioButtonGroup, Row, Select, Slider
 
 from sweep.explore.setup import why_still
-from sweep.explore.slices import Axis, Source
-from sweep.explore.state import State
+from sweep.explore.slices import Source
+from sweep.explore.state import Choice, State, choices
 from sweep.plots import labels
 
 _SOFT = '<p style="color:#5b6875">{}</p>'
@@ -22,11 +21,6 @@ HINT = _SOFT.format(
     "With the keyboard: arrows choose a cell, Enter runs it."
 )
 EMPTY = _SOFT.format("The trajectories of the cells that you click are drawn and played here.")
-
-_BUTTONS = 6
-"""Values of an axis that have a button each; more share a slider."""
-
-_COUNTS = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
 
 BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }"
 
@@ -72,89 +66,68 @@ def progress(text: str, share: float) -> str:
 
 
 class MapControls:
-    """Which variable is shown, over which axes, and where on the others."""
+    """The widgets of all choices: which variable is shown, over which axes, and where on the others."""
 
     def __init__(self, source: Source, change: Callable[[State], None]) -> None:
         self._source, self._change = source, change
         self._state: State | None = None
-        self._counts = [n for n in _COUNTS if n in source.variables]
-        others = [(n, source.words(n)) for n in source.variables if n not in self._counts]
-        names = [_COUNTS[n] for n in self._counts]
-        self._count = RadioButtonGroup(labels=names, active=None, name="count", stylesheets=[BARE],
-                                       visible=bool(names))  # fmt: skip
-        placeholder = [("", "another variable …")] if names else []
-        self._other = Select(options=[*placeholder, *others], value="", width=250, name="show", stylesheets=[BARE])
-        options = [(d, source.words(d)) for d in source.dims]
-        self._x = Select(title="horizontal axis", options=options, width=150, name="x", stylesheets=[BARE])
-        self._y = Select(
-            title="vertical axis", options=options, width=150, name="y", visible=len(options) > 1, stylesheets=[BARE]
-        )
-        self._rest = {name: _axis_control(axis) for name, axis in source.axes.items()}
-        on(self._count, "active", self._counted)
-        on(self._other, "value", lambda name: self._set(show=name))
-        for control in (self._x, self._y):
-            on(control, "value", lambda _: self._set(axes=(self._x.value, self._y.value)))
-        for name, control in self._rest.items():
-            event = "active" if isinstance(control, RadioButtonGroup) else "value_throttled"
-            on(control, event, partial(self._moved, name))
-        groups = [
-            _titled("variable", Row(self._count, self._other, styles={"gap": "6px", "flex-wrap": "wrap"})),
-            self._x, self._y,
-            *(_titled(source.words(d), c) if isinstance(c, RadioButtonGroup) else c for d, c in self._rest.items()),
-        ]  # fmt: skip
-        self._groups = dict(zip(self._rest, groups[3:], strict=True))
-        self.root = Row(children=groups, name="controls", sizing_mode="stretch_width",
-                            styles={"gap": "10px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
+        self._choices = choices(source)
+        self._widgets = {name: _Widgets(choice, partial(self._pick, choice)) for name, choice in self._choices.items()}
+        self.root = Row(children=[widgets.root for widgets in self._widgets.values()], name="controls",
+                        sizing_mode="stretch_width",
+                        styles={"gap": "10px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 
     def show(self, state: State) -> None:
-        """Let the controls say what is shown."""
-        self._state = None
-        self._count.active = self._counts.index(state.show) if state.show in self._counts else None
-        self._other.value = "" if state.show in self._counts else state.show
-        self._x.value, self._y.value = state.x, state.y
-        along = self._source.dims_of(state.show) | set(self._source.dims)
-        for name, control in self._rest.items():
-            self._groups[name].visible = name in along - {state.x, state.y}
-            if isinstance(control, RadioButtonGroup):
-                control.active = state.at[name]
-            else:
-                control.value = state.at[name]
+        """Let the widgets say what is shown."""
         self._state = state
+        along = self._source.dims_of(state.show) | set(self._source.dims)
+        for name, widgets in self._widgets.items():
+            widgets.show(self._choices[name].of(state))
+            widgets.root.visible = name not in self._source.axes or name in along - {state.x, state.y}
 
-    def _counted(self, k: int | None) -> None:
-        if k is not None and 0 <= k < len(self._counts):
-            self._set(show=self._counts[k])
-
-    def _moved(self, name: str, index: Any) -> None:
-        self._set(at={name: index})
-
-    def _set(
-        self, show: str = "", axes: tuple[str, str] | None = None, at: Mapping[str, int] | None = None
-    ) -> None:  # fmt: skip
-        state = self._state
-        if state is None:
-            return
-        if show in self._source.variables:
-            state = replace(state, show=show)
-        if axes and set(axes) <= {*self._source.dims, ""}:
-            state = state.with_axes(*axes)
-        for name, index in (at or {}).items():
-            if isinstance(index, int | float) and 0 <= index < len(self._source.axes[name].values):
-                state = replace(state, at={**state.at, name: int(index)})
-        self._change(state)
+    def _pick(self, choice: Choice, k: Any) -> None:
+        """Take an option that the browser sent, which may be anything."""
+        if self._state and isinstance(k, int | float) and 0 <= k < len(choice.options):
+            self._change(choice.put(self._state, int(k)))
 
 
-def _titled(title: str, control: Any) -> Column:
-    return Column(Div(text=escaped(title), styles={"font-size": "12px", "color": "#5b6875"}, margin=0), control)
+class _Widgets:
+    """Buttons, a list or a slider, or buttons and a list, for the options of a choice."""
+
+    def __init__(self, choice: Choice, pick: Callable[[Any], None]) -> None:
+        n = self._count = choice.buttons
+        self._options = choice.options
+        name, title = choice.name, "" if n else choice.title
+        self._buttons = RadioButtonGroup(labels=list(choice.words[:n]), visible=n > 0, name=f"buttons {name}",
+                                         stylesheets=[BARE])  # fmt: skip
+        on(self._buttons, "active", pick)
+        self._more: Slider | Select | None = None
+        if n < len(choice.options) and choice.axis:
+            self._more = _slider(choice)
+            on(self._more, "value_throttled", pick)
+        elif n < len(choice.options):
+            named = [*([("", f"another {choice.title} …")] if n else []), *zip(choice.options[n:], choice.words[n:], strict=True)]
+            self._more = Select(title=title, options=named, value="", width=250 if n else 150, name=name,
+                                stylesheets=[BARE])  # fmt: skip
+            on(self._more, "value", lambda option: pick(choice.find(option)))
+        row = Row(self._buttons, *([self._more] if self._more else []), styles={"gap": "6px", "flex-wrap": "wrap"})
+        heading = Div(text=escaped(choice.title), styles={"font-size": "12px", "color": "#5b6875"}, margin=0)
+        self.root = Column(heading, row) if n else row
+
+    def show(self, k: int) -> None:
+        """Let the widgets say that option `k` is chosen."""
+        self._buttons.active = k if k < self._count else None
+        if isinstance(self._more, Slider):
+            self._more.value = k
+        elif self._more:
+            self._more.value = self._options[k] if k >= self._count else ""
 
 
-def _axis_control(axis: Axis) -> RadioButtonGroup | Slider:
-    values = [f"{v:.6g}" for v in axis.values]
-    if len(values) <= _BUTTONS:
-        return RadioButtonGroup(labels=values, active=0, name=f"at {axis.name}", stylesheets=[BARE])
-    symbol = labels.symbol(axis.name)
-    slider = Slider(start=0, end=len(values) - 1, step=1, value=0, width=190, show_value=False, name=f"at {axis.name}",
-                    title=f"{symbol} = {values[0]}", stylesheets=[BARE])  # fmt: skip
+def _slider(choice: Choice) -> Slider:
+    """A slider over the indices of an axis that says the value."""
+    symbol = labels.symbol(choice.name)
+    slider = Slider(start=0, end=len(choice.words) - 1, step=1, value=0, width=190, show_value=False, name=choice.name,
+                    title=f"{symbol} = {choice.words[0]}", stylesheets=[BARE])  # fmt: skip
     code = "cb_obj.title = `${symbol} = ${values[cb_obj.value]}`"
-    slider.js_on_change("value", CustomJS(args={"values": values, "symbol": symbol}, code=code))
+    slider.js_on_change("value", CustomJS(args={"values": list(choice.words), "symbol": symbol}, code=code))
     return slider

@@ -25,9 +25,10 @@ from bokeh.plotting import figure
 
 from sweep.explore.colours import Scale, scale
 from sweep.explore.lines import Lines
+from sweep.explore.patterns import TILES
 from sweep.explore.slices import Axis, Slice, Source, plain
 from sweep.grid import Array
-from sweep.plots import labels, marks
+from sweep.plots import labels
 
 HEIGHT = 480
 """Of the map, in pixels."""
@@ -84,8 +85,9 @@ class Map:
         self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
         self._kinds = ColumnDataSource({"kinds": [np.zeros((1, 1), "uint8")]})
-        _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "names": list(marks.WORDS),
-                 "overlay": overlay, "ex": x.edges, "ey": y.edges, "cursor": self.cursor, "probe": probe,
+        _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "overlay": overlay,
+                 "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
+                 "ex": x.edges, "ey": y.edges, "cursor": self.cursor, "probe": probe,
                  "request": request})  # fmt: skip
 
     def show(self, part: Slice, columns: Mapping[str, Any], lines: Sequence[Lines] = ()) -> Scale:

@@ -31,31 +31,13 @@ const sweep = (() => {
 
   // ---- patterns over cells that are not plain results, drawn in screen pixels at every zoom
 
-  const WHITE = 0xc8ffffff, BLACK = 0x90000000, DARK = 0xff474340, LIGHT = 0xffa8a39e // ABGR
-
-  const ALONG = (x, y) => (x + y) % 10
-  const BACK = (x, y) => (((x - y) % 10) + 10) % 10
-
-  /** The colour of a pixel for each kind of cell, 0 where the pattern leaves the map to be seen. */
-  const PATTERNS = {
-    not_run: () => LIGHT,
-    failed: (x, y) => (ALONG(x, y) === 0 || BACK(x, y) === 0 ? LIGHT : DARK),
-    impossible: (x, y) => (y % 6 === 0 ? DARK : LIGHT),
-    no_value: () => LIGHT,
-    time_limit: (x, y) => [WHITE, BLACK][ALONG(x, y)] ?? 0,
-    inferred: (x, y) => (x % 6 < 2 && y % 6 === 0 ? WHITE : x % 6 < 2 && y % 6 === 1 ? BLACK : 0),
-    noise_limited: (x, y) => [WHITE, BLACK][y % 8] ?? 0,
-    uncertain: (x, y) => [WHITE, BLACK][x % 8] ?? 0,
-  }
-
-  function paint({figure, kinds, names, overlay, ex, ey}) {
+  function paint({figure, kinds, tiles, overlay, ex, ey}) {
     const width = Math.round(figure.inner_width), height = Math.round(figure.inner_height)
     const table = kinds.data.kinds[0]
     if (!(width > 1 && height > 1)) return
     const [x, y] = [figure.x_range, figure.y_range]
     const columns = cells(ex, x, figure.x_scale.type === "LogScale", width)
     const rows = cells(ey, y, figure.y_scale.type === "LogScale", height)
-    const patterns = names.map((name) => PATTERNS[name])
     const across = ex.length - 1
     const out = new Uint32Array(width * height)
     for (let r = 0; r < height; r++) {
@@ -63,13 +45,12 @@ const sweep = (() => {
       for (let c = 0; c < width; c++) {
         const bits = columns[c] < 0 ? 0 : table[rows[r] * across + columns[c]]
         if (!bits) continue
-        for (let k = 0; k < patterns.length; k++) {
-          if (bits & (1 << k)) {
-            const colour = patterns[k](c, r)
-            if (colour) {
-              out[r * width + c] = colour
-              break
-            }
+        for (let k = 0; k < tiles.length; k++) {
+          const {side, colours} = tiles[k]
+          const colour = bits & (1 << k) ? colours[(r % side) * side + (c % side)] : 0
+          if (colour) {
+            out[r * width + c] = colour
+            break
           }
         }
       }
@@ -117,22 +98,22 @@ const sweep = (() => {
     if (current.request) ask(current.request, i, j, Boolean(event.modifiers?.shift))
   }
 
-  let last = ""
   let waiting = 0
 
-  /** Tell the server which cell is under the pointer: at most twenty times a second, and the last one for certain. */
+  /** Tell the server which cell is under the pointer, or else the chosen one: at most twenty times a second. */
   function point(event) {
-    const {probe, ex, ey} = current
+    const {cursor, probe, ex, ey} = current
     if (!probe) return
     const i = event ? cell(ex, event.x) : -1, j = event ? cell(ey, event.y) : -1
     clearTimeout(waiting)
-    waiting = setTimeout(() => {
-      if (last !== `${i},${j}`) {
-        last = `${i},${j}`
-        probe.data = {i: [i], j: [j]}
-      }
-    }, 50)
+    waiting = setTimeout(() => tell(probe, ...(i < 0 || j < 0 ? chosen(cursor) : [i, j])), 50)
   }
+
+  function tell(probe, i, j) {
+    if (probe.data.i[0] !== i || probe.data.j[0] !== j) probe.data = {i: [i], j: [j]}
+  }
+
+  const chosen = (cursor) => [cursor.data.i[0] ?? -1, cursor.data.j[0] ?? -1]
 
   const STEPS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}
 
@@ -140,13 +121,13 @@ const sweep = (() => {
     if (!current || event.ctrlKey || event.altKey || event.metaKey) return
     const {cursor, request, probe, ex, ey} = current
     const clamp = (at, edges) => Math.max(0, Math.min(edges.length - 2, at))
-    const [i, j] = [cursor.data.i[0] ?? -1, cursor.data.j[0] ?? -1]
+    const [i, j] = chosen(cursor)
     if (event.key in STEPS) {
       const [di, dj] = STEPS[event.key]
       const stride = event.shiftKey ? 10 : 1
-      const chosen = i < 0 ? [0, 0] : [clamp(i + stride * di, ex), clamp(j + stride * dj, ey)]
-      choose(...chosen)
-      if (probe) probe.data = {i: [chosen[0]], j: [chosen[1]]}
+      const next = i < 0 ? [0, 0] : [clamp(i + stride * di, ex), clamp(j + stride * dj, ey)]
+      choose(...next)
+      if (probe) tell(probe, ...next)
     } else if (event.key === "Enter" && request && i >= 0) {
       ask(request, i, j, event.shiftKey)
     } else {
@@ -159,13 +140,14 @@ const sweep = (() => {
 
   let player = null
 
-  /** Show the trajectories at a moment: the line in the curves, and the path of the last while. */
-  function moment({curves, trails, points, line, window, clock}, time) {
+  /** Show the trajectories at the slider's moment: the line in the curves, and the path of the last while. */
+  function moment({curves, trails, points, line, slider, trail, clock, unit}) {
+    const time = slider.value
     line.location = time
-    clock.text = `t = ${time.toFixed(time < 100 ? 1 : 0)} √(c/g)`
+    clock.text = `t = ${time.toFixed(time < 100 ? 1 : 0)} ${unit.text}`
     curves.forEach((curve, k) => {
-      const {time: t, x, y} = curve.data
-      const end = before(t, time), begin = before(t, time - window.value)
+      const {time: t, contact_x: x, contact_y: y} = curve.data
+      const end = before(t, time), begin = before(t, time - trail.value * slider.end)
       const some = t.length > 0 && time <= t[t.length - 1]
       trails[k].data = {x: Array.from(x.slice(begin, end + 1)), y: Array.from(y.slice(begin, end + 1))}
       points[k].data = end >= 0 && t.length ? {x: [x[end]], y: [y[end]], alpha: [some ? 1 : 0.35]} : {x: [], y: [], alpha: []}
@@ -201,12 +183,13 @@ const sweep = (() => {
 
   // ---- address, downloads, pictures
 
-  function address(query) {
-    history.replaceState(null, "", `?${query}`)
+  /** Call the function of this object that the server names. */
+  function called({name: [name], given: [given]}) {
+    api[name](...given)
   }
 
-  function notice(text) {
-    document.querySelector("#notice").classList.toggle("silent", !text)
+  function address(query) {
+    history.replaceState(null, "", `?${query}`)
   }
 
   function save(bytes, name, type) {
@@ -251,5 +234,6 @@ const sweep = (() => {
 
   document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
 
-  return {address, copy, cell, moment, notice, paint, picture, play, point, repaint, save, tap, use}
+  const api = {address, called, copy, moment, picture, play, point, save, tap, use}
+  return api
 })()

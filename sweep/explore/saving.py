@@ -1,48 +1,96 @@
-"""What the visitor handles to save what is seen."""
+"""What is seen as files: slice and trajectories as netCDF, the configuration that makes them, and their buttons."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Row
+from bokeh.models import Button, Column, CustomJS, Row
 
+from sweep.config import Config, Values
+from sweep.explore.runner import Curve
+from sweep.explore.setup import Setup
 from sweep.explore.slices import Source
+from sweep.explore.state import Cell, State
+
+_TYPES = {"nc": ("netCDF", "application/x-netcdf"), "yaml": ("YAML", "application/yaml")}
 
 
-class Saving:
-    """Buttons that save what is seen: the map in the column `plots`, and the other figures."""
+def stem(source: Source) -> str:
+    """The name of all files without its ending: what a configuration may be called, whatever the dataset's title is."""
+    words = re.sub(r"[^A-Za-z0-9_-]", "", str(source.dataset.attrs.get("title", "")).split(":")[0])
+    return f"{words or 'sweep'}_explored"
 
-    def __init__(
-        self, source: Source, netcdf: Callable[[], bytes], yaml: Callable[[], bytes] | None, plots: Column,
-        figures: Sequence[Any],
-    ) -> None:  # fmt: skip
-        # What a name may be in a configuration, whatever the title of the dataset is.
-        words = re.sub(r"[^A-Za-z0-9_-]", "", str(source.dataset.attrs.get("title", "")).split(":")[0])
-        self.stem = f"{words or 'sweep'}_explored"
-        self._file = ColumnDataSource({"bytes": [], "name": [], "type": []}, name="file")
-        code = "if (cb_obj.data.name.length) sweep.save(cb_obj.data.bytes[0], cb_obj.data.name[0], cb_obj.data.type[0])"
-        self._file.js_on_change("data", CustomJS(code=code))
-        png = Button(label="PNG", name="png", width=64)
-        args = {"plots": plots, "figures": list(figures), "name": f"{self.stem}.png"}
-        png.js_on_click(CustomJS(args=args, code="sweep.picture([...plots.children, ...figures], name)"))
-        link = Button(label="Copy link", name="link", width=92)
-        link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
-        buttons = [link, png, self._button("netCDF", f"{self.stem}.nc", "application/x-netcdf", netcdf)]
-        if yaml:
-            buttons.append(self._button("YAML", f"{self.stem}.yaml", "application/yaml", yaml))
-        link.tags = [self._file]
-        self.root = Row(*buttons, name="save")
 
-    def _button(self, label: str, name: str, mime: str, content: Callable[[], bytes]) -> Button:
-        button = Button(label=label, name=label, width=76)
+def netcdf(source: Source, address: str, state: State, curves: Sequence[Curve]) -> bytes:
+    """The slice with all its variables, and in the groups `trajectory_1`, … the trajectories, as a netCDF file."""
+    fixed = {d: state.at.get(d, 0) for d in source.dims if d not in (state.x, state.y)}
+    part = source.dataset.isel(fixed, missing_dims="ignore").load()
+    part = part.assign_attrs(explored=address)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "slice.nc")
+        part.to_netcdf(path, engine="netcdf4")
+        for k, curve in enumerate(curves, 1):
+            curve.dataset.to_netcdf(path, engine="netcdf4", mode="a", group=f"trajectory_{k}")
+        return path.read_bytes()
 
-        def send() -> None:
-            bytes_ = np.frombuffer(content(), "uint8")
-            self._file.data = {"bytes": [bytes_], "name": [name], "type": [mime]}
-            self._file.data = {"bytes": [], "name": [], "type": []}
 
-        button.on_click(send)
-        return button
+def yaml(source: Source, setup: Setup, state: State) -> str:
+    """The configuration of the slice, and in comments the commands that make the map and the trajectories from it."""
+    name, config = f"{stem(source)}.yaml", _sliced(source, setup.config, state)
+    lines = [f"# python -m sweep run {name}"]
+    lines += [f"# python -m sweep trajectory {name} {_options(config, cell)}" for cell in state.cells]
+    if "case" in source.dims:
+        lines.append("# The cases of the table are left out; this is the first of them.")
+    return "\n".join([*lines, config.to_yaml()])
+
+
+def _sliced(source: Source, config: Config, state: State) -> Config:
+    """`config` with a number for each axis that is not drawn."""
+    parameters = dict(config.parameters)
+    for name, at in state.at.items():
+        if name in parameters and name not in (state.x, state.y):
+            value = float(source.axes[name].values[at])
+            parameters[name] = Values((value,), False, value)
+    return replace(config, parameters=parameters)
+
+
+def _options(config: Config, cell: Cell) -> str:
+    given = {n: v.numbers[0] for n, v in config.parameters.items() if not v.is_axis}
+    return " ".join(f"--at {name}={value:.12g}" for name, value in cell.items() if given.get(name) != value)
+
+
+def buttons(
+    name: str, plots: Column, figures: Sequence[Any], files: Mapping[str, Callable[[], bytes]],
+    call: Callable[..., None],
+) -> Row:  # fmt: skip
+    """Buttons that copy the address and save what is seen.
+
+    Parameters
+    ----------
+    name : of all files, without its ending
+    plots, figures : what is in the picture: the map in the column `plots`, and the others
+    files : by its ending, what makes the content of a file
+    call : calls a function of page.js with arguments
+    """
+    link = Button(label="Copy link", name="link", width=92)
+    link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
+    png = Button(label="PNG", name="png", width=64)
+    args = {"plots": plots, "figures": list(figures), "name": f"{name}.png"}
+    png.js_on_click(CustomJS(args=args, code="sweep.picture([...plots.children, ...figures], name)"))
+    made = []
+    for ending, content in files.items():
+        label, mime = _TYPES[ending]
+        made.append(button := Button(label=label, name=label, width=76))
+        button.on_click(partial(_send, f"{name}.{ending}", mime, content, call))
+    return Row(link, png, *made, name="save")
+
+
+def _send(name: str, mime: str, content: Callable[[], bytes], call: Callable[..., None]) -> None:
+    call("save", np.frombuffer(content(), "uint8"), name, mime)

@@ -17,7 +17,6 @@ from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 
 from sweep.explore import view
-from sweep.explore.cells import Runner
 from sweep.explore.setup import Setup
 from sweep.explore.slices import Source
 
@@ -54,7 +53,7 @@ def start(source: Source, setup: Setup | None, port: int | None, loop: IOLoop) -
     logging.getLogger("tornado.access").setLevel(logging.ERROR)
     sockets, found = _bind(port)
     hosts = [f"{host}:{found}" for host in ("localhost", ADDRESS)]
-    application = Application(FunctionHandler(view.make(source, setup, Runner())))
+    application = Application(FunctionHandler(view.make(source, setup)))
     web = BokehTornado({"/": application}, extra_websocket_origins=hosts, absolute_url=f"http://{hosts[0]}/")
     http = HTTPServer(web)
     http.add_sockets(sockets)

@@ -1,19 +1,29 @@
-"""What the page shows, as the address says it: every value that comes from an address is checked here."""
+"""What the page shows, the choices that lead there, and both as an address says them.
+
+Every value that comes from an address or from a browser is checked here.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 from urllib.parse import urlencode
 
 from sweep.config.faults import brief
-from sweep.explore.slices import Source
+from sweep.explore.slices import Axis, Source
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.plots.quantities import subject
 
 MAX_CELLS = 6
 """Curves over each other; as many as there are colours that everybody can tell apart."""
+
+_BUTTONS = 6
+"""Values of an axis that have a button each; more share a slider."""
+
+_COUNTS = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
+"""The variables that have a button each, and what it says."""
 
 Cell = Mapping[str, float]
 """The parameters of a trajectory."""
@@ -32,13 +42,58 @@ class State:
     """The index on each axis that is not drawn."""
     cells: tuple[Cell, ...] = ()
 
-    def with_axes(self, x: str, y: str) -> State:
-        """The same with other axes; one that was chosen for both changes places with the other."""
-        if x == y and x == self.x:
-            x = self.y
-        elif x == y:
-            y = self.x
-        return replace(self, x=x, y=y)
+
+@dataclass(frozen=True)
+class Choice:
+    """A part of the state that the visitor chooses among `options`; its `name` is the key in the address."""
+
+    name: str
+    title: str
+    options: Sequence[str]
+    words: Sequence[str]
+    """What the page says of each option."""
+    buttons: int = 0
+    """How many of the options, from the first on, have a button each; the others share a list or a slider."""
+    axis: Axis | None = None
+    """The axis of the dataset on which the options are places."""
+
+    def find(self, text: str) -> int | None:
+        """The option that an address names, which may be any number on an axis; None if there is none."""
+        if not self.axis:
+            return self.options.index(text) if text in self.options else None
+        number, (low, high) = _number(text), self.axis.values[[0, -1]]
+        slack = 1e-9 * max(abs(low), abs(high))
+        return self.axis.nearest(number) if low - slack <= number <= high + slack else None
+
+    def of(self, state: State) -> int:
+        """The option that is chosen in a state."""
+        return state.at[self.name] if self.axis else self.options.index(getattr(state, self.name))
+
+    def put(self, state: State, k: int) -> State:
+        """The state with option `k`; two axes that would be the same change places."""
+        if self.axis:
+            return replace(state, at={**state.at, self.name: k})
+        change: dict[str, Any] = {self.name: self.options[k]}
+        other = {"x": "y", "y": "x"}.get(self.name, "")
+        if other and getattr(state, other) == self.options[k]:
+            change[other] = getattr(state, self.name)
+        return replace(state, **change)
+
+
+def choices(source: Source) -> dict[str, Choice]:
+    """All that can be chosen of the map of a dataset, by name."""
+    counts = [n for n in _COUNTS if n in source.variables]
+    others = [n for n in source.variables if n not in counts]
+    words = [*(_COUNTS[n] for n in counts), *map(source.words, others)]
+    axes = source.dims, [source.words(d) for d in source.dims]
+    found = [Choice("show", "variable", [*counts, *others], words, len(counts))]
+    found.append(Choice("x", "horizontal axis", *axes))
+    if len(source.dims) > 1:
+        found.append(Choice("y", "vertical axis", *axes))
+    for name, axis in source.axes.items():
+        exact, short = ([f"{v:.{digits}g}" for v in axis.values] for digits in (12, 6))
+        found.append(Choice(name, source.words(name), exact, short, len(exact) * (len(exact) <= _BUTTONS), axis))
+    return {choice.name: choice for choice in found}
 
 
 def first(source: Source) -> State:
@@ -52,11 +107,11 @@ def first(source: Source) -> State:
 
 def write(state: State, source: Source, base: Cell) -> str:
     """The query of the address that opens `state`; of a cell it names what lies on an axis or differs from `base`."""
-    pairs = [("x", state.x), *([("y", state.y)] if state.y else []), ("show", state.show)]
-    pairs += [(d, f"{source.axes[d].values[i]:.12g}") for d, i in state.at.items() if d not in (state.x, state.y)]
+    told = [choice for name, choice in choices(source).items() if name not in (state.x, state.y)]
+    pairs = [(choice.name, choice.options[choice.of(state)]) for choice in told]
     for cell in state.cells:
-        told = {n: v for n, v in cell.items() if n in source.dims or v != base.get(n)}
-        pairs.append(("cell", ",".join(f"{n}:{v:.12g}" for n, v in told.items())))
+        named = {n: v for n, v in cell.items() if n in source.dims or v != base.get(n)}
+        pairs.append(("cell", ",".join(f"{n}:{v:.12g}" for n, v in named.items())))
     return urlencode(pairs, safe=":,")
 
 
@@ -71,82 +126,49 @@ def read(
     base : the parameters of a trajectory that a cell does not name; empty where none can be run
     known : what they are, by name
     """
-    state, faults = first(source), list[str]()
-    given = {key: values[-1] for key, values in query.items() if values}
-    axes = {}
-    for key in ("x", "y"):
-        if (name := given.pop(key, "")) in source.dims:
-            axes[key] = name
-        elif name:
-            faults.append(f"{key}={brief(name)}: no axis; allowed: {', '.join(source.dims)}")
-    if state.y:
-        x = axes.get("x", state.x)
-        others = [d for d in (axes.get("y"), state.y, state.x) if d and d != x]
-        state = replace(state, x=x, y=others[0])
-    if (name := given.pop("show", "")) in source.variables:
-        state = replace(state, show=name)
-    elif name:
-        faults.append(f"show={brief(name)}: no variable; allowed: {', '.join(source.variables)}")
-    cells = list(query.get("cell", ()))
-    given.pop("cell", None)
-    at = dict(state.at)
-    for key, text in given.items():
-        if key not in source.axes:
-            faults.append(f"{brief(key)}: unknown; allowed: x, y, show, cell, {', '.join(source.axes)}")
-        elif (index := _index(source, key, text)) is None:
-            values = source.axes[key].values
-            faults.append(f"{key}={brief(text)}: not on the axis; allowed: {values[0]:g} to {values[-1]:g}")
-        else:
-            at[key] = index
-    found = []
-    for text in cells[:MAX_CELLS]:
-        cell, wrong = _cell(text, base, known)
-        faults += wrong
-        if not wrong:
-            found.append(cell)
-    if len(cells) > MAX_CELLS:
-        faults.append(f"{len(cells)} cells; allowed: at most {MAX_CELLS}")
-    return replace(state, at=at, cells=tuple(found)), faults
+    state, faults, all_choices = first(source), list[str](), choices(source)
+    for key, values in query.items():
+        choice = all_choices.get(key)
+        if choice and (k := choice.find(values[-1])) is not None:
+            state = choice.put(state, k)
+        elif choice:
+            among = f"from {choice.options[0]} to {choice.options[-1]}" if choice.axis else ", ".join(choice.options)
+            faults.append(f"{key}={brief(values[-1])} is not there; choose {among}")
+        elif key != "cell":
+            faults.append(f"{brief(key)} is no part of an address; there are {', '.join(all_choices)} and cell")
+    asked = query.get("cell", ())
+    cells = [(text, _cell(text, base, known)) for text in asked[:MAX_CELLS]]
+    faults += [f"cell={brief(text)}: {cell}" for text, cell in cells if isinstance(cell, str)]
+    if len(asked) > MAX_CELLS:
+        faults.append(f"{len(asked)} cells are too many; the first {MAX_CELLS} are drawn")
+    return replace(state, cells=tuple(cell for _, cell in cells if not isinstance(cell, str))), faults
 
 
-def wrong_value(parameter: Parameter, value: float | None) -> str:
+def wrong_value(parameter: Parameter, value: float) -> str:
     """What is wrong with the value of a parameter; "" if nothing is."""
-    if value is not None and math.isfinite(value) and parameter.allows(value):
+    if math.isfinite(value) and parameter.allows(value):
         return ""
-    return f"{parameter.name}: {'not a number' if value is None else f'{value:g}'}; allowed: {parameter.allowed}"
+    return f"{parameter.name} has to be {parameter.allowed}"
 
 
-def _index(source: Source, axis: str, text: str) -> int | None:
-    values = source.axes[axis].values
-    number = _number(text)
-    slack = 1e-9 * max(abs(values[0]), abs(values[-1]))
-    if number is None or not values[0] - slack <= number <= values[-1] + slack:
-        return None
-    return source.axes[axis].nearest(number)
-
-
-def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> tuple[Cell, list[str]]:
+def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell | str:
+    """The cell that an address names, or what is wrong with it."""
+    if not base:
+        return "this file has no configuration from which a trajectory could be run"
     cell = dict(base)
-    return cell, list(_fill(cell, text, known))
-
-
-def _fill(cell: dict[str, float], text: str, known: Mapping[str, Parameter]) -> Iterator[str]:
-    if not cell:
-        yield f"cell={brief(text)}: this file has no configuration from which a trajectory could be run"
-        return
-    for pair in text.split(",", len(cell)):
+    for pair in text.split(",", len(base)):
         name, _, value = pair.partition(":")
         if name not in cell:
-            yield f"cell={brief(text)}: no parameter {brief(name)}; allowed: {', '.join(cell)}"
-        elif fault := wrong_value(known[name], _number(value)):
-            yield f"cell={brief(text)}: {fault}"
-        else:
-            cell[name] = float(value)
+            return f"{brief(name)} is no parameter; there are {', '.join(cell)}"
+        cell[name] = _number(value)
+        if fault := wrong_value(known[name], cell[name]):
+            return fault
+    return cell
 
 
-def _number(text: str) -> float | None:
+def _number(text: str) -> float:
+    """The number that a text spells, or else NaN."""
     try:
-        number = float(text) if len(text) <= 40 else math.nan
+        return float(text) if len(text) <= 40 else math.nan
     except ValueError:
-        return None
-    return number if math.isfinite(number) else None
+        return math.nan

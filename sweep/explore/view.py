@@ -11,16 +11,15 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.models import Column, ColumnDataSource, CustomJS, Div
 
-from sweep.explore import controls, export, figure, page
+from sweep.explore import controls, figure, page, saving
 from sweep.explore import state as states
-from sweep.explore.cells import News, Runner
 from sweep.explore.chosen import CellControls
 from sweep.explore.colours import CURVES
 from sweep.explore.controls import escaped
 from sweep.explore.curves import Curves
 from sweep.explore.drawn import Drawn
 from sweep.explore.lines import critical_lines
-from sweep.explore.saving import Saving
+from sweep.explore.runner import Job, Runner
 from sweep.explore.setup import Setup
 from sweep.explore.slices import Source
 from sweep.explore.state import Cell, State
@@ -30,34 +29,34 @@ from sweep.plots import labels
 _BESIDE = ("reversals", "reversals_predicted", "status")
 """What the pointer shows of a cell at once; the server adds everything else."""
 
+_NOTICE = {"background": "#1b2733", "border-radius": "8px", "box-shadow": "0 4px 18px #0004", "color": "white",
+           "max-width": "calc(100vw - 72px)", "padding": "8px 16px"}  # fmt: skip
+
 
 class View:
     """Everything on one page.  Each change goes through `_change`, which draws what differs and writes the address."""
 
     def __init__(
-        self,
-        document: Document,
-        source: Source,
-        setup: Setup | None,
-        runner: Runner,
+        self, document: Document, source: Source, setup: Setup | None, runner: Runner | None,
         query: Mapping[str, Sequence[str]],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._document, self._source, self._setup = document, source, setup
         self._base: Cell = setup.base if setup else {}
         self._known = setup.config.table if setup else PARAMETERS
         self.state, self._faults = states.read(query, source, self._base, self._known)
         self._shown: figure.Map | None = None
         self._build()
-        self._drawn = Drawn(self.state.cells, setup, runner, self._tell)
+        self._drawn = Drawn(self.state.cells, runner, self._tell)
         self._draw_map()
         self._draw_cells()
+        page.dress(document, source, self._query())
         document.on_session_destroyed(lambda _: self._drawn.leave())
 
     # ---- parts of the page
 
     def _build(self) -> None:
-        self._address = ColumnDataSource({"query": [""]}, name="address")
-        self._address.js_on_change("data", CustomJS(code="sweep.address(cb_obj.data.query[0])"))
+        self._calls = ColumnDataSource({"name": [], "given": []}, name="calls")
+        self._calls.js_on_change("data", CustomJS(code="sweep.called(cb_obj.data)"))
         self._probe = ColumnDataSource({"i": [-1], "j": [-1]}, name="probe")
         controls.on(self._probe, "data", lambda _: self._point())
         self._request = ColumnDataSource({"i": [-1], "j": [-1], "add": [False], "count": [0]}, name="request")
@@ -65,29 +64,27 @@ class View:
         self._map = Column(sizing_mode="stretch_width", name="map")
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._cell = Div(sizing_mode="stretch_width", name="cell")
-        self._notice = Div(name="notice", styles={"color": "white"})
-        self._notice.js_on_change("text", CustomJS(code="sweep.notice(cb_obj.text)"))
-        args = {"address": self._address, "notice": self._notice}
-        code = "sweep.address(address.data.query[0]); sweep.notice(notice.text)"
-        self._document.js_on_event("document_ready", CustomJS(args=args, code=code))
+        self._notice = Div(name="notice", styles=_NOTICE)
         self._figures = Curves()
         self._controls = controls.MapControls(self._source, self._change)
         self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
         self._hint = Div(text=controls.EMPTY, sizing_mode="stretch_width")
-        plots = (self._figures.spin, self._figures.energy)
-        curves = Column(self._hint, *plots, sizing_mode="stretch_width", name="curves")
-        path = Column(self._figures.path, self._figures.player, sizing_mode="stretch_width", name="path")
-        self._shown_with = {"spin": plots[:1], "energy": plots[1:], "contact_x": path.children}
-        self._saving = Saving(
-            self._source, self._netcdf, self._yaml if self._setup else None, self._map,
-            [self._figures.spin, self._figures.energy, self._figures.path],
-        )  # fmt: skip
-        # The address travels with a root: what a callback of the document alone refers to is not kept up to date.
-        self._saving.root.tags = [self._address]
-        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, path,
-                     self._chosen.root, self._saving.root):  # fmt: skip
+        spin, energy, path, player = (getattr(self._figures, name) for name in ("spin", "energy", "path", "player"))
+        curves = Column(self._hint, spin, energy, sizing_mode="stretch_width", name="curves")
+        paths = Column(path, player, sizing_mode="stretch_width", name="path")
+        self._shown_with = {"spin": [spin], "energy": [energy], "contact_x": [path, player]}
+        files = {"nc": self._netcdf, "yaml": self._yaml} if self._setup else {"nc": self._netcdf}
+        name = saving.stem(self._source)
+        save = saving.buttons(name, self._map, [spin, energy, path], files, self._call)
+        # It travels with a root: what a callback of the document alone refers to is not kept up to date.
+        save.tags = [self._calls]
+        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, paths,
+                     self._chosen.root, save):  # fmt: skip
             self._document.add_root(root)
-        page.dress(self._document, self._source, live=True)
+
+    def _call(self, name: str, *given: Any) -> None:
+        """Call a function of page.js."""
+        self._calls.data = {"name": [name], "given": [given]}
 
     # ---- the map
 
@@ -108,30 +105,24 @@ class View:
         if self._shown is None or self._shown.axes != (state.x, state.y):
             self._shown = figure.Map(self._source, part.x, part.y, self._probe, self._request)
             self._map.children = [self._shown.figure]
-            controls.on(self._shown.cursor, "data", lambda _: self._point())
         self._part = part
         self._legend.text = page.legend(part, self._shown.show(part, columns, lines), lines)
         self._controls.show(state)
 
-    def _index(self, i: int, j: int) -> dict[str, int] | None:
-        """The index of a cell of the map on every axis; None for a place without a cell."""
+    def _place(self, source: ColumnDataSource) -> dict[str, int] | None:
+        """The index on every axis of the cell that the browser wrote into `source`, which may be anything."""
+        data = [source.data.get(key) for key in ("i", "j")]
+        if not all(isinstance(d, list | np.ndarray) and len(d) and isinstance(d[0], int | np.integer) for d in data):
+            return None
+        i, j = (int(d[0]) for d in data)
         if not (0 <= i < len(self._part.x.values) and 0 <= j < len(self._part.y.values)):
             return None
         index = {**self.state.at, self.state.x: i}
         return {**index, self.state.y: j} if self.state.y else index
 
-    def _place(self, source: ColumnDataSource) -> dict[str, int] | None:
-        """The cell that the browser wrote into `source`, which may be anything."""
-        data = [source.data.get(key) for key in ("i", "j")]
-        if not all(isinstance(d, list | np.ndarray) and len(d) and isinstance(d[0], int | np.integer) for d in data):
-            return None
-        return self._index(int(data[0][0]), int(data[1][0]))
-
     def _point(self) -> None:
         """Tell about the cell under the pointer, or else about the chosen one."""
         index = self._place(self._probe)
-        if index is None and self._shown:
-            index = self._place(self._shown.cursor)
         if index is None:
             self._cell.text = controls.HINT if self._setup else controls.still(self._source)
             return
@@ -141,32 +132,29 @@ class View:
     # ---- the cells whose trajectories are drawn
 
     def _requested(self) -> None:
-        """A click, or Enter: run the cell."""
+        """Run the cell that was clicked, or chosen with Enter."""
         index = self._place(self._request)
         if index is None or not self._setup:
             return
         cell = {**self._setup.base, **self._source.parameters_at(tuple(self._setup.base), index)}
-        self._add(cell, beside=bool(self._request.data["add"][0]) or self._chosen.keeps)
-
-    def _add(self, cell: Cell, *, beside: bool) -> None:
         if cell in self._drawn.cells:
             self._activate(self._drawn.cells.index(cell))
             return
         self._faults = []
-        self._drawn.add(cell, beside=beside)
+        self._drawn.add(cell, beside=bool(self._request.data["add"][0]) or self._chosen.keeps)
         self._draw_cells()
 
     def _edit(self, name: str, value: float) -> None:
         """Run the active cell with another value of a parameter."""
-        if not self._drawn.cells or not self._setup:
+        if not self._drawn.cells:
             return
-        if fault := states.wrong_value(self._known[name], value):
-            self._faults = [fault]
+        fault = states.wrong_value(self._known[name], value)
+        self._faults = [fault] if fault else []
+        if fault:
             self._draw_progress()
-            return
-        self._faults = []
-        self._drawn.change({**self._drawn.cells[self._drawn.active], name: value})
-        self._draw_cells()
+        else:
+            self._drawn.change({**self._drawn.cells[self._drawn.active], name: value})
+            self._draw_cells()
 
     def _activate(self, k: int) -> None:
         self._drawn.active = k
@@ -176,19 +164,19 @@ class View:
         self._drawn.remove(k)
         self._draw_cells()
 
-    def _tell(self, key: int, news: News) -> None:
-        """Called on the thread of the trajectories."""
-        self._document.add_next_tick_callback(partial(self._hear, key, news))
+    def _tell(self, job: Job) -> None:
+        """Take news of a run, on the thread of the trajectories."""
+        self._document.add_next_tick_callback(partial(self._hear, job))
 
-    def _hear(self, key: int, news: News) -> None:
-        if self._drawn.hear(key, news):
-            self._faults = [news.fault] if news.fault else self._faults
-            if news.curve:
+    def _hear(self, job: Job) -> None:
+        if self._drawn.hear(job):
+            self._faults = [job.fault] if job.fault else self._faults
+            if job.curve:
                 self._draw_curves()
             self._draw_progress()
 
     def _draw_cells(self) -> None:
-        """The list of cells, their pins on the map, the curves and the address."""
+        """Draw the list of cells, their pins on the map and the curves, and write the address."""
         cells, source = self._drawn.cells, self._source
         self.state = replace(self.state, cells=tuple(cells))
         self._chosen.show(cells, self._names(), self._drawn.active)
@@ -206,20 +194,20 @@ class View:
         self._draw_curves()
         self._draw_progress()
         self._point()
-        self._address.data = {"query": [self._query()]}
+        self._call("address", self._query())
 
     def _draw_curves(self) -> None:
+        curves = self._drawn.curves
         names = [
-            f"{k + 1}: {name}" + (f", {labels.reversals(len(curve.reversals))}" if curve else "")
-            for k, (name, curve) in enumerate(zip(self._names(), self._drawn.curves, strict=True))
+            f"{k}: {name}" + (f", {labels.reversals(len(curve.reversals))}" if curve else "")
+            for k, (name, curve) in enumerate(zip(self._names(), curves, strict=True), 1)
         ]
-        self._hint.visible = not any(self._drawn.curves)
-        drawn = [curve.dataset for curve in self._drawn.curves if curve]
+        self._hint.visible = not any(curves)
         for series, parts in self._shown_with.items():
             for part in parts:
-                part.visible = any(series in one for one in drawn)
-        self._figures.show(self._drawn.curves, names, self._drawn.active)
-        self._chosen.tell(self._drawn.curves)
+                part.visible = any(series in curve.dataset for curve in curves if curve)
+        self._figures.show(curves, names, self._drawn.active)
+        self._chosen.tell(curves)
 
     def _names(self) -> list[str]:
         """What tells the cells apart."""
@@ -230,12 +218,11 @@ class View:
 
     def _draw_progress(self) -> None:
         names = self._names()
-        told = [f'<div class="fault">{escaped(fault)}</div>' for fault in self._faults]
-        lines = [
-            controls.progress(f"{names[k]}: {news.note or f'{news.share:.0%}'}", news.share)
-            for k, news in self._drawn.running()
-        ]
-        self._notice.text = "".join([*told, *lines])
+        told = [f"<div>{escaped(fault)}</div>" for fault in self._faults]
+        for k, job in self._drawn.running():
+            told.append(controls.progress(f"{names[k]}: {job.delay or f'{job.share:.0%}'}", job.share))
+        self._notice.text = "".join(told)
+        self._notice.visible = bool(told)
 
     # ---- files
 
@@ -243,17 +230,19 @@ class View:
         return states.write(self.state, self._source, self._base)
 
     def _netcdf(self) -> bytes:
-        return export.netcdf(self._source, self._query(), self.state, [curve for curve in self._drawn.curves if curve])
+        return saving.netcdf(self._source, self._query(), self.state, [curve for curve in self._drawn.curves if curve])
 
     def _yaml(self) -> bytes:
         assert self._setup
-        return export.yaml(self._source, self._setup, self.state, f"{self._saving.stem}.yaml").encode()
+        return saving.yaml(self._source, self._setup, self.state).encode()
 
 
-def make(source: Source, setup: Setup | None, runner: Runner) -> Callable[[Document], None]:
+def make(source: Source, setup: Setup | None) -> Callable[[Document], None]:
     """What fills the document of each visitor."""
-    if setup:
-        runner.warm_up(setup)
+    runner = Runner(setup) if setup else None
+    if setup and runner:
+        # Compiles the simulation, or loads it from the cache, before the first click needs it.
+        runner.submit(Job(setup.base, lambda _: None))
 
     def fill(document: Document) -> None:
         request: Any = document.session_context.request if document.session_context else None

@@ -14,7 +14,7 @@ from support.own import PENDULUM
 
 import sweep
 from sweep.config import ConfigError
-from sweep.explore import cells, export, state
+from sweep.explore import runner, saving, state
 from sweep.explore.setup import Setup, usable, why_still
 from sweep.explore.slices import Source, open_source
 from sweep.explore.state import State
@@ -58,7 +58,7 @@ def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, 
     (words,) = said
     assert words.startswith(f"running the code of {folder / 'pendulum.py'} (SHA-256 ")
     index = {"damping": 1, "torque": 2}
-    curve = cells.run(setup, {**setup.base, **source.parameters_at(tuple(setup.base), index)})
+    curve = runner.run(setup, {**setup.base, **source.parameters_at(tuple(setup.base), index)})
     for name in ("reversals", "t_stop", "spin_final"):
         assert curve.dataset[name].item() == source.dataset[name].isel(index).item()
     assert len(curve.reversals) == curve.dataset["reversals"] > 5
@@ -121,12 +121,12 @@ def test_cells_in_an_address_know_its_parameters(source: Source, setup: Setup) -
     assert not faults
     assert shown.cells[0] == {"damping": 0.3, "torque": 1.1, "angle": 0.5}
     _, faults = state.read({"cell": ["torque:-1"]}, source, setup.base, known)
-    assert faults == ["cell=torque:-1: torque: -1; allowed: a finite number >= 0 and < 10"]
+    assert faults == ["cell=torque:-1: torque has to be a finite number >= 0 and < 10"]
 
 
 def test_its_files_make_what_is_seen(source: Source, setup: Setup, tmp_path: Path) -> None:
     cell = {**setup.base, "torque": 1.2, "damping": 0.5}
-    text = export.yaml(source, setup, State("torque", "damping", "reversals", {}, (cell,)), "saved.yaml")
+    text = saving.yaml(source, setup, State("torque", "damping", "reversals", {}, (cell,)))
     (tmp_path / "saved.yaml").write_text(text, encoding="utf-8")
     again = sweep.run(tmp_path / "saved.yaml")
     np.testing.assert_array_equal(again["reversals"], source.dataset["reversals"])

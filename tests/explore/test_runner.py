@@ -10,11 +10,13 @@ import pytest
 import xarray as xr
 
 import sweep
-from sweep.explore import cells, export
-from sweep.explore.cells import COMPILING, News, Runner
+from sweep.engine.reporter import Progress
+from sweep.explore import runner, saving
+from sweep.explore.runner import COMPILING, Curve, Job, Runner
 from sweep.explore.setup import Setup, usable
 from sweep.explore.slices import Source, open_source
-from sweep.explore.state import State
+from sweep.explore.state import Cell, State
+from sweep.jit import compiling
 from sweep.kernels.status import LIFT_OFF
 
 
@@ -32,26 +34,26 @@ def cell_at(source: Source, setup: Setup, **index: int) -> dict[str, float]:
     return {**setup.base, **source.parameters_at(tuple(setup.base), index)}
 
 
-class Listener:
-    """Collects what a run tells, and waits for its end."""
+class Heard(Job):
+    """A job that remembers what it was delayed by when it told news, and can be waited for."""
 
-    def __init__(self) -> None:
-        self.news = list[News]()
-        self._ended = threading.Event()
+    def __init__(self, cell: Cell) -> None:
+        super().__init__(cell, self._hear)
+        self.delays, self._ended = list[str](), threading.Event()
 
-    def __call__(self, news: News) -> None:
-        self.news.append(news)
-        if news.curve or news.fault:
+    def _hear(self, job: Job) -> None:
+        self.delays.append(job.delay)
+        if job.curve or job.fault:
             self._ended.set()
 
-    def wait(self) -> News:
-        assert self._ended.wait(60), self.news
-        return self.news[-1]
+    def wait(self) -> Job:
+        assert self._ended.wait(60), self.delays
+        return self
 
 
 def test_a_trajectory_has_the_sweeps_numbers(source: Source, setup: Setup, opened: xr.Dataset) -> None:
     index = {"mu": 3, "b": 2, "n0": 1}
-    curve = cells.run(setup, cell_at(source, setup, **index))
+    curve = runner.run(setup, cell_at(source, setup, **index))
     cell = opened.isel(index)
     for name in ("reversals", "t_stop", "spin_final"):
         assert curve.dataset[name].item() == cell[name].item()
@@ -63,73 +65,68 @@ def test_long_trajectories_are_sampled_sparsely(
     source: Source, setup: Setup, monkeypatch: pytest.MonkeyPatch
 ) -> None:  # fmt: skip
     cell = cell_at(source, setup, mu=3, b=2, n0=1)
-    whole = cells.run(setup, cell).dataset
-    monkeypatch.setattr(cells, "SAMPLES", 500)
-    sparse = cells.run(setup, cell).dataset
+    whole = runner.run(setup, cell).dataset
+    monkeypatch.setattr(runner, "SAMPLES", 500)
+    sparse = runner.run(setup, cell).dataset
     assert whole.sizes["time"] > 2000
     assert 450 < sparse.sizes["time"] < 600
     assert sparse["spin"].values[-1] == whole["spin"].values[-1]
 
 
 def test_what_cannot_be_run_is_told(setup: Setup) -> None:
-    listener = Listener()
-    Runner().submit(1, setup, {**setup.base, "x0": 50.0}, listener)
-    assert "x0" in listener.wait().fault
+    job = Heard({**setup.base, "x0": 50.0})
+    Runner(setup).submit(job)
+    assert "x0" in job.wait().fault
 
 
-def test_a_newer_request_replaces_the_older(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The running one ends at its next chunk, the waiting one is never begun, and neither is heard of again."""
-    begun, go_on = list[float](), threading.Event()
+def test_nothing_is_heard_of_dropped_jobs(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The running one ends at its next chunk, and the waiting one is never begun."""
+    begun, inside, go_on = list[float](), threading.Event(), threading.Event()
 
-    def slow(_: Setup, cell: cells.Cell, reporter: Runner) -> cells.Curve:
+    def slow(_: Setup, cell: Cell, reporter: Job) -> Curve:
         begun.append(cell["mu"])
-        if len(begun) == 1:
-            assert go_on.wait(60)
-        reporter.chunk(cells.Progress(1, 0.5, 0, 0, 1.0))
-        return cells.Curve(cell, xr.Dataset(), np.zeros(0), 0.0)
+        inside.set()
+        assert go_on.wait(60)
+        reporter.chunk(Progress(1, 0.5, 0, 0, 1.0))
+        return Curve(xr.Dataset(), np.zeros(0), 0.0)
 
-    monkeypatch.setattr(cells, "run", slow)
-    runner, listeners = Runner(), [Listener() for _ in range(3)]
-    runner.submit("a", setup, {"mu": 1.0}, listeners[0])
-    while not begun:
-        pass
-    runner.submit("a", setup, {"mu": 2.0}, listeners[1])
-    runner.submit("a", setup, {"mu": 3.0}, listeners[2])
+    monkeypatch.setattr(runner, "run", slow)
+    running, first, second, third = Runner(setup), *(Heard({"mu": mu}) for mu in (1.0, 2.0, 3.0))
+    for job in (first, second, third):
+        running.submit(job)
+    assert inside.wait(60)
+    first.dropped = second.dropped = True
     go_on.set()
-    curve = listeners[2].wait().curve
-    assert curve
-    assert curve.cell == {"mu": 3.0}
+    assert third.wait().curve
     assert begun == [1.0, 3.0]
-    assert not listeners[0].news
-    assert not listeners[1].news
+    assert first.delays + second.delays == []
 
 
 def test_compiling_is_announced_to_all_who_wait(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sweep.jit import compiling
-
     inside, go_on = threading.Event(), threading.Event()
 
-    def compile_first(_: Setup, cell: cells.Cell, _reporter: Runner) -> cells.Curve:
+    def compile_first(*_: object) -> Curve:
         with compiling():
             inside.set()
             assert go_on.wait(60)
-        return cells.Curve(cell, xr.Dataset(), np.zeros(0), 0.0)
+        return Curve(xr.Dataset(), np.zeros(0), 0.0)
 
-    monkeypatch.setattr(cells, "run", compile_first)
-    runner, first, second = Runner(), Listener(), Listener()
-    runner.submit(1, setup, {"mu": 1.0}, first)
+    monkeypatch.setattr(runner, "run", compile_first)
+    running, first, second = Runner(setup), Heard({"mu": 1.0}), Heard({"mu": 2.0})
+    running.submit(first)
     assert inside.wait(60)
-    runner.submit(2, setup, {"mu": 2.0}, second)
-    assert [news.note for news in (*first.news, *second.news)] == [COMPILING, COMPILING]
+    running.submit(second)
+    assert [first.delays, second.delays] == [[COMPILING], [COMPILING]]
     go_on.set()
     assert second.wait().curve
+    assert not second.delay
 
 
 def test_the_files_make_what_is_seen(source: Source, setup: Setup, opened: xr.Dataset, tmp_path: Path) -> None:
     cell = cell_at(source, setup, mu=3, b=2, n0=1)
     state = State("mu", "b", "reversals", {"n0": 1}, (cell,))
     saved = tmp_path / "saved.nc"
-    saved.write_bytes(export.netcdf(source, "x=mu", state, [cells.run(setup, cell)]))
+    saved.write_bytes(saving.netcdf(source, "x=mu", state, [runner.run(setup, cell)]))
     with xr.open_dataset(saved, decode_times=False) as part:
         xr.testing.assert_equal(part.load(), opened.isel(n0=1))
         assert part.attrs["explored"] == "x=mu"
@@ -137,13 +134,13 @@ def test_the_files_make_what_is_seen(source: Source, setup: Setup, opened: xr.Da
         assert float(dense["spin_final"]) == opened["spin_final"].isel(mu=3, b=2, n0=1)
 
     config = tmp_path / "saved.yaml"
-    config.write_text(export.yaml(source, setup, state, "saved.yaml"), encoding="utf-8")
+    config.write_text(saving.yaml(source, setup, state), encoding="utf-8")
     again = sweep.run(config)
     sound = opened["status"].isel(n0=1) != LIFT_OFF
     assert sound.sum() == 19
     np.testing.assert_array_equal(again["spin_final"].where(sound), opened["spin_final"].isel(n0=1).where(sound))
     (line,) = [line for line in config.read_text().splitlines() if "trajectory" in line]
-    assert line == "# python -m sweep trajectory saved.yaml --at b=4 --at mu=70"
+    assert line == "# python -m sweep trajectory tiny_explored.yaml --at b=4 --at mu=70"
 
 
 def test_cases_are_run_with_their_own_parameters(tmp_path: Path) -> None:
@@ -155,7 +152,7 @@ def test_cases_are_run_with_their_own_parameters(tmp_path: Path) -> None:
     setup = Setup(source)
     cell = cell_at(source, setup, case=1)
     assert (cell["mu"], cell["b"]) == (70, 4)
-    assert cells.run(setup, cell).dataset["spin_final"].item() == dataset["spin_final"][1].item()
+    assert runner.run(setup, cell).dataset["spin_final"].item() == dataset["spin_final"][1].item()
 
 
 @pytest.mark.parametrize("text", ["", "colour: red\n", "model: analytic\nfriction: {mu: [1, 2]}\n"])

@@ -1,0 +1,155 @@
+"""Runs the trajectories of single cells in a thread of their own, while the page stays responsive."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from queue import SimpleQueue
+
+import xarray as xr
+
+from sweep.config import Config, ConfigError, Values
+from sweep.config.faults import printable
+from sweep.engine.reporter import Progress, Reporter
+from sweep.explore.setup import Setup
+from sweep.explore.state import Cell
+from sweep.grid import Array
+from sweep.jit import showing
+from sweep.kernels import measures
+from sweep.plots.trajectories import reversal_times
+from sweep.studies.trajectory import trajectory
+
+SAMPLES = 60_000
+"""Samples of a trajectory at most, about: more are no longer drawn fluently."""
+
+COMPILING = "compiling the simulation for this machine; later runs find it in the cache"
+
+_KEPT = 64
+"""Trajectories that are remembered."""
+
+_TELL_EVERY = 0.1
+"""Seconds between two reports of progress."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A trajectory that was run."""
+
+    dataset: xr.Dataset
+    """As `sweep.trajectory` gives it, without the dimension `trajectory`."""
+    reversals: Array
+    """Times of the reversals, in the unit of the dataset."""
+    seconds: float
+    """The time that the run took."""
+
+
+class Dropped(Exception):
+    """Nobody waits for this trajectory any more."""
+
+
+@dataclass(eq=False)
+class Job(Reporter):
+    """A trajectory that somebody waits for; `tell` is called with it, on the runner's thread, at all news of it."""
+
+    cell: Cell
+    tell: Callable[[Job], None]
+    share: float = 0.0
+    """How much of the run is over."""
+    delay: str = ""
+    """Why it does not get on, if it does not."""
+    curve: Curve | None = None
+    fault: str = ""
+    """Why there will be no curve."""
+    dropped: bool = False
+    """Set by whoever no longer waits: the run is not begun, or ends at its next chunk, and nothing more is told."""
+    _told: float = 0.0
+
+    def news(self, delay: str = "") -> None:
+        """Tell that something has changed, unless nobody waits."""
+        self.delay, self._told = delay, time.perf_counter()
+        if not self.dropped:
+            self.tell(self)
+
+    def chunk(self, progress: Progress) -> None:
+        """Tell how far the run is; ends it by `Dropped` if nobody waits."""
+        if self.dropped:
+            raise Dropped
+        self.share = progress.done / progress.cells
+        if time.perf_counter() - self._told > _TELL_EVERY:
+            self.news()
+
+
+def run(setup: Setup, cell: Cell, reporter: Reporter | None = None) -> Curve:
+    """Run the trajectory of a cell, with the usual measurements, sampled as densely as `SAMPLES` allow."""
+    began = time.perf_counter()
+    parameters = {name: Values((value,), False, value) for name, value in cell.items()}
+    config = replace(setup.config, parameters=parameters, measure=measures.default(setup.config.equations))
+    one = trajectory(config, every=_interval(config, reporter), reporter=reporter).isel(trajectory=0)
+    return Curve(one, reversal_times(one), time.perf_counter() - began)
+
+
+def _interval(config: Config, reporter: Reporter | None) -> float | None:
+    """The time between samples that keeps a long trajectory to `SAMPLES`; None where the usual one does."""
+    if config.integrator.t_end <= SAMPLES / 2:
+        return None
+    stop = float(trajectory(config, every=config.integrator.t_end, reporter=reporter)["t_stop"][0])
+    return None if stop <= SAMPLES / 2 else stop / SAMPLES
+
+
+class Runner:
+    """Runs one trajectory after the other, in the order in which they are asked for."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._jobs: SimpleQueue[Job] = SimpleQueue()
+        self._known: dict[tuple[tuple[str, float], ...], Curve] = {}
+        self._running: Job | None = None
+        self._compiles = False
+        # Not waited for at the end of the program: a chunk of a kernel cannot be interrupted.
+        threading.Thread(target=self._work, daemon=True, name="trajectories").start()
+
+    def submit(self, job: Job) -> None:
+        """Run a trajectory as soon as those asked for before are over."""
+        self._jobs.put(job)
+        if self._compiles:
+            job.news(COMPILING)
+
+    def _work(self) -> None:
+        with showing(self._compiling):
+            while True:
+                self._running = self._jobs.get()
+                self._finish(self._running)
+
+    def _finish(self, job: Job) -> None:
+        try:
+            job.curve = self._curve(job)
+        except Dropped:
+            return
+        except ConfigError as error:
+            job.fault = error.faults[0].message if error.faults else str(error)
+        except Exception as error:  # told on the page: this thread has to go on
+            job.fault = printable(f"{type(error).__name__}: {error}")
+        job.news()
+
+    def _curve(self, job: Job) -> Curve:
+        if job.dropped:
+            raise Dropped
+        key = tuple(sorted(job.cell.items()))
+        if key not in self._known:
+            self._known[key] = run(self._setup, job.cell, job)
+            if len(self._known) > _KEPT:
+                del self._known[next(iter(self._known))]
+        return self._known[key]
+
+    @contextmanager
+    def _compiling(self) -> Iterator[None]:
+        self._compiles = True
+        if self._running:
+            self._running.news(COMPILING)
+        try:
+            yield
+        finally:
+            self._compiles = False
