@@ -106,7 +106,8 @@ class _Widgets:
             self._more = _slider(choice)
             on(self._more, "value_throttled", pick)
         elif n < len(choice.options):
-            named = [*([("", f"another {choice.title} …")] if n else []), *zip(choice.options[n:], choice.words[n:], strict=True)]
+            hint = [("", f"another {choice.title} …")] if n else []
+            named = [*hint, *zip(choice.options[n:], choice.words[n:], strict=True)]
             self._more = Select(title=title, options=named, value="", width=250 if n else 150, name=name,
                                 stylesheets=[BARE])  # fmt: skip
             on(self._more, "value", lambda option: pick(choice.find(option)))

@@ -10,6 +10,7 @@ from typing import Any
 
 from bokeh.application import Application
 from bokeh.application.handlers import FunctionHandler
+from bokeh.resources import Resources
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
 from bokeh.server.util import bind_sockets
@@ -54,12 +55,20 @@ def start(source: Source, setup: Setup | None, port: int | None, loop: IOLoop) -
     sockets, found = _bind(port)
     hosts = [f"{host}:{found}" for host in ("localhost", ADDRESS)]
     application = Application(FunctionHandler(view.make(source, setup)))
-    web = BokehTornado({"/": application}, extra_websocket_origins=hosts, absolute_url=f"http://{hosts[0]}/")
+    web = _Web({"/": application}, extra_websocket_origins=hosts, absolute_url=f"http://{hosts[0]}/")
     http = HTTPServer(web)
     http.add_sockets(sockets)
     server = BaseServer(loop, web, http)
     server.start()
     return server, found
+
+
+class _Web(BokehTornado):  # type: ignore[misc]  # Bokeh tells no types of it
+    """Sends only those of Bokeh's scripts that the page uses; its formulas and tables would be more than the rest."""
+
+    def resources(self, absolute_url: str | bool | None = None) -> Resources:
+        resources: Resources = super().resources(absolute_url)
+        return resources.clone(components=["bokeh", "bokeh-widgets"])
 
 
 def _bind(port: int | None) -> tuple[list[Any], int]:
