@@ -64,7 +64,7 @@ def test_newton_solves_the_stiff_slip(v1: float, v2: float, mu: float, away1: fl
     gamma = 0.05
 
     def slip_rate(v: np.ndarray) -> np.ndarray:
-        y = stiff_slip.velocities(np.array([*split[:5], *v]), p)
+        y = stiff_slip.PAPER_FORM.velocities(np.array([*split[:5], *v]), p)
         return np.array(slip.rhs(y, p)[0][5:])
 
     base = np.array([v1, v2]) - gamma * slip_rate(np.array([v1, v2]))  # so that (v1, v2) is the solution

@@ -126,7 +126,7 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
     assert (reached[~ended] > begin[~ended, ADAMS.row("begin")]).all()
     assert set(status) == {RUNNING, LIFT_OFF}
     # They keep sound states, those of the start.
-    states = np.stack(stiff_slip.start(body), axis=-1)
+    states = np.stack(stiff_slip.STIFF_MODEL.start(body), axis=-1)
     np.testing.assert_allclose(begin[ended, :7], states[ended], rtol=1e-14, atol=1e-14)
 
 

@@ -15,6 +15,7 @@ from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.ladder import slip
 from sweep.models.model import stack, take
 from sweep.models.stiff import slip as stiff_slip
+from sweep.models.stiff.form import subset
 from sweep.models.stiff.modes import RATTLE, Rattle, bending
 from sweep.models.theory import linear, stability
 
@@ -45,7 +46,7 @@ def carried(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 def resolved(size: float, **parameters: Any) -> tuple[Rattle, np.ndarray, stiff_slip.Constants, dict[str, np.ndarray]]:
     body = columns(x0=size, y0=size, **parameters)
-    states, constants = stack(stiff_slip.start(body)), stiff_slip.Constants.of(body)
+    states, constants = stack(stiff_slip.STIFF_MODEL.start(body)), stiff_slip.Constants.of(body)
     return Rattle.of(states, constants), states, constants, body
 
 
@@ -78,7 +79,7 @@ def test_energies_of_the_modes_add_up() -> None:
     np.testing.assert_allclose(energies.sum(axis=1), 2 * whole / inertia, rtol=0.1)
     np.testing.assert_allclose(
         rattle.rates.real.max(axis=1),
-        linear.growth_rate(slip.MODEL, stiff_slip.slip_constants(constants), np.array([0.05, -0.02, 0.001])),
+        linear.growth_rate(slip.MODEL, subset(slip.Constants, constants), np.array([0.05, -0.02, 0.001])),
         rtol=1e-9,
     )
 

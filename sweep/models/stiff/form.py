@@ -7,15 +7,49 @@ it, so neither friction nor the normal force appears in u' and M'.  See `sweep.m
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
-from sweep.models.model import Array, Columns, Model
+import numpy as np
+
+from sweep.models.model import Array, Columns, Model, Ripple
+
+STATES = ("u1", "u2", "M1", "M2", "M3", "v1", "v2")
+
+
+class Geometry(NamedTuple):
+    """What `slow` computes on its way and `newton` needs as well; components along the body axes."""
+
+    u3: Any
+    x: Any
+    """Contact point x_p."""
+    y: Any
+    z: Any
+    t1: Any
+    """u1/u3; t2 is u2/u3, so that v3 = -(t1 v1 + t2 v2)."""
+    t2: Any
+    v3: Any
+    w1: Any
+    """ω."""
+    w2: Any
+    w3: Any
+    du1: Any
+    """u'."""
+    du2: Any
+    du3: Any
+    s1: Any
+    """s = v_0 - x_p'."""
+    s2: Any
+    s3: Any
+    q1: Any
+    """u × x_p."""
+    q2: Any
+    q3: Any
 
 
 @dataclass(frozen=True)
 class StiffForm:
-    """A model with slip in the variables (u1, u2, M1, M2, M3, v1, v2)."""
+    """A model with slip in the variables `STATES`."""
 
     full: Model
     """The model as the configuration names it."""
@@ -23,8 +57,6 @@ class StiffForm:
     """The same in these variables; its constants `p` contain those of `full`."""
     momentum: Callable[..., Any]
     """Inline, (states of `full`, p) -> states."""
-    velocities: Callable[[Array, Any], Array]
-    """(states, of shape (7, cells); p) -> states of `full`, of the same shape."""
     slow: Callable[..., Any]
     """Inline, (states one by one, p) -> ((u1', u2', M1', M2', M3'), geometry), where `newton` needs the latter."""
     newton: Callable[..., Any]
@@ -49,3 +81,32 @@ class StiffForm:
     """(columns) -> bound on the rate at which couples damp the angular velocity, shape (cells,)."""
     resolves_modes: bool
     """Whether `sweep.models.stiff.modes` can resolve a small rattle of it into its modes."""
+
+    def velocities(self, y: Array, p: Any) -> Array:
+        """The states of `full` from these, shape (7, cells): the inverse of `momentum`."""
+        return _velocities(self.slow, y, p)
+
+
+def subset(constants: type[Any], p: Any) -> Any:
+    """Those of the constants `p` that another model has, as its record."""
+    return constants(*(getattr(p, name) for name in constants._fields))
+
+
+def in_momentum(full: Model, constants: type[Any], momentum: Any, slow: Any, energy: Any, ripple: Ripple) -> Model:
+    """The model `full` in the variables `STATES`; the other arguments are as of `StiffForm` and `Model`."""
+
+    def start(columns: Columns) -> tuple[Array, ...]:
+        states: tuple[Array, ...] = momentum(full.start(columns), constants.of(columns))
+        return states
+
+    def observe(y: Array, p: Any) -> dict[str, Array]:
+        return full.observe(_velocities(slow, y, p), subset(full.constants, p))
+
+    return replace(
+        full, states=STATES, constants=constants, start=start, energy=energy, observe=observe, ripple=ripple
+    )  # fmt: skip
+
+
+def _velocities(slow: Any, y: Array, p: Any) -> Array:
+    _, geometry = slow(*y, p)
+    return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))

@@ -13,7 +13,6 @@ A couple in proportion to the normal force would make M' stiff too: there is no 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -29,13 +28,10 @@ from sweep.models.general.resistance import resistances
 from sweep.models.general.rigid_body import gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.model import Array, Columns, Model, Ripple, named
-from sweep.models.stiff.form import StiffForm
-from sweep.models.stiff.slip import Geometry
+from sweep.models.stiff.form import Geometry, StiffForm, in_momentum
 
 ROCKING = ("B11", "B12", "B21", "B22", "C12", "C21")
 """Elements of B and C in u' = B M, M' = C u: rocking about upright rest without slip.  C has no others."""
-
-STATES = ("u1", "u2", "M1", "M2", "M3", "v1", "v2")
 
 
 def form_of(model: Model) -> StiffForm | None:
@@ -148,30 +144,11 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
         return general_energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
 
-    def velocities(y: Array, p: Any) -> Array:
-        _, geometry = slow(*y, p)
-        return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))
-
-    def full_constants(p: Any) -> Any:
-        return full.constants(*(getattr(p, name) for name in full.constants._fields))
-
-    def start(columns: Columns) -> tuple[Array, ...]:
-        states: tuple[Array, ...] = momentum(full.start(columns), Constants.of(columns))
-        return states
-
+    ripple = Ripple(general_ripple.NAMES, lambda columns: general_ripple.form(columns, surface), _ripple)
     return StiffForm(
         full=full,
-        model=replace(
-            full,
-            states=STATES,
-            constants=Constants,
-            start=start,
-            energy=energy,
-            observe=lambda y, p: full.observe(velocities(y, p), full_constants(p)),
-            ripple=Ripple(general_ripple.NAMES, lambda columns: general_ripple.form(columns, surface), _ripple),
-        ),
+        model=in_momentum(full, Constants, momentum, slow, energy, ripple),
         momentum=momentum,
-        velocities=velocities,
         slow=slow,
         newton=newton,
         power=power,

@@ -22,7 +22,8 @@ import numpy as np
 from sweep.models import ellipsoid
 from sweep.models.ladder import averaged, slip
 from sweep.models.model import Array, Columns, stack, take
-from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum, slip_constants, slow
+from sweep.models.stiff.form import subset
+from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum, slow
 from sweep.models.theory import linear
 
 RATTLE = (0, 1, 2, 3, 5, 6)
@@ -147,7 +148,7 @@ def fastest_growth(columns: Columns, reach: Array) -> Array:
 
 def _rocking(constants: Constants, spin: Array) -> tuple[Array, Array, Array]:
     """Rates and modes, as in `Rattle`, and whether there are two rocking modes, shape (cells,)."""
-    rates, modes = np.linalg.eig(linear.jacobian(slip.MODEL, slip_constants(constants), spin))
+    rates, modes = np.linalg.eig(linear.jacobian(slip.MODEL, subset(slip.Constants, constants), spin))
     # With little friction the slip is not stopped fast, but oscillates slowly, and these two modes do not describe
     # that: at μ = 1e-3 leaving it out cost 3e-7 in spin.
     falling = np.argsort(-rates.imag, axis=1)

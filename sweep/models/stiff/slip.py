@@ -19,8 +19,7 @@ without a root or a quotient, so that a single division yields 1/r, 1/u3 and I_P
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.ladder import friction, slip
 from sweep.models.model import Array, Columns, Ripple, named, zeros
-from sweep.models.stiff.form import StiffForm
+from sweep.models.stiff.form import Geometry, StiffForm, in_momentum
 from sweep.models.theory.ripple import FORM, form, ripple
 from sweep.models.theory.rocking import frequencies, rocking
 
@@ -39,36 +38,6 @@ class Constants(named("I1", "I2", "I3", *slip.Constants._fields)):  # type: igno
     @classmethod
     def of(cls, columns: Columns) -> Constants:
         return cls(*ellipsoid.inertia(columns), *slip.Constants.of(columns))
-
-
-class Geometry(NamedTuple):
-    """What `slow` computes on its way and `newton` needs as well; components along the body axes."""
-
-    u3: Any
-    x: Any
-    """Contact point x_p."""
-    y: Any
-    z: Any
-    t1: Any
-    """u1/u3; t2 is u2/u3, so that v3 = -(t1 v1 + t2 v2)."""
-    t2: Any
-    v3: Any
-    w1: Any
-    """ω."""
-    w2: Any
-    w3: Any
-    du1: Any
-    """u'."""
-    du2: Any
-    du3: Any
-    s1: Any
-    """s = v_0 - x_p'."""
-    s2: Any
-    s3: Any
-    q1: Any
-    """u × x_p."""
-    q2: Any
-    q3: Any
 
 
 @inline
@@ -83,12 +52,6 @@ def momentum(y: Any, p: Any) -> Any:
     g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
     M1, M2, M3 = p.I1 * w1 - (y_ * g3 - z * g2), p.I2 * w2 - (z * g1 - x * g3), p.I3 * w3 - (x * g2 - y_ * g1)
     return u1, u2, M1, M2, M3, v1, v2
-
-
-def start(columns: Columns) -> tuple[Array, ...]:
-    """The start of the slip model: ω = n0 u, v_p = 0, contact point at (x0, y0)."""
-    states: tuple[Array, ...] = momentum(slip.start(columns), Constants.of(columns))
-    return states
 
 
 @inline
@@ -209,36 +172,12 @@ def implicit(weight: Any, p: Any) -> Any:
     )  # fmt: skip
 
 
-def velocities(y: Array, p: Constants) -> Array:
-    """The states of the slip model from these, shape (7, cells): the inverse of `momentum`."""
-    _, geometry = slow(*y, p)
-    return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))
-
-
-def slip_constants(p: Constants) -> slip.Constants:
-    """The constants of the slip model from these."""
-    return slip.Constants(*(getattr(p, name) for name in slip.Constants._fields))
-
-
-def observe(y: Array, p: Constants) -> dict[str, Array]:
-    """What a trajectory shows, as in the slip model."""
-    return slip.observe(velocities(y, p), slip_constants(p))
-
-
 @inline
 def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
     return ripple(y[0], y[1], y[2], y[3], k)
 
 
-STIFF_MODEL = replace(
-    slip.MODEL,
-    states=("u1", "u2", "M1", "M2", "M3", "v1", "v2"),
-    constants=Constants,
-    start=start,
-    energy=energy,
-    observe=observe,
-    ripple=Ripple(FORM, form, _ripple),
-)
+STIFF_MODEL = in_momentum(slip.MODEL, Constants, momentum, slow, energy, Ripple(FORM, form, _ripple))
 """The slip model in these variables, for methods that use `slow` and `newton` in place of a right-hand side."""
 
 
@@ -256,7 +195,6 @@ PAPER_FORM = StiffForm(
     full=slip.MODEL,
     model=STIFF_MODEL,
     momentum=momentum,
-    velocities=velocities,
     slow=slow,
     newton=newton,
     power=power,
