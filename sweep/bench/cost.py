@@ -1,114 +1,112 @@
-"""Time of whole runs against the number of trajectories, t_end, friction and the number of threads."""
+"""Time of a step, and of whole runs against the number of trajectories, t_end, friction and the number of threads."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 
 import numba
 import numpy as np
 from matplotlib.axes import Axes
 
-from sweep.bench.timing import (
-    COLOURS,
-    MARKERS,
-    T_END,
-    Effort,
-    Measurement,
-    Part,
-    Spread,
-    Work,
-    in_turn,
-    runs_at,
-    spread_out,
-)
-from sweep.kernels import methods
+from sweep.bench.section import BenchSection, Spread, colour, curve, marker
+from sweep.bench.timing import T_END, Effort, Work, in_turn, runs_at, spread_out
+from sweep.kernels.layout import LANES
 from sweep.kernels.method import TOLERANCE
+from sweep.kernels.methods import METHODS, allowed, automatic_step
 from sweep.models import MODELS
-from sweep.report.direct import make_kernel, standard
-from sweep.report.rows import Section
+from sweep.report.direct import MEASURE, make_kernel, standard
 
 MU = 60.0
+
+STEP = 0.02
+"""Step whose time is measured, in sqrt(c/g): short enough for every method at `MU`."""
 
 AXES = {"trajectories": "number of trajectories", "t_end": "t_end", "mu": "μ"}
 """What is varied and drawn, with its label; threads appear in the table only."""
 
-
-@dataclass(frozen=True)
-class Run:
-    setting: str
-    at: float
-    method: str
-    work: Work
-    threads: int
-
-    def __call__(self) -> None:
-        numba.set_num_threads(self.threads)
-        self.work()
+Key = tuple[str, float, str]
+"""What is varied, to which value, and the method."""
 
 
-def cost(effort: Effort) -> Part:
-    threads = numba.get_num_threads()
-    runs = list(_runs(effort, threads))
+def step_times(effort: Effort) -> BenchSection:
+    """Time of a step of one trajectory, by each method of each model, alone and with measurements."""
+    threads, section = numba.get_num_threads(), BenchSection("Time of a step", name="steps")
+    works, cells = {}, LANES * threads
+    for name, model in MODELS.items():
+        for method in allowed(model):
+            for measure in ((), MEASURE):
+                kernel = make_kernel(method, model, measure)
+                what = " and ".join(kernel.measure) or "nothing"
+                works[name, method, what] = Work(kernel, standard(mu=np.full(cells, MU)), np.full(cells, STEP))
+    # These works are short, so they are repeated more often: some turns escape the machine's other work.
+    times = in_turn(works, replace(effort, repeats=5 * effort.repeats))
+    lines = [["model", "method", "measuring", "ns per step and trajectory"]]
+    for key, spread in times.items():
+        each = Spread(1e9 * STEP / T_END / cells * spread.values)
+        lines.append([*key, f"{each:.2f}"])
+        section.add(*key, "threads", threads, ns_per_step=each)
+    caption = f"Runs to t = {T_END:g} in steps of {STEP:g}, start-up included: {cells} trajectories, {threads} threads"
+    section.tables.append((f"{caption}, μ = {MU:g}", lines))
+    return section
+
+
+def cost(effort: Effort) -> BenchSection:
+    """Time of whole runs of the slip model, with one quantity varied."""
+    threads, section = numba.get_num_threads(), BenchSection("Cost", name="cost")
+    works = dict(_works(effort, threads))
+    threaded = {key: partial(_on, key[1] if key[0] == "threads" else threads, work) for key, work in works.items()}
     try:
-        times = in_turn(dict(enumerate(runs)), effort)
+        times = in_turn(threaded, effort)
     finally:
         numba.set_num_threads(threads)
-    spreads = [times[i].times(1e3 / len(run.work)) for i, run in enumerate(runs)]
-    part = Part(Section("Cost"))
-    lines = [["varied", "value", *(f"{method}, ms per trajectory" for method in methods.METHODS), "trajectories"]]
-    for setting, at in dict.fromkeys((run.setting, run.at) for run in runs):
-        here = {r.method: (r, s) for r, s in zip(runs, spreads, strict=True) if (r.setting, r.at) == (setting, at)}
-        shown = [f"{here[m][1]:.3g}" if m in here else "—" for m in methods.METHODS]
-        sizes = " and ".join(dict.fromkeys(str(len(run.work)) for run, _ in here.values()))
-        lines.append([setting, f"{at:g}", *shown, sizes])
-    part.measurements = [
-        Measurement(
-            "cost", "slip", run.method, f"{len(run.work)} trajectories", run.setting, run.at, "ms_per_trajectory", s
-        )
-        for run, s in zip(runs, spreads, strict=True)
-    ]
+    each = {key: Spread(1e3 / len(works[key]) * spread.values) for key, spread in times.items()}
+    for (setting, at, method), spread in each.items():
+        case = f"{len(works[setting, at, method])} trajectories"
+        section.add("slip", method, case, setting, at, ms_per_trajectory=spread)
+    lines = [["varied", "value", *(f"{method}, ms per trajectory" for method in METHODS), "trajectories"]]
+    for setting, at in dict.fromkeys((setting, at) for setting, at, _ in works):
+        keys = [(setting, at, method) for method in METHODS]
+        shown = [f"{each[key]:.3g}" if key in each else "—" for key in keys]
+        sizes = dict.fromkeys(str(len(works[key])) for key in keys if key in works)
+        lines.append([setting, f"{at:g}", *shown, " and ".join(sizes)])
     caption = (
         f"The slip model at the automatic step for tolerance {TOLERANCE:g}, start-up included. Unless varied: "
         f"{effort.trajectories} trajectories, {threads} threads, t_end = {T_END:g}, μ = {MU:g}"
     )
-    part.section.tables.append((caption, lines))
-    part.panels = [_draw(runs, spreads, setting) for setting in AXES]
-    return part
+    section.tables.append((caption, lines))
+    section.panels += [partial(_draw, each=each, setting=setting) for setting in AXES]
+    return section
 
 
-def _runs(effort: Effort, threads: int) -> Iterator[Run]:
-    for method in methods.METHODS:
+def _works(effort: Effort, threads: int) -> Iterator[tuple[Key, Work]]:
+    count = effort.trajectories
+    for method in METHODS:
         for size in effort.sizes:
-            yield Run("trajectories", size, method, _work(method, count=size), threads)
+            yield ("trajectories", size, method), _work(method, size)
         for number in sorted({1, threads}):
-            yield Run("threads", number, method, _work(method, count=effort.trajectories), number)
+            yield ("threads", number, method), _work(method, count)
         for t_end in effort.ends:
-            yield Run("t_end", t_end, method, _work(method, count=effort.trajectories, t_end=t_end), threads)
+            yield ("t_end", t_end, method), _work(method, count, t_end=t_end)
         for mu in effort.frictions:
             if runs_at(method, mu):
-                yield Run("mu", mu, method, _work(method, count=effort.trajectories, mu=mu).affordable(effort), threads)
+                yield ("mu", mu, method), _work(method, count, mu=mu).affordable(effort)
 
 
 def _work(method: str, count: int, t_end: float = T_END, mu: float = MU) -> Work:
     body = standard(mu=mu)
-    step, _ = methods.automatic_step(method, MODELS["slip"], body)
+    step, _ = automatic_step(method, MODELS["slip"], body)
     return Work(make_kernel(method, MODELS["slip"], ()), spread_out(body, count), np.resize(step, count), t_end)
 
 
-def _draw(runs: list[Run], spreads: list[Spread], setting: str) -> Callable[[Axes], Any]:
-    def draw(axes: Axes) -> None:
-        for method in methods.METHODS:
-            chosen = [
-                (r.at, s) for r, s in zip(runs, spreads, strict=True) if (r.setting, r.method) == (setting, method)
-            ]
-            at, several = zip(*chosen, strict=True)
-            reach = np.transpose([s.reach for s in several])
-            axes.errorbar(at, [s.median for s in several], reach, fmt=f"{MARKERS[method]}-", capsize=2,
-                          color=COLOURS[method], label=method)  # fmt: skip
-        axes.set(xscale="log", yscale="log", xlabel=AXES[setting], ylabel="ms per trajectory",
-                 title=f"Cost against {AXES[setting]}")  # fmt: skip
-        axes.legend(fontsize=7)
+def _on(threads: float, work: Work) -> None:
+    numba.set_num_threads(int(threads))
+    work()
 
-    return draw
+
+def _draw(axes: Axes, each: dict[Key, Spread], setting: str) -> None:
+    for method in METHODS:
+        points = {at: spread for (varied, at, by), spread in each.items() if (varied, by) == (setting, method)}
+        curve(axes, list(points), list(points.values()), fmt=f"{marker(method)}-", color=colour(method), label=method)
+    axes.set(xlabel=AXES[setting], ylabel="ms per trajectory", title=f"Cost against {AXES[setting]}")

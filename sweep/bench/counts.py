@@ -2,67 +2,62 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from matplotlib.axes import Axes
 
-from sweep.bench.reference import Counts, read_counts
-from sweep.bench.timing import COLOURS, MARKERS, Effort, Measurement, Part, Spread
+from sweep.bench.reference import Counts, at_each, read_counts
+from sweep.bench.section import BenchSection, colour, marker
+from sweep.bench.timing import Effort
 from sweep.grid import Array
-from sweep.kernels import methods
-from sweep.kernels.methods import METHODS
+from sweep.kernels.methods import METHODS, automatic_step
 from sweep.models import MODELS
 from sweep.report.direct import simulate
-from sweep.report.rows import Section
 
 T_END = 30_000.0
 
-EVERY = {name: 1 if method.stable_step is None else 5 for name, method in METHODS.items()}
-"""Every n-th cell of the reference is run, because dopri5 takes ten times as long as adams."""
+SPARSE = 5
+"""A method whose stability limits the step runs every fifth cell of the reference: dopri5 takes ten times as long."""
 
 
-def wrong_counts(effort: Effort) -> Part:
-    reference = read_counts()
-    part = Part(Section("Wrong counts"))
+def wrong_counts(effort: Effort) -> BenchSection:
+    reference, section = read_counts(), BenchSection("Wrong counts", name="counts")
     lines = [["method", "cells", "which", *(f"{t:g}" for t in effort.tolerances)]]
-    shares: dict[tuple[str, str], list[float]] = {}
-    for method, every in EVERY.items():
-        sample = np.arange(0, len(reference.reversals), every)
-        wrong = counts(method, reference, sample, effort.tolerances) != reference.reversals[sample]
-        groups = {"all": np.full(len(sample), True), "firm": reference.firm[sample]}
-        for group, chosen in groups.items():
-            shares[method, group] = share = wrong[:, chosen].mean(axis=1).tolist()
+    shares: dict[tuple[str, str], Array] = {}
+    for name, method in METHODS.items():
+        sample = np.arange(0, len(reference.reversals), 1 if method.stable_step is None else SPARSE)
+        wrong = counts(name, reference, sample, effort.tolerances) != reference.reversals[sample]
+        for group, chosen in {"all": np.full(len(sample), True), "firm": reference.firm[sample]}.items():
+            shares[name, group] = share = wrong[:, chosen].mean(axis=1)
             shown = [f"{s:.1%} ({n})" for s, n in zip(share, wrong[:, chosen].sum(axis=1), strict=True)]
-            lines.append([method, f"{chosen.sum()} of {len(reference.reversals)}", group, *shown])
-            part.measurements += [
-                Measurement("counts", "slip", method, group, "tolerance", t, "share_wrong", Spread((s,)))
-                for t, s in zip(effort.tolerances, share, strict=True)
-            ]
-    part.section.tables.append((
+            lines.append([name, f"{chosen.sum()} of {len(reference.reversals)}", group, *shown])
+            for tolerance, s in zip(effort.tolerances, share, strict=True):
+                section.add("slip", name, group, "tolerance", tolerance, share_wrong=s)
+    caption = (
         "Share (and number) of cells whose count differs from the reference, by tolerance. "
-        "firm: cells whose reference count depends neither on round-off nor on where the windows begin",
-        lines,
-    ))  # fmt: skip
-    part.panels.append(lambda axes: _draw(axes, shares, effort.tolerances))
-    return part
+        "firm: cells whose reference count depends neither on round-off nor on where the windows begin"
+    )
+    section.tables.append((caption, lines))
+    section.panels.append(partial(_draw, shares=shares, asked=effort.tolerances))
+    return section
 
 
 def counts(method: str, reference: Counts, sample: Array, asked: tuple[float, ...]) -> Array:
-    """Reversals at each tolerance, shape (tolerances, sample).  Cells with equal steps are run once."""
+    """Reversals at each tolerance, shape (tolerances, sample)."""
     columns = {name: column[sample] for name, column in reference.columns.items()}
-    steps = np.concatenate([methods.automatic_step(method, MODELS["slip"], columns, t)[0] for t in asked])
-    cells = np.tile(np.arange(len(sample)), len(asked))
-    runs, place = np.unique(np.stack([cells, steps]), axis=1, return_inverse=True)
-    chosen = {name: column[runs[0].astype(int)] for name, column in columns.items()}
-    ends = simulate(chosen, T_END, method=method, step=runs[1], settle=True)
-    return np.asarray(ends["reversals"][place.ravel()].reshape(len(asked), -1))
+
+    def reversals(cells: Array, steps: Array) -> Array:
+        chosen = {name: column[cells] for name, column in columns.items()}
+        return simulate(chosen, T_END, method=method, step=steps, settle=True)["reversals"]
+
+    return at_each([automatic_step(method, MODELS["slip"], columns, t)[0] for t in asked], reversals)
 
 
-def _draw(axes: Axes, shares: dict[tuple[str, str], list[float]], asked: tuple[float, ...]) -> None:
+def _draw(axes: Axes, shares: dict[tuple[str, str], Array], asked: tuple[float, ...]) -> None:
     for (method, group), share in shares.items():
-        colour = COLOURS[method]
-        face, line = ("white", "--") if group == "all" else (colour, "-")
-        axes.semilogx(asked, np.array(share) * 100, MARKERS[method], linestyle=line, color=colour,
+        face, line = ("white", "--") if group == "all" else (colour(method), "-")
+        axes.semilogx(asked, share * 100, marker(method), linestyle=line, color=colour(method),
                       markerfacecolor=face, label=f"{method}, {group}")  # fmt: skip
     axes.set(title="Wrong counts", xlabel="tolerance", ylabel="cells with a wrong count, %")
     axes.set_ylim(bottom=0)
-    axes.legend(fontsize=7)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from sweep.bench.reference import Spins, read_spins, spin_errors, whole_steps
-from sweep.bench.timing import MARKERS, Effort, Measurement, Part, Spread, Work, in_turn, runs_at, spread_out
-from sweep.grid import Array
+from sweep.bench.reference import Spins, comparisons, spin_errors, whole_steps
+from sweep.bench.section import PALETTE, BenchSection, Spread, curve, marker
+from sweep.bench.timing import Effort, Work, in_turn, spread_out
 from sweep.kernels import methods
 from sweep.models import MODELS
-from sweep.parameters import PARAMETERS
 from sweep.report.direct import make_kernel
-from sweep.report.rows import Section
+from sweep.report.rows import Table
 
 LOOSEST = 1e-3
 """The longest step tried is the automatic step for this tolerance."""
@@ -26,8 +25,6 @@ FLOOR = 1e-11
 
 BOUND = 1e-6
 """Error at which the methods are compared."""
-
-PALETTE = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#bbbbbb")
 
 
 @dataclass(frozen=True)
@@ -42,48 +39,37 @@ class Point:
     work: Work
 
 
-def work_precision(effort: Effort) -> Part:
+def work_precision(effort: Effort) -> BenchSection:
     """Time of whole runs against the largest error, for every method of every model."""
-    points = [point for group in _groups(read_spins()) for point in _ladder(*group, effort)]
+    section = BenchSection("Work and precision", name="precision")
+    points = [point for group in _groups() for point in _ladder(*group, effort)]
     times = in_turn({i: point.work for i, point in enumerate(points)}, effort)
-    cost = [times[i].times(1e3 / len(point.work)) for i, point in enumerate(points)]
-    part = Part(Section("Work and precision"))
+    cost = [Spread(1e3 / len(point.work) * times[i].values) for i, point in enumerate(points)]
     lines = [["model", "case", "method", "step", "largest error in spin", "ms per trajectory", "trajectories"]]
-    for point, milliseconds in zip(points, cost, strict=True):
-        error = f"{point.error:.1e}"
-        where = [point.model, point.case, point.method, f"{point.step:.4g}", error, f"{milliseconds:.3g}"]
-        lines.append([*where, str(len(point.work))])
-        for quantity, spread in (("spin_error", Spread((point.error,))), ("ms_per_trajectory", milliseconds)):
-            measured = ("precision", point.model, point.method, point.case, "step", point.step, quantity, spread)
-            part.measurements.append(Measurement(*measured))
+    for point, spread in zip(points, cost, strict=True):
+        shown = (f"{point.step:.4g}", f"{point.error:.1e}", f"{spread:.3g}", str(len(point.work)))
+        lines.append([point.model, point.case, point.method, *shown])
+        where = (point.model, point.method, point.case, "step", point.step)
+        section.add(*where, spin_error=point.error, ms_per_trajectory=spread)
     caption = (
         "Whole runs to t = 400, start-up included, compilation excluded, with no measurement but the spin; median "
         f"(smallest … largest) of up to {effort.repeats} runs, in turn. The error is the largest over "
         "t = 25, 50, … 400. Steps at which a trajectory fails are left out."
     )
-    medians = [spread.median for spread in cost]
-    part.section.tables += [(caption, lines), _at_equal_error(points, medians)]
-    part.panels = [_panel(points, cost, slip) for slip in (True, False)]
-    return part
+    section.tables += [(caption, lines), at_equal_error(points, [spread.median for spread in cost])]
+    section.panels += [partial(_draw, points=points, cost=cost, slip=slip) for slip in (True, False)]
+    return section
 
 
-def _groups(spins: dict[str, Spins]) -> Iterator[tuple[str, str, str, Spins]]:
+def _groups() -> Iterator[tuple[str, str, str, Spins]]:
     """Model, method, name and bodies: one group for each friction of the slip model, one for each other model."""
-    for model, reference in spins.items():
-        for method in methods.allowed(MODELS[model]):
-            if model != "slip":
-                yield model, method, f"{len(reference.spins)} bodies", reference
-                continue
-            for body in np.flatnonzero(_standard_but_mu(reference)):
-                mu = reference.columns["mu"][body]
-                if mu >= 60 and runs_at(method, mu):
-                    yield model, method, f"μ = {mu:g}", reference.select(np.array([body]))
-
-
-def _standard_but_mu(reference: Spins) -> Array:
-    others = [name for name in reference.columns if name != "mu"]
-    alike = [reference.columns[name] == PARAMETERS[name].default for name in others]
-    return np.asarray(np.all(alike, axis=0))
+    for model, method, reference in comparisons():
+        if model != "slip":
+            yield model, method, f"{len(reference.spins)} bodies", reference
+            continue
+        for body, mu in enumerate(reference.columns["mu"]):
+            if mu >= 60 and reference.name(body) == f"μ = {mu:g}":
+                yield model, method, reference.name(body), reference.select(np.array([body]))
 
 
 def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort) -> Iterator[Point]:
@@ -103,7 +89,7 @@ def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort
         best = error
 
 
-def _at_equal_error(points: list[Point], cost: list[float]) -> tuple[str, list[list[str]]]:
+def at_equal_error(points: list[Point], cost: list[float]) -> Table:
     """The cheapest step of each method with an error up to `BOUND`, side by side."""
     best: dict[str, dict[str, float]] = {}
     for point, milliseconds in zip(points, cost, strict=True):
@@ -119,26 +105,17 @@ def _at_equal_error(points: list[Point], cost: list[float]) -> tuple[str, list[l
     return f"The slip model at equal error: the cheapest step with an error up to {BOUND:g}", lines
 
 
-def _panel(points: list[Point], cost: list[Spread], slip: bool) -> Callable[[Axes], None]:
-    """Draws a curve for each method, and each friction of the slip model or each other model."""
+def _draw(axes: Axes, points: list[Point], cost: list[Spread], slip: bool) -> None:
+    """A curve for each method (a marker), and each friction of the slip model or each other model (a colour)."""
     curves: dict[tuple[str, str], list[tuple[float, Spread]]] = {}
-    for point, milliseconds in zip(points, cost, strict=True):
+    for point, spread in zip(points, cost, strict=True):
         if (point.model == "slip") == slip:
-            case = point.case if slip else point.model
-            curves.setdefault((case, point.method), []).append((point.error, milliseconds))
-    return partial(_draw, curves=curves, title=f"Work and precision, {'slip' if slip else 'reduced models'}")
-
-
-def _draw(axes: Axes, curves: dict[tuple[str, str], list[tuple[float, Spread]]], title: str) -> None:
-    """A curve for each case (a colour) and method (a marker)."""
+            curves.setdefault((point.case if slip else point.model, point.method), []).append((point.error, spread))
     cases = list(dict.fromkeys(case for case, _ in curves))
-    for (case, method), points in curves.items():
-        errors, spreads = zip(*points, strict=True)
+    for (case, method), found in curves.items():
         colour = PALETTE[cases.index(case) % len(PALETTE)]
-        axes.errorbar(
-            errors, [s.median for s in spreads], np.transpose([s.reach for s in spreads]), fmt=f"{MARKERS[method]}-",
-            color=colour, markerfacecolor="white" if method == methods.PLAIN else colour, label=f"{case}, {method}",
-            linewidth=1, elinewidth=0.6, markersize=4,
-        )  # fmt: skip
-    axes.set(xscale="log", yscale="log", title=title, xlabel="largest error in spin", ylabel="ms per trajectory")
-    axes.legend(fontsize=7)
+        face = "white" if method == methods.PLAIN else colour
+        curve(axes, *zip(*found, strict=True), fmt=f"{marker(method)}-", color=colour, markerfacecolor=face,
+              label=f"{case}, {method}")  # fmt: skip
+    title = f"Work and precision, {'slip' if slip else 'reduced models'}"
+    axes.set(title=title, xlabel="largest error in spin", ylabel="ms per trajectory")

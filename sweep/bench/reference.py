@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import resources
-from importlib.resources.abc import Traversable
 
 import numpy as np
 
+from sweep.bench.timing import runs_at
 from sweep.engine.executor import execute
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
+from sweep.kernels.methods import allowed
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
@@ -56,37 +57,50 @@ class Counts:
     """Whether the count depends neither on round-off nor on where the windows begin."""
 
 
+def _table(path: object) -> Array:
+    return np.genfromtxt(str(path), delimiter=",", names=True, dtype=None, encoding="utf-8")
+
+
 def read_spins() -> dict[str, Spins]:
-    """The reference spins of each model."""
-    found: dict[str, dict[tuple[float, ...], dict[float, float]]] = {}
-    for line in _lines(SPINS):
-        body = tuple(float(line[name]) for name in MODELS[line["model"]].parameters)
-        found.setdefault(line["model"], {}).setdefault(body, {})[float(line["t"])] = float(line["spin"])
-    spins = {}
-    for model, bodies in found.items():
-        columns = dict(zip(MODELS[model].parameters, np.array(list(bodies)).T, strict=True))
-        times = sorted(next(iter(bodies.values())))
-        values = np.array([[series[t] for t in times] for series in bodies.values()])
-        spins[model] = Spins(columns, np.array(times), values)
+    """Read the reference spins of each model, whose lines are in the order of bodies and times."""
+    table, spins = _table(SPINS), {}
+    for model in dict.fromkeys(table["model"].tolist()):
+        lines = table[table["model"] == model]
+        times = np.unique(lines["t"]).astype(float)
+        bodies = lines.reshape(-1, len(times))
+        columns = {name: bodies[name][:, 0].astype(float) for name in MODELS[model].parameters}
+        spins[model] = Spins(columns, times, bodies["spin"])
     return spins
 
 
+def comparisons() -> Iterator[tuple[str, str, Spins]]:
+    """Each model with each method that runs it, and those of its bodies that take the method a bearable time."""
+    for model, reference in read_spins().items():
+        for method in allowed(MODELS[model]):
+            mu = reference.columns.get("mu", np.zeros(len(reference.spins)))
+            yield model, method, reference.select(np.array([runs_at(method, x) for x in mu]))
+
+
 def read_counts() -> Counts:
-    """The reference counts."""
-    lines = _lines(COUNTS)
-    names = ("a", "b", "delta", "mu", "n0", "x0", "y0")
-    columns = {name: np.array([float(line[name]) for line in lines]) for name in names}
-    reversals = np.array([int(float(line["reversals"])) for line in lines])
-    firm = np.array([line["firm"].strip().lower() in ("1", "true") for line in lines])
-    return Counts(columns | {"c": np.ones(len(lines))}, reversals, firm)
+    """Read the reference counts."""
+    table = _table(COUNTS)
+    columns = {name: table[name].astype(float) for name in MODELS["slip"].parameters}
+    return Counts(columns, table["reversals"], table["firm"] == 1)
 
 
-def _lines(table: Traversable) -> list[dict[str, str]]:
-    return list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+def at_each(steps: list[Array], run: Callable[[Array, Array], Array]) -> Array:
+    """What `run` (bodies, steps) finds for all bodies at each of several steps, of shape (..., several, bodies).
+
+    Equal steps of a body, which occur where stability decides, are run once.
+    """
+    bodies = np.tile(np.arange(len(steps[0])), len(steps))
+    runs, place = np.unique(np.stack([bodies, np.concatenate(steps)]), axis=1, return_inverse=True)
+    found = run(runs[0].astype(int), runs[1])
+    return found[..., place.ravel()].reshape(*found.shape[:-1], len(steps), -1)
 
 
-def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> tuple[Array, Array]:
-    """Largest error in spin over the reference's times, and `energy_error` at the last, both of shape (bodies,).
+def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
+    """Largest error in spin over the reference's times, and `energy_error` at the last, of shape (2, bodies).
 
     Each time gets a trajectory of its own, because the steps of adams depend on where it is to end.  The error of a
     trajectory that fails is infinite.
@@ -95,11 +109,11 @@ def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> tuple[Array, A
     execute(kernel, table, stop_when_settled=False)
     spin = kernel.model.energy(*kernel.unpack(table))[0]
     error = np.where(table[:, kernel.row("status")] == TIME_LIMIT, np.abs(spin - reference.spins.T.ravel()), np.inf)
-    last = table[-len(step) :]
     violation = np.full(len(step), np.nan)
     if "energy_error" in kernel.measure:
+        last = table[-len(step) :]
         violation = last[:, kernel.row("violation")] / last[:, kernel.row("energy_start")]
-    return error.reshape(len(reference.times), -1).max(axis=0), violation
+    return np.stack([error.reshape(len(reference.times), -1).max(axis=0), violation])
 
 
 def whole_steps(reference: Spins, step: Array) -> Array:

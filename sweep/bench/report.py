@@ -1,10 +1,9 @@
-"""The report: all parts in order, then raw figures, picture and page."""
+"""The report: all sections in order, then raw figures, picture and page."""
 
 from __future__ import annotations
 
 import csv
 import os
-import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,22 +12,24 @@ import llvmlite.binding
 import numba
 from matplotlib.figure import Figure
 
-from sweep.bench.cost import cost
+from sweep.bench.cost import cost, step_times
 from sweep.bench.counts import wrong_counts
 from sweep.bench.hard import hard_cases
-from sweep.bench.peak import peak
 from sweep.bench.precision import work_precision
-from sweep.bench.timing import Effort, Measurement, Part
+from sweep.bench.section import BenchSection, Reading
+from sweep.bench.timing import Effort
 from sweep.bench.tolerance import tolerance
 from sweep.bench.whole import whole
 from sweep.kernels import methods
 from sweep.models import MODELS
 from sweep.report import page
-from sweep.report.direct import MEASURE, simulate, standard
+from sweep.report.direct import MEASURE, make_kernel
 from sweep.report.rows import Row, Section
 from sweep.results.writing import replacing
 
-PARTS: tuple[Callable[[Effort], Part], ...] = (work_precision, tolerance, wrong_counts, peak, cost, whole)
+SECTIONS: tuple[Callable[[Effort], BenchSection], ...] = (
+    work_precision, tolerance, wrong_counts, step_times, cost, whole, hard_cases,
+)  # fmt: skip
 
 COLUMNS = 3
 """Number of panels side by side."""
@@ -39,77 +40,57 @@ def bench(output: Path, note: Callable[[str], None] = lambda _: None, effort: Ef
     began = time.perf_counter()
     output.mkdir(parents=True, exist_ok=True)
     compile_kernels()
-    ready = time.perf_counter()
-    note(f"kernels compiled or loaded in {ready - began:.1f} s, which no time below includes")
-    parts = []
-    for measure in PARTS:
-        parts.append(measure(effort or Effort()))
-        note(page.text(parts[-1].section))
-    parts.append(Part(hard_cases()))
-    note(page.text(parts[-1].section))
-    write_csv(output / "bench.csv", [m for part in parts for m in part.measurements])
-    figure = draw(parts)
+    note(f"kernels compiled or loaded in {time.perf_counter() - began:.1f} s, which no time below includes")
+    sections = []
+    for measure in SECTIONS:
+        sections.append(measure(effort or Effort()))
+        note(page.text(sections[-1]))
+    write_csv(output / "bench.csv", [reading for section in sections for reading in section.readings])
+    figure = draw(sections)
     with replacing(output / "bench.png") as temporary:
         figure.savefig(temporary, format="png")
-    _write_page(output / "bench.html", parts, figure, time.perf_counter() - began)
-    return [row for part in parts for row in part.section.rows if not row.holds]
+    about = (
+        f"Measured in {time.perf_counter() - began:.0f} s on {numba.get_num_threads()} threads of {os.cpu_count()} "
+        f"({llvmlite.binding.get_host_cpu_name()}), load {os.getloadavg()[0]:.1f} at the end. Raw figures: bench.csv."
+    )
+    overview = Section("Overview", figures=[("speed, error and cost", figure)])
+    heads = ("method", "expected", "found")
+    page.write(output / "bench.html", "sweep: speed against error", about, [overview, *sections], heads)
+    return [row for section in sections for row in section.rows if not row.holds]
 
 
 def compile_kernels() -> None:
-    """Compile all that the parts run, so that no time includes a compilation."""
-    for name, model in MODELS.items():
+    """Compile all that the sections run, so that no time includes a compilation."""
+    for model in MODELS.values():
         for method in methods.allowed(model):
             for measure in ((), MEASURE):
-                simulate(standard(), 1.0, model=name, method=method, measure=measure)
+                make_kernel(method, model, measure)
 
 
-def draw(parts: list[Part]) -> Figure:
+def draw(sections: list[BenchSection]) -> Figure:
     """All panels in one figure."""
-    panels = [panel for part in parts for panel in part.panels]
+    panels = [panel for section in sections for panel in section.panels]
     lines = -(-len(panels) // COLUMNS)
     figure = Figure(figsize=(6 * COLUMNS, 4.6 * lines), dpi=90, layout="constrained")
     grid = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
     for axes, panel in zip(grid, panels, strict=False):
         panel(axes)
         axes.grid(which="major", alpha=0.3)
+        if axes.get_legend_handles_labels()[1]:
+            axes.legend(fontsize=7)
     for axes in grid[len(panels) :]:
         axes.set_axis_off()
     return figure
 
 
-def write_csv(path: Path, measurements: list[Measurement]) -> None:
+def write_csv(path: Path, readings: list[Reading]) -> None:
     """Write the raw figures, one per line."""
-    head = (
-        "section",
-        "model",
-        "method",
-        "case",
-        "setting",
-        "at",
-        "quantity",
-        "median",
-        "smallest",
-        "largest",
-        "repeats",
-    )
+    names = ("section", "model", "method", "case", "setting")
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(head)
-        for m in measurements:
-            values = m.spread.values
-            figures = [f"{v:.6g}" for v in (statistics.median(values), min(values), max(values))]
-            writer.writerow(
-                [m.section, m.model, m.method, m.case, m.setting, f"{m.at:.8g}", m.quantity, *figures, len(values)]
-            )
-
-
-def _write_page(path: Path, parts: list[Part], figure: Figure, seconds: float) -> None:
-    about = (
-        f"Measured in {seconds:.0f} s on {numba.get_num_threads()} threads of {os.cpu_count()} "
-        f"({llvmlite.binding.get_host_cpu_name()}), load {os.getloadavg()[0]:.1f} at the end. Raw figures: bench.csv."
-    )
-    sections = [
-        Section("Overview", figures=[("speed, error and cost", figure)]),
-        *(part.section for part in parts),
-    ]
-    page.write(path, "sweep: speed against error", about, sections, ("method", "expected", "found"))
+        writer.writerow([*names, "at", "quantity", "median", "smallest", "largest", "repeats"])
+        for one in readings:
+            values = one.spread.values
+            figures = [f"{v:.6g}" for v in (one.spread.median, values.min(), values.max())]
+            where = [getattr(one, name) for name in names]
+            writer.writerow([*where, f"{one.at:.8g}", one.quantity, *figures, len(values)])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -51,8 +50,8 @@ def standard(**parameters: Any) -> dict[str, Array]:
 
 @cache
 def make_kernel(method: str, model: Model, measure: tuple[str, ...]) -> Kernel:
-    """The compiled kernel."""
-    kernel = methods.make_kernel(method, model, measure)
+    """The compiled kernel, with those of the measurements that the model knows."""
+    kernel = methods.make_kernel(method, model, [name for name in measure if name in measures.possible(model)])
     build([kernel])
     kernel.compile()
     return kernel
@@ -66,7 +65,7 @@ def simulate(
     method: str = methods.PLAIN,
     step: float | Array | None = None,
     tolerance: float = TOLERANCE,
-    measure: Iterable[str] = MEASURE,
+    measure: tuple[str, ...] = MEASURE,
     ranges: bool = True,
     settle: bool = False,
 ) -> Ends:
@@ -82,7 +81,7 @@ def simulate(
     settle : whether a trajectory ends as soon as it has settled
     """
     chosen = MODELS[model]
-    kernel = make_kernel(method, chosen, tuple(name for name in measure if name in measures.possible(chosen)))
+    kernel = make_kernel(method, chosen, measure)
     cells = len(columns["a"])
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
     stability = predict(chosen, Grid({}, {}, dict(columns))).stability if ranges else None

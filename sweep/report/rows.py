@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 from matplotlib.figure import Figure
 
+Table = tuple[str, list[list[str]]]
+"""Caption and lines; the first line is the head."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -31,8 +34,7 @@ class Section:
     rows: list[Row] = field(default_factory=list)
     figures: list[tuple[str, Figure]] = field(default_factory=list)
     """Caption and figure."""
-    tables: list[tuple[str, list[list[str]]]] = field(default_factory=list)
-    """Caption and lines; the first line is the head."""
+    tables: list[Table] = field(default_factory=list)
 
 
 def against(what: str, source: str, expected: float, found: float, tolerance: float, why: str, remark: str = "") -> Row:
