@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from support import ROOT, STANDARD, adaptive, columns, independent
+from support import ROOT, STANDARD, adaptive, columns, newton
 from support.kernels import threads
 from support.runs import same_numbers
 
@@ -59,7 +59,7 @@ def cells(tmp_path: Path) -> Callable[..., xr.Dataset]:
 @pytest.mark.parametrize("method", ["adams", "dopri5"])
 def test_true_failures_have_their_time(cells: Callable[..., xr.Dataset], method: str) -> None:
     found = cells(ENDS.values(), method=method, t_end=50.0)
-    expected = [independent.end(**end, t_end=50.0)[0] for end in ENDS.values()]
+    expected = [newton.end(**end, t_end=50.0)[0] for end in ENDS.values()]
     assert found.status.values.tolist() == list(ENDS)
     np.testing.assert_allclose(found.t_stop, expected, rtol=0, atol=1e-6)
 

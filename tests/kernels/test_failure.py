@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import columns, independent
+from support import columns, newton
 
 from sweep.kernels.failure import approach
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
@@ -29,7 +29,7 @@ def met(body: dict[str, np.ndarray], stretch: float) -> tuple[Array, Array]:
 @pytest.mark.parametrize("kind", ENDS)
 def test_failures_and_their_times(kind: int) -> None:
     (status,), (time,) = met(columns(**ENDS[kind]), 5.0)
-    expected, height, force, determinant = independent.end(**ENDS[kind], t_end=5.0)
+    expected, height, force, determinant = newton.end(**ENDS[kind], t_end=5.0)
     assert status == kind
     assert time == pytest.approx(expected, abs=1e-7)
     # And SciPy ended there for the same reason.

@@ -229,7 +229,7 @@ integrator: {{t_end: 1, method: dopri5}}
     for i in range(4):
         parameters = {name: float(values[i]) for name, values in columns.items()} | {"surface": "paraboloid"}
         u = np.array([*start[:2, i], -np.sqrt(1 - start[0, i] ** 2 - start[1, i] ** 2)])
-        assert newton._contact(u, parameters)[:2] == pytest.approx([parameters["x0"], parameters["y0"]], rel=1e-12)
+        assert newton.contact(u, parameters)[:2] == pytest.approx([parameters["x0"], parameters["y0"]], rel=1e-12)
         end = newton.follow(start[:, i], parameters, "viscous", np.array([0, 1.0]))[:, -1]
         spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
         assert float(result["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)

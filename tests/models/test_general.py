@@ -102,9 +102,9 @@ def test_the_energy_is_that_of_a_rigid_body(name: str, body: dict[str, Any]) -> 
     for number in range(20):
         y = states(number, 7)
         u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
-        x_p, v = newton._contact(u, body), np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
+        x_p, v = newton.contact(u, body), np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
         v_g, rest = v + np.cross(x_p, y[2:5]), SKEW["c"] - SKEW["offset"]
-        expected = y[2:5] @ newton._inertia(SKEW) @ y[2:5] / 2 / SKEW["mass"] + v_g @ v_g / 2
+        expected = y[2:5] @ newton.inertia(SKEW) @ y[2:5] / 2 / SKEW["mass"] + v_g @ v_g / 2
         expected += SKEW["gravity"] * (-x_p @ u - rest)
         spin, rattle, inertia = model.energy(tuple(y), constants)
         assert rattle + 0.5 * inertia * spin**2 == pytest.approx(expected, rel=1e-12)

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import columns
-from support.independent import contact
 from support.kernels import finish, images, kernel, spin
 
 import sweep
@@ -20,16 +19,13 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
-from sweep.models.ladder import averaged, effective, noslip
+from sweep.models.ladder import averaged, effective
 from sweep.models.model import stack, take
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.rocking import slower_period
 
 Write = Callable[..., Path]
 
-bodies = st.fixed_dictionaries(
-    {"a": st.floats(2, 15), "b": st.floats(1.1, 10), "c": st.floats(0.5, 1.5), "delta": st.floats(-0.5, 0.5)}
-)
 small, quick = st.floats(-0.3, 0.3), st.floats(-0.5, 0.5)
 
 
@@ -40,38 +36,6 @@ def simulate(model: str, t_end: float, step: float | None = None, **parameters: 
     table = finish(ours, images(ours, steps, t_end, **parameters), settle=False)
     assert set(table[:, ours.row("status")]) == {TIME_LIMIT}
     return ours, table
-
-
-@given(st.tuples(small, small, quick, quick, quick).map(np.array), bodies)
-def test_rolling_obeys_newton_and_euler(y: np.ndarray, body: dict[str, float]) -> None:
-    p = take(noslip.Constants.of(columns(**body)), 0)
-    slopes, (n, _, R, _) = noslip.rhs(tuple(y), p)
-    u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
-    omega, domega = y[2:], np.array(slopes[2:])
-    x_p = contact(u, **body)
-    du, eps = np.cross(u, omega), 1e-6
-    turned = [(u + s * eps * du) / np.linalg.norm(u + s * eps * du) for s in (1, -1)]
-    dx_p = (contact(turned[0], **body) - contact(turned[1], **body)) / (2 * eps)
-    # The contact point rests: v_g = x_p × ω, whose derivative in space Newton's force explains.
-    v_g = np.cross(x_p, omega)
-    force = np.cross(dx_p, omega) + np.cross(x_p, domega) + np.cross(omega, v_g) + u
-    a, b, c = body["a"], body["b"], body["c"]
-    inertia = np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) / 5
-    scale = 1 + np.abs(force).max() * a
-    np.testing.assert_allclose(
-        inertia * domega + np.cross(omega, inertia * omega), np.cross(x_p, force), atol=1e-7 * scale
-    )
-    np.testing.assert_allclose(slopes[:2], du[:2], atol=1e-14)
-    assert pytest.approx(force @ u, abs=1e-7 * scale) == R
-    assert n == pytest.approx(u @ omega)
-
-
-@given(st.tuples(small, small, quick, quick, quick).map(np.array), bodies)
-def test_rolling_conserves_energy(y: np.ndarray, body: dict[str, float]) -> None:
-    p = take(noslip.Constants.of(columns(**body)), 0)
-    slopes, _ = noslip.rhs(y, p)
-    n, rattle, inertia = noslip.energy(y + 1e-30j * np.array(slopes), p)
-    assert abs((rattle + 0.5 * inertia * n**2).imag / 1e-30) < 1e-11 * (1 + np.abs(slopes).max())
 
 
 def test_rolling_energy_drift() -> None:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import columns
-from support.independent import contact, derivative
+from support import columns, newton
 
-from sweep.models.ladder import slip
+from sweep.models.ladder import noslip, slip
 from sweep.models.model import stack, take
 
 bodies = st.fixed_dictionaries(
@@ -32,39 +31,29 @@ def evaluate(y: np.ndarray, body: dict[str, float]) -> tuple[np.ndarray, tuple[f
 
 
 @given(states, bodies)
-def test_right_hand_side_equals_newton_euler_with_unknown_force(y: np.ndarray, body: dict[str, float]) -> None:
-    ours, (spin, dissipation, R, _) = evaluate(y, body)
-    theirs, R_theirs = derivative(y, **body)
-    scale = 1 + np.abs(theirs).max()
-    np.testing.assert_allclose(ours, theirs, atol=2e-8 * scale)
-    assert pytest.approx(R_theirs, abs=1e-7 * scale) == R
+def test_the_equations_and_the_energy_are_those_of_newton_and_euler(y: np.ndarray, body: dict[str, float]) -> None:
+    """With slip, and without it, where the contact rests."""
     u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
-    v = np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
-    assert spin == pytest.approx(u @ y[2:5], abs=1e-14)
-    assert dissipation == pytest.approx(body["mu"] * R * (v @ v), rel=1e-12)
+    for model, law in ((slip, "viscous"), (noslip, None)):
+        y = y if law else y[:5]
+        constants = take(model.Constants.of(columns(**body)), 0)
+        slopes, (spin, power, R, _) = model.rhs(tuple(y), constants)
+        expected, N, lost = newton.derivative(y, body, law)
+        scale = 1 + np.abs(expected).max()
+        np.testing.assert_allclose(slopes, expected, atol=1e-10 * scale)
+        assert pytest.approx(N, abs=1e-10 * scale) == R
+        assert (spin, power) == (pytest.approx(u @ y[2:5], abs=1e-14), pytest.approx(lost, rel=1e-9, abs=1e-9))
 
-
-@given(states, bodies)
-def test_energy_changes_by_friction_alone(y: np.ndarray, body: dict[str, float]) -> None:
-    slopes, (_, dissipation, _, _) = evaluate(y, body)
-    constants = take(slip.Constants.of(columns(**body)), 0)
-    # The derivative of the energy along the motion, by a complex step.
-    spin, rattle, inertia = slip.energy(y + 1e-30j * slopes, constants)
-    change = (rattle + 0.5 * inertia * spin**2).imag / 1e-30
-    assert change == pytest.approx(-dissipation, abs=1e-10 * (1 + abs(dissipation)))
-
-
-@given(states, bodies)
-def test_energy_above_rest_equals_the_textbook_formula(y: np.ndarray, body: dict[str, float]) -> None:
-    u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
-    v = np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]])
-    a, b, c = body["a"], body["b"], body["c"]
-    x_p = contact(u, a, b, c, body["delta"])
-    inertia = np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) / 5
-    v_g = v + np.cross(x_p, y[2:5])
-    expected = 0.5 * inertia @ y[2:5] ** 2 + 0.5 * v_g @ v_g - x_p @ u - c
-    spin, rattle, J = slip.energy(tuple(y), take(slip.Constants.of(columns(**body)), 0))
-    assert rattle + 0.5 * J * spin**2 == pytest.approx(expected, rel=1e-9, abs=1e-12)
+        v = np.array([y[5], y[6], -(y[5] * u[0] + y[6] * u[1]) / u[2]]) if law else np.zeros(3)
+        x_p = newton.contact(u, body)
+        v_g = v + np.cross(x_p, y[2:5])
+        total = 0.5 * y[2:5] @ newton.inertia(body) @ y[2:5] + 0.5 * v_g @ v_g - x_p @ u - body["c"]
+        spin, rattle, J = model.energy(tuple(y), constants)
+        assert rattle + 0.5 * J * spin**2 == pytest.approx(total, rel=1e-9, abs=1e-12)
+        # The derivative of the energy along the motion, by a complex step.
+        spin, rattle, J = model.energy(y + 1e-30j * np.array(slopes), constants)
+        change = (rattle + 0.5 * J * spin**2).imag / 1e-30
+        assert change == pytest.approx(-power, abs=1e-10 * (1 + abs(power)) if law else 1e-11 * scale)
 
 
 @given(states, bodies)
@@ -82,7 +71,7 @@ def test_mirror_image_moves_as_the_mirror_image(y: np.ndarray, body: dict[str, f
 def test_start_puts_the_contact_where_asked(x0: float, y0: float, n0: float, delta: float) -> None:
     u1, u2, w1, w2, w3, v1, v2 = (float(s[0]) for s in slip.start(columns(x0=x0, y0=y0, n0=n0, delta=delta)))
     u = np.array([u1, u2, -np.sqrt(1 - u1**2 - u2**2)])
-    np.testing.assert_allclose(contact(u, 10, 3, 1, delta)[:2], [x0, y0], atol=1e-14)
+    np.testing.assert_allclose(newton.contact(u, {"a": 10, "b": 3, "c": 1, "delta": delta})[:2], [x0, y0], atol=1e-14)
     np.testing.assert_allclose([w1, w2, w3], n0 * u, atol=1e-15)
     assert (v1, v2) == (0, 0)
 

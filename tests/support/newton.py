@@ -49,26 +49,32 @@ def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vect
     Parameters
     ----------
     y : u1, u2, ω1, ω2, ω3 and, with a law, v1 and v2, in the body's axes
-    p : parameters by name
+    p : parameters by name; without `Ixx` of the paper's body, in its axes of inertia, at `delta` from its own
     """
+    slopes, N, power, _ = _solution(y, p, law)
+    return slopes, N, power
+
+
+def _solution(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vector, float, float, float]:
+    """As `derivative`, and the determinant of the linear system, which vanishes where no force solves it."""
     m, g = p.get("mass", 1.0), p.get("gravity", 1.0)
     u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
     side = np.cross(u, [1.0, 0, 0]) / np.linalg.norm(np.cross(u, [1.0, 0, 0]))
     space = np.array([np.cross(side, u), side, u])  # rows: axes fixed in space, in the body's components
-    inertia = space @ _inertia(p) @ space.T
+    J = space @ inertia(p) @ space.T
     omega, up = space @ y[2:5], np.array([0, 0, 1.0])
     v = space @ np.array([*y[5:], -(y[5] * u[0] + y[6] * u[1]) / u[2]]) if law else np.zeros(3)
     du = np.cross(u, y[2:5])
-    x_p = space @ _contact(u, p)
+    x_p = space @ contact(u, p)
     # The velocity of the contact point, in space, as the body turns: by a complex step.
-    moving = space @ (_contact(u + 1e-30j * du, p).imag / 1e-30) + np.cross(omega, x_p)
+    moving = space @ (contact(u + 1e-30j * du, p).imag / 1e-30) + np.cross(omega, x_p)
 
     # Unknowns: a_G, ω' and the contact force F; ω' is the same in both systems of axes.
     matrix, right = np.zeros((9, 9)), np.zeros(9)
     matrix[:3, :3], matrix[:3, 6:], right[:3] = m * np.eye(3), -np.eye(3), -m * g * up
     speed = np.linalg.norm(omega)
-    matrix[3:6, 3:6], matrix[3:6, 6:] = inertia, -_cross(x_p)
-    right[3:6] = -np.cross(omega, inertia @ omega) - p.get("sigma", 0.0) * omega
+    matrix[3:6, 3:6], matrix[3:6, 6:] = J, -_cross(x_p)
+    right[3:6] = -np.cross(omega, J @ omega) - p.get("sigma", 0.0) * omega
     rolling = p["mu_rolling"] * p["radius"] / _rounded(speed, p["speed_rolling"]) if "mu_rolling" in p else 0.0
     matrix[3:6, 8] += rolling * omega
     n = omega[2]
@@ -99,7 +105,7 @@ def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vect
         in_space = acceleration @ found[:6] - drift
         slopes += list((space.T @ in_space - np.cross(y[2:5], space.T @ v))[:2])
     power = -found[6:] @ v + (p.get("sigma", 0.0) + N * rolling) * speed**2 + N * spinning * n**2
-    return np.array(slopes), N, power
+    return np.array(slopes), N, power, np.linalg.det(matrix)
 
 
 def follow(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) -> Vector:
@@ -111,18 +117,24 @@ def follow(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) ->
     return np.asarray(solution.y)
 
 
-def _inertia(p: Mapping[str, float]) -> Vector:
+def inertia(p: Mapping[str, float]) -> Vector:
+    if "Ixx" not in p:
+        return np.diag([p["b"] ** 2 + p["c"] ** 2, p["a"] ** 2 + p["c"] ** 2, p["a"] ** 2 + p["b"] ** 2]) / 5
     xy, xz, yz = (p.get(name, 0.0) for name in ("Ixy", "Ixz", "Iyz"))
     return np.array([[p["Ixx"], xy, xz], [xy, p["Iyy"], yz], [xz, yz, p["Izz"]]])
 
 
-def _contact(u: Vector, p: Mapping[str, float]) -> Vector:
+def contact(u: Vector, p: Mapping[str, float]) -> Vector:
     """The lowest point of the surface, from the centre of mass."""
     if p.get("surface") == "paraboloid":  # where the gradient of z + (a x² + b y²)/c is along -u
         x, y = p["c"] / 2 / p["a"] * u[0] / u[2], p["c"] / 2 / p["b"] * u[1] / u[2]
         return np.array([x, y, p["c"] * (1 - p["a"] * (x / p["c"]) ** 2 - p["b"] * (y / p["c"]) ** 2) - p["offset"]])
-    semi = np.array([p["a"], p["b"], p["c"]])
-    return -semi * _unit(semi * u) - np.array([0, 0, p["offset"]])
+    semi, turn = np.array([p["a"], p["b"], p["c"]]), _turn(0.0 if "Ixx" in p else p["delta"])
+    return turn.T @ (-semi * _unit(semi * (turn @ u))) - np.array([0, 0, p.get("offset", 0.0)])
+
+
+def _turn(delta: float) -> Vector:
+    return np.array([[np.cos(delta), -np.sin(delta), 0], [np.sin(delta), np.cos(delta), 0], [0, 0, 1]])
 
 
 def _cross(x: Vector) -> Vector:
@@ -132,3 +144,48 @@ def _cross(x: Vector) -> Vector:
 
 def _unit(u: Vector) -> Vector:
     return u / np.sqrt(u @ u)
+
+
+def end(*, t_end: float, n0: float, x0: float, y0: float, **p: float) -> tuple[float, float, float, float]:
+    """When and how a trajectory of the paper's body ends: the time, and then u3², normal force and determinant.
+
+    It ends where one of these vanishes, or where the force grows beyond all bounds.  Force and determinant often vanish
+    together, so that the force stays finite, and SciPy steps across.
+    """
+    turn = _turn(p["delta"])
+    inverse = turn.T @ np.diag([p["a"] ** -2.0, p["b"] ** -2.0, p["c"] ** -2.0]) @ turn
+    # The point (x0, y0, z) of the surface, with z > 0, where the normal of the surface is -u.
+    point = np.array([x0, y0, 0.0])
+    point[2] = p["c"] * np.sqrt(1 - point @ inverse @ point)
+    u = -_unit(inverse @ point)
+
+    def height(_: float, y: Vector) -> float:
+        return 1 - y[0] ** 2 - y[1] ** 2
+
+    def slopes(_: float, y: Vector) -> Vector:
+        return _solution(y, p, "viscous")[0]
+
+    def force(_: float, y: Vector) -> float:
+        return _solution(y, p, "viscous")[1]
+
+    def determinant(_: float, y: Vector) -> float:
+        return _solution(y, p, "viscous")[3]
+
+    def jams(t: float, y: Vector) -> float:
+        return force(t, y) - 1e4
+
+    def topples(t: float, y: Vector) -> float:
+        return height(t, y) - 1e-8
+
+    events = [force, jams, topples, determinant]
+    for event in events:
+        event.terminal = True  # type: ignore[attr-defined]
+    with np.errstate(all="ignore"):
+        solution = solve_ivp(
+            slopes, (0, t_end), [*u[:2], *(n0 * u), 0.0, 0.0], "DOP853", rtol=1e-9, atol=1e-12, events=events
+        )  # fmt: skip
+    assert solution.status == 1
+    y, time = solution.y[:, -1], solution.t[-1]
+    if len(solution.t_events[2]):  # u3 vanishes linearly in time, so u3² does like its square
+        time += height(time, y) / (y[:2] @ slopes(time, y)[:2])
+    return time, height(time, y), force(time, y), determinant(time, y)
