@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from sweep.config import Config, ConfigError, brought, load_config
-from sweep.config.document import Document
+from sweep.config import Config, ConfigError, Fault, load_config
+from sweep.config.brought import SUFFIX
 from sweep.config.faults import brief
 from sweep.explore.slices import Source
 from sweep.explore.state import Cell
-from sweep.models.user import loading
+from sweep.models.user.loading import entry_point
 
 Announce = Callable[[str], None]
 
@@ -33,7 +34,7 @@ class Setup:
     """
 
     def __init__(self, source: Source, model: str | None = None, announce: Announce | None = None) -> None:
-        self.config = _configuration(source, _named(source, model), announce) if model else _configuration(source)
+        self.config = _configuration(source, _named(source, model) if model else {}, announce if model else None)
         here = source.parameters_at(tuple(self.config.parameters), dict.fromkeys(source.dims, 0))
         self.base: Cell = {name: here.get(name, v.numbers[0]) for name, v in self.config.parameters.items()}
 
@@ -53,42 +54,38 @@ def usable(source: Source) -> Setup | None:
         return None
 
 
-def _named(source: Source, model: str) -> dict[str, Any]:
-    """What the configuration has to say of the model that the user names, which is not run before it is the right one.
+def _named(source: Source, model: str) -> dict[str, str]:
+    """What the configuration has to say of the model that the user names: it runs only if its hash is the dataset's.
 
     What the dataset says of its file does not matter: the dataset may come from anybody.
     """
-    place = str(Path(model).absolute()) if model.endswith(brought.SUFFIX) else model
-    option = Document("", {"model": place}, arguments={("model",): ("--model", ("model",))})
-    wanted = source.dataset.attrs.get("model_sha256")
-    found = brought.of_file(option, place) if model.endswith(brought.SUFFIX) else loading.entry_point(model)
+    wanted, words = source.dataset.attrs.get("model_sha256"), ""
     if wanted is None:
-        words = f"the model of {source.name} is none that a user brought; allowed: no --model"
-    elif found is None:
-        words = f"{brief(model)}: unknown; allowed: a Python file, or an entry point of an installed package"
-    elif found.digest != wanted:
-        words = f"{brief(model)} has the SHA-256 {found.digest}; allowed: that of {source.name}, {brief(str(wanted))}"
-    else:
-        return {"model": place, "model_sha256": found.digest}
-    raise ConfigError([option.fault(("model",), words)])
+        words = f"no user brought the model of {source.name}; leave the option out"
+    elif model.endswith(SUFFIX):
+        model = str(Path(model).absolute())
+    elif entry_point(model) is None:
+        words = f"{brief(model)} is neither a Python file nor an entry point of an installed package"
+    if words:
+        raise ConfigError([Fault("", None, None, ("--model",), words)])
+    return {"model": model, "model_sha256": str(wanted)}
 
 
-def _configuration(source: Source, named: Mapping[str, Any] | None = None, announce: Announce | None = None) -> Config:
+def _configuration(source: Source, named: dict[str, str], announce: Announce | None) -> Config:
     """The configuration in the dataset; a table of cases, which is another file, gives way to the first case.
 
     It may come from anybody, so that a model in it that is a file or an entry point is refused, not run, unless the
     user has named it.
     """
-    text = str(source.dataset.attrs.get("config", ""))
+    text, overrides = str(source.dataset.attrs.get("config", "")), dict[str, Any](named)
+    if "case" in source.dims:
+        text = re.sub("^cases:.*", "", text, flags=re.MULTILINE)
+        coordinates = [str(n) for n, c in source.dataset.coords.items() if n != "case"]
+        overrides |= source.parameters_at(tuple(coordinates), {"case": 0})
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "explore.yaml")
         path.write_text(text, encoding="utf-8")
-        overrides: dict[str, Any] = dict(named or {})
-        if "case" in source.dims:
-            path.write_text("\n".join(line for line in text.split("\n") if not line.startswith("cases:")), "utf-8")
-            coordinates = [str(n) for n, c in source.dataset.coords.items() if n != "case"]
-            overrides |= source.parameters_at(tuple(coordinates), {"case": 0})
-        config = load_config(path, overrides, announce=announce)
+        config = load_config(path, overrides, argument=lambda _: "--model", announce=announce)
     if not config.simulated:
         raise ConfigError([])
     names = config.tier.parameters
