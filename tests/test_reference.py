@@ -13,8 +13,8 @@ from support import ROOT
 from support.kernels import default_measures
 
 import sweep
-from sweep.bench.counts import T_END
 from sweep.bench.reference import read_counts
+from sweep.bench.timing import LONGEST
 from sweep.report.direct import simulate
 
 
@@ -47,5 +47,5 @@ def test_firm_counts_of_500_random_cells_agree(method: str, every: int) -> None:
     sample = np.flatnonzero(reference.firm)[::every]
     assert len(sample) > 400 / every
     columns = {name: column[sample] for name, column in reference.columns.items()}
-    ends = simulate(columns, T_END, method=method, measure=default_measures("slip"), settle=True)
+    ends = simulate(columns, LONGEST, method=method, measure=default_measures("slip"), settle=True)
     np.testing.assert_array_equal(ends["reversals"], reference.reversals[sample])

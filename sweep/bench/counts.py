@@ -9,13 +9,11 @@ from matplotlib.axes import Axes
 
 from sweep.bench.reference import Counts, at_each, read_counts
 from sweep.bench.section import BenchSection, colour, marker
-from sweep.bench.timing import Effort
+from sweep.bench.timing import LONGEST, Effort
 from sweep.grid import Array
 from sweep.kernels.methods import METHODS, automatic_step
 from sweep.models import MODELS
 from sweep.report.direct import simulate
-
-T_END = 30_000.0
 
 SPARSE = 5
 """A method whose stability limits the step runs every fifth cell of the reference: dopri5 takes ten times as long."""
@@ -49,7 +47,7 @@ def counts(method: str, reference: Counts, sample: Array, asked: tuple[float, ..
 
     def reversals(cells: Array, steps: Array) -> Array:
         chosen = {name: column[cells] for name, column in columns.items()}
-        return simulate(chosen, T_END, method=method, step=steps, settle=True)["reversals"]
+        return simulate(chosen, LONGEST, method=method, step=steps, settle=True)["reversals"]
 
     return at_each([automatic_step(method, MODELS["slip"], columns, t)[0] for t in asked], reversals)
 

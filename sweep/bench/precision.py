@@ -117,5 +117,5 @@ def _draw(axes: Axes, points: list[Point], cost: list[Spread], slip: bool) -> No
         face = "white" if method == methods.PLAIN else colour
         curve(axes, *zip(*found, strict=True), fmt=f"{marker(method)}-", color=colour, markerfacecolor=face,
               label=f"{case}, {method}")  # fmt: skip
-    title = f"Work and precision, {'slip' if slip else 'reduced models'}"
-    axes.set(title=title, xlabel="largest error in spin", ylabel="ms per trajectory")
+    axes.set(xlabel="largest error in spin", ylabel="ms per trajectory")
+    axes.set_title(f"Work and precision, {'slip' if slip else 'reduced models'}")

@@ -38,11 +38,10 @@ class Spins:
 
     def name(self, body: int) -> str:
         """The friction, and what else differs from the standard case, in words."""
-        values = {name: float(column[body]) for name, column in self.columns.items()}
         shown = [
-            f"{'μ' if name == 'mu' else name} = {value:g}"
-            for name, value in values.items()
-            if name == "mu" or value != PARAMETERS[name].default
+            f"{'μ' if name == 'mu' else name} = {column[body]:g}"
+            for name, column in self.columns.items()
+            if name == "mu" or column[body] != PARAMETERS[name].default
         ]
         return ", ".join(shown) or "standard"
 

@@ -92,5 +92,5 @@ def write_csv(path: Path, readings: list[Reading]) -> None:
         for one in readings:
             values = one.spread.values
             figures = [f"{v:.6g}" for v in (one.spread.median, values.min(), values.max())]
-            where = [getattr(one, name) for name in names]
+            where = (getattr(one, name) for name in names)
             writer.writerow([*where, f"{one.at:.8g}", one.quantity, *figures, len(values)])

@@ -22,6 +22,9 @@ Key = TypeVar("Key")
 T_END = 400.0
 """The time for which `tolerance` bounds the error in spin, in sqrt(c/g)."""
 
+LONGEST = 30_000.0
+"""Time limit of runs to the end, in sqrt(c/g)."""
+
 STEEPEST = 1e4
 """Largest friction at which a method is run whose stability limits the step: its time is proportional to μ."""
 

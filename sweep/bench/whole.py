@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 
 from sweep.bench.section import BenchSection, Spread, colour, curve, marker
 from sweep.bench.stopwatch import Place, stopwatch
-from sweep.bench.timing import T_END, Effort, in_turn
+from sweep.bench.timing import LONGEST, T_END, Effort, in_turn
 from sweep.engine import plan
 from sweep.engine.plan import Plan
 from sweep.engine.run import run
@@ -41,15 +41,11 @@ PLACES: dict[Place, str] = {
 }
 """What is timed inside a run.  The time of the kernel includes that of lanes which wait for the last trajectories."""
 
-LONGEST = 30_000.0
-"""Time limit of the runs to the end."""
-
 COMPARED = 16
 """Cells of a run that are compared with a tight one."""
 
-START = {"a": 10.0, "n0": 0.05}
-BASE = f"body: {{a: {START['a']}, b: 3.0}}\nfriction: {{mu: 60.0}}\nstart: {{n0: {START['n0']}}}\n"
-"""The configuration of all runs; what differs is given beside it."""
+BASE = "friction: {mu: 60.0}\n"
+"""The configuration of all runs, whose other values are the paper's; what differs is given beside it."""
 
 REFERENCE = {"mu": np.linspace(20, 200, 46), "b": np.linspace(1.2, 9.8, 44), "n0": np.array([0.02, 0.05, 0.1])}
 """Axes of `configs/mu_b.yaml`, in their order."""
@@ -87,7 +83,7 @@ class WholeRun:
         cells = self.dataset.stack(cell=("mu", "b"))
         at_end = np.flatnonzero(cells["status"].values == TIME_LIMIT)
         sample = cells.isel(cell=at_end[np.linspace(0, len(at_end) - 1, COMPARED).astype(int)])
-        columns = standard(**{name: sample[name].values for name in ("mu", "b")}, **START)
+        columns = standard(**{name: sample[name].values for name in ("mu", "b")})
         step, _ = methods.automatic_step(methods.PLAIN, MODELS["slip"], columns, 1e-12)
         tight = simulate(columns, T_END, step=step / 2, ranges=False)["spin_final"]
         return float(np.abs(sample["spin_final"].values - tight).max())
@@ -148,9 +144,8 @@ def _beside_kernel(runs: list[WholeRun], times: list[Spread], section: BenchSect
 def _by_share(reference: WholeRun, whole: float, section: BenchSection) -> Table:
     seconds = {name: reference.share(name).median for name in dict.fromkeys(PLACES.values())}
     seconds |= {"rest": whole - sum(seconds.values()), "whole": whole}
-    for name, spent in seconds.items():
-        quantity = {f"{name.replace('-', '_')}_seconds": spent}
-        section.add("slip", AUTO, "reference sweep", "cells", reference.cells, **quantity)
+    quantities = {f"{name.replace('-', '_')}_seconds": spent for name, spent in seconds.items()}
+    section.add("slip", AUTO, "reference sweep", "cells", reference.cells, **quantities)
     caption = (
         f"Where the time of a whole run goes: the first {reference.cells} cells of the reference sweep, method {AUTO}, "
         "to the end, one run. planning: limits, choice of method and step, and images without start-up; "
