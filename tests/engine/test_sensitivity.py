@@ -44,20 +44,19 @@ def labels(dataset: xr.Dataset) -> str:
     return " ".join(text.get_text() for legend in picture.draw(dataset).legends for text in legend.get_texts())
 
 
-def test_settled_trajectories_come_to_rest_where_they_are_said_to() -> None:
-    settings: dict[str, object] = {"b": [2.0, 3.0, 6.0], "mu": [40, 80], "n0": 0.05, "t_end": 30_000, "method": "adams"}
+def test_settled_trajectories_stay_where_they_are_said_to() -> None:
+    settings: dict[str, object] = {"b": [2.0, 3.0], "mu": [40, 70], "n0": 0.05, "t_end": 30_000, "method": "adams"}
     settings["measure"] = list(default_measures("slip"))
     left, later = run(**settings), run(**settings, stop_when_settled=False)
     settled = (left.status == SETTLED).values
-    assert settled.sum() >= 4
-    rest, end = left.spin_rest.values[settled], later.spin_final.values[settled]
-    # Beyond n_c1 a rattle grows before it comes to rest.
-    growing = (left.spin_final / xr.where(left.spin_final > 0, left.n_c1_plus_linear, left.n_c1_minus_linear)) > 1
-    np.testing.assert_array_equal(np.isnan(rest), growing.values[settled])
-    rest, end, settled = rest[~np.isnan(rest)], end[~np.isnan(rest)], settled & ~growing.values
-    np.testing.assert_allclose(rest, end, rtol=1e-3)
-    assert np.abs(left.spin_final.values[settled] / end - 1).max() > 0.01
-    assert np.isnan(left.spin_rest.values[~settled]).all()
+    rest, end = left.spin_rest.values, later.spin_final.values
+    # Beyond n_c1 a rattle grows, and turns the spin back, before it decays.
+    n_c1 = xr.where(left.spin_final > 0, left.n_c1_plus_linear, left.n_c1_minus_linear)
+    grows = (left.spin_final / n_c1 > 1).values
+    assert min((settled & grows).sum(), (settled & ~grows).sum()) >= 2
+    assert (np.abs(rest / end - 1) < np.where(grows, 4e-3, 1e-3))[settled].all()
+    assert np.abs(left.spin_final.values / end - 1)[settled].max() > 0.01
+    assert np.isnan(rest[~settled]).all()
 
 
 def test_a_start_by_angles_is_nudged_too() -> None:
