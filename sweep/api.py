@@ -130,19 +130,22 @@ def trajectory(
     config: ConfigLike,
     *,
     every: float | None = None,
+    stop_when_settled: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
     **values: Any,
 ) -> xr.Dataset:
-    """Follow single cells densely in time.
+    """Follow single cells densely in time, up to t_end.
 
     The method is always dopri5, whatever the configuration names: it alone can stop after any step for a sample.
 
     Parameters
     ----------
     config, progress, reporter : as for `run`
-    every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, rounded to whole steps; by default nearly
-        twenty per period of the fastest motion
+    every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
+        per period of the fastest motion
+    stop_when_settled : end a trajectory when neither spin nor count can change any more, as a sweep does, and not at
+        t_end, whatever the configuration says; with `t_end: .inf`, it always ends there
     values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``, of which each combination is one trajectory;
         an axis of `config` that is not named takes its first value.  Anything else replaces a value of `config`, such
         as ``t_end=300``
@@ -150,8 +153,8 @@ def trajectory(
     Returns
     -------
     Dataset over (trajectory, time): the series that the model can show, NaN after the end of a
-    trajectory.  Over (trajectory): all that a sweep gives for the cell, from the very same steps, which the sampling
-    does not change.
+    trajectory.  Over (trajectory): all that a sweep gives for the cell, from the same steps, which the sampling does
+    not change.  The status is `settled` if neither spin nor count would change any more after t_stop.
 
     Raises
     ------
@@ -166,7 +169,7 @@ def trajectory(
     cells = {name: value for name, value in values.items() if name in known}
     with shown(progress, reporter, "sqrt(c/g)") as told:
         checked = load_config(config, {n: v for n, v in values.items() if n not in known}, announce=told.note)
-        return trajectory(checked, every=every, reporter=told, **cells)
+        return trajectory(checked, every=every, stop_when_settled=stop_when_settled, reporter=told, **cells)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:

@@ -86,14 +86,22 @@ def run(
 @CONFIG
 @click.option("--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun_parameters,
               help="Which cell, e.g. --at mu=60 --at b=3; a parameter given again adds a trajectory.")  # fmt: skip
+@click.option("--stop-when-settled", is_flag=True,
+              help="End when neither spin nor count can change any more, as a sweep does, not at t_end.")  # fmt: skip
 @OUTPUT
 @SETTINGS
 @click.option("--dry-run", is_flag=True, help="Print trajectories, steps and estimated time; compute nothing.")
 @QUIET
 def trajectory(
-    config: Path, cells: tuple[str, ...], output: Path | None, settings: tuple[str, ...], dry_run: bool, quiet: bool
+    config: Path,
+    cells: tuple[str, ...],
+    stop_when_settled: bool,
+    output: Path | None,
+    settings: tuple[str, ...],
+    dry_run: bool,
+    quiet: bool,
 ) -> None:
-    """Follow single cells of CONFIG densely in time.
+    """Follow single cells of CONFIG densely in time, up to its t_end.
 
     Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip,
     normal force, energy and the work of friction.  Several trajectories are drawn over each other.
@@ -114,7 +122,7 @@ def trajectory(
 
         interrupt.raise_again()
         with Terminal(quiet, _TIMES[checked.units]) as terminal, of_option("--at", checked.table):
-            result = follow(checked, reporter=terminal, **at)
+            result = follow(checked, stop_when_settled=stop_when_settled, reporter=terminal, **at)
         files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
         files.save_result(result, plots.draw(result))
         if not quiet:

@@ -104,7 +104,7 @@ class Integrator(Strict):
         "hundreds",
     )  # fmt: skip
     stop_when_settled: bool = Field(
-        default=True, description="whether a trajectory ends when neither spin nor count can change any more"
+        default=True, description="whether a trajectory of a sweep ends when neither spin nor count can change any more"
     )
 
 

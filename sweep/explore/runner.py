@@ -11,19 +11,21 @@ from queue import SimpleQueue
 
 import xarray as xr
 
-from sweep.config import Config, ConfigError, Values
+from sweep.config import ConfigError, Values
 from sweep.config.faults import printable
+from sweep.config.schema import FOREVER
 from sweep.engine.reporter import Progress, Reporter
 from sweep.explore.setup import Setup
 from sweep.explore.state import Cell
 from sweep.grid import Array
 from sweep.jit import showing
 from sweep.kernels import measures
-from sweep.plots.trajectories import reversal_times
+from sweep.plots.trajectories import lively_until, reversal_times
 from sweep.studies.trajectory import trajectory
 
-SAMPLES = 60_000
-"""Samples of a trajectory at most, about: more are no longer drawn fluently."""
+LONG = 30_000.0
+"""Time in sqrt(c/g) beyond which a trajectory is sampled more coarsely: 200 000 samples of the paper's body.  One
+without an end (`t_end: .inf`) ends here."""
 
 COMPILING = "compiling the simulation for this machine; later runs find it in the cache"
 
@@ -83,20 +85,18 @@ class Job(Reporter):
 
 
 def run(setup: Setup, cell: Cell, reporter: Reporter | None = None) -> Curve:
-    """Run the trajectory of a cell, with the usual measurements, sampled as densely as `SAMPLES` allow."""
+    """Run the trajectory of a cell, with the usual measurements, and keep what is worth a look (`lively_until`)."""
     began = time.perf_counter()
     parameters = {name: Values((value,), False, value) for name, value in cell.items()}
-    config = replace(setup.config, parameters=parameters, measure=measures.default(setup.config.equations))
-    one = trajectory(config, every=_interval(config, reporter), reporter=reporter).isel(trajectory=0)
+    t_end = setup.config.integrator.t_end
+    t_end = LONG if t_end >= FOREVER else t_end
+    integrator = setup.config.integrator.model_copy(update={"t_end": t_end})
+    usual = measures.default(setup.config.equations)
+    config = replace(setup.config, parameters=parameters, measure=usual, integrator=integrator)
+    every = t_end / (2 * LONG) if t_end > LONG else None
+    one = trajectory(config, every=every, reporter=reporter).isel(trajectory=0)
+    one = one.sel(time=slice(0, lively_until(one)))
     return Curve(one, reversal_times(one), time.perf_counter() - began)
-
-
-def _interval(config: Config, reporter: Reporter | None) -> float | None:
-    """The time between samples that keeps a long trajectory to `SAMPLES`; None where the usual one does."""
-    if config.integrator.t_end <= SAMPLES / 2:
-        return None
-    stop = float(trajectory(config, every=config.integrator.t_end, reporter=reporter)["t_stop"][0])
-    return None if stop <= SAMPLES / 2 else stop / SAMPLES
 
 
 class Runner:

@@ -37,12 +37,17 @@ _MOST_ENTRIES = 12
 _SHADES = (0.55, 1.0)
 """Opacity of the first and of the second series of a panel."""
 
+_STILL = 0.01
+"""Changes smaller than this share of a series' range are not worth a look."""
+
 _CRITICAL = {"n_c1": ":", "n_c2": "--"}
 """Styles of the critical spins, none of them that of a curve."""
 
 
 def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     """The spin with its reversals and critical values over time, and below it whatever else the dataset has.
+
+    Where the bodies come to rest early, the time axis ends there, and says so.
 
     Parameters
     ----------
@@ -68,6 +73,10 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
     entries = _series(first, dataset, only) if only else _spin(first, dataset)
+    time, until, last = labels.label(dataset, "time"), lively_until(dataset), float(dataset["time"].max())
+    if until < last:
+        first.set_xlim(0, until)
+        time = f"{time}; nothing changes by more than {_STILL:.0%} from here to {last:g}"
     axes = first
     for k, (title, names) in enumerate(panels):
         axes = figure.add_subplot(grid[1 + k // 2, k % 2], sharex=first)
@@ -76,9 +85,9 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
         axes.set_title(f"{title}{per_mass}", fontsize=9, loc="left")
         axes.tick_params(labelbottom=k >= len(panels) - 2)
         if k >= len(panels) - 2:
-            axes.set_xlabel(labels.label(dataset, "time"), fontsize=9)
+            axes.set_xlabel(time, fontsize=9)
     if not panels:
-        first.set_xlabel(labels.label(dataset, "time"), fontsize=9)
+        first.set_xlabel(time, fontsize=9)
     legends.below(figure, entries)
     return figure
 
@@ -154,6 +163,22 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
                     )  # fmt: skip
                     written.append(at)
     return list(entries.values())
+
+
+def lively_until(dataset: xr.Dataset) -> float:
+    """A quarter beyond the time of the last reversal, and of the last change of any series by a share of its range.
+
+    The end of the series if that is not much later.
+    """
+    at = dataset["time"].values
+    last = float(dataset["t_last_reversal"].fillna(0.0).max()) if "t_last_reversal" in dataset else 0.0
+    for values in (v.values for v in dataset.data_vars.values() if "time" in v.dims):
+        if not (known := np.isfinite(values)).any():
+            continue
+        ends = np.take_along_axis(values, known.cumsum(axis=-1).argmax(axis=-1)[..., None], axis=-1)
+        lively = known & (np.abs(values - ends) > _STILL * np.nanmax(np.abs(values - ends)))
+        last = max(last, float(at[lively.reshape(-1, len(at)).any(axis=0)].max(initial=0.0)))
+    return 1.25 * last if 0 < 1.5 * last < at[-1] else float(at[-1])
 
 
 def reversal_times(one: xr.Dataset) -> Array:

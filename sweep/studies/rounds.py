@@ -22,6 +22,12 @@ _CHUNK_SECONDS = 0.05
 """Length of a chunk.  Trajectories whose answer is known before their end are ended after one."""
 
 
+def advanced(kernel: Kernel, images: Array) -> Array:
+    """The share of the way to its time limit that each trajectory has covered, 1 where it has ended."""
+    table = kernel.table(images)
+    return np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0)
+
+
 @dataclass(frozen=True)
 class Simulations:
     """Trajectories of one method."""
@@ -29,12 +35,6 @@ class Simulations:
     kernel: Kernel
     images: Array
     """Shape (simulations, rows)."""
-
-    @property
-    def advanced(self) -> Array:
-        """The share of the way to its time limit that each has covered, 1 where it has ended, shape (simulations,)."""
-        table = self.kernel.table(self.images)
-        return np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0)
 
 
 Batch = Mapping[str, Simulations]
@@ -98,7 +98,7 @@ class Rounds:
             if (now := time.perf_counter()) - saved > executor.CHUNK_SECONDS:
                 self.store.save_running(Running([number], tables, now - began))
                 saved = now
-            self.advanced(float(np.concatenate([some.advanced for some in batch.values()]).mean()))
+            self.advanced(float(np.concatenate([advanced(some.kernel, some.images) for some in batch.values()]).mean()))
 
         for each in batch.values():
             executor.execute(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import product
 from math import prod
@@ -16,6 +16,7 @@ from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
 from sweep.config.brought import explained
 from sweep.config.faults import suggestion
 from sweep.config.scenes import misplaced, unfit
+from sweep.config.schema import FOREVER
 from sweep.config.values import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS
@@ -28,12 +29,12 @@ from sweep.jit import threads
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import automatic_step
-from sweep.kernels.status import RUNNING
+from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models.model import Columns, Model
 from sweep.models.theory.linear import fastest_motion
 from sweep.results import dataset
 from sweep.results.provenance import provenance
-from sweep.studies.rounds import Simulations
+from sweep.studies.rounds import advanced
 from sweep.studies.stepwise import stepwise
 from sweep.variables import Variable
 
@@ -43,11 +44,8 @@ SAMPLES_A_RADIAN = 3
 # The fewest blocks of steps between two marks of a run, and the most marks, counting those of each trajectory.
 _BLOCKS, _MARKS = 8, 2048
 
-# Samples whose images are held at a time (about 100 MB).
-_SAMPLES = 200_000
-
-# Times that differ relatively by less than this are the same one.
-_SAME = 1e-12
+# Times that differ relatively by less than this are the same one; so are a step and one that is longer by this share.
+_SAME, _SAME_STEP = 1e-12, 1e-9
 
 # Blocks of steps: as many as are needed.
 _UNTIL_ALL_STOP = 2**40
@@ -86,6 +84,7 @@ def trajectory(
     config: ConfigLike,
     *,
     every: float | None = None,
+    stop_when_settled: bool = False,
     reporter: Reporter | None = None,
     **at: Any,
 ) -> xr.Dataset:
@@ -97,8 +96,10 @@ def trajectory(
     Parameters
     ----------
     config : as `sweep.config.load_config` takes it
-    every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, rounded to whole steps if all trajectories
-        have the same; by default nearly twenty per period of the fastest motion
+    every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
+        per period of the fastest motion
+    stop_when_settled : as of a sweep: end a trajectory when neither spin nor count can change any more.  Otherwise it
+        goes to t_end, whatever the configuration says; with `t_end: .inf`, it always ends there
     reporter : receives progress, counted in time, and messages; by default there are none
     at : a number, or several as an axis of a configuration has them, by parameter; each combination is one
         trajectory.  An axis of `config` that is not named takes its first value
@@ -106,8 +107,9 @@ def trajectory(
     Returns
     -------
     Dataset over (trajectory, time): the series that the model can show, NaN after the end of a trajectory.  Over
-    (trajectory): all that a sweep gives for the cell, from the very same steps, which the sampling does not change.
-    Samples of trajectories whose steps differ lie between steps: each is one shorter step away from the last one.
+    (trajectory): all that a sweep gives for the cell, from the same steps, which the sampling does not change; the
+    status is `settled` if neither spin nor count would change any more after t_stop.  A sample that lies between two
+    steps is one shorter step away from the first of them.
 
     Raises
     ------
@@ -115,6 +117,8 @@ def trajectory(
         if the model is a formula, or `at` picks cells that cannot be run.
     """
     chosen = choose(config, at)
+    stops = stop_when_settled or chosen.integrator.t_end >= FOREVER
+    chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_when_settled": stops}))
     with explained(chosen.origin):
         return _followed(chosen, every, reporter or Reporter())
 
@@ -123,39 +127,33 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     """`trajectory` of all cells of `chosen`."""
     job = plan(chosen)
     (part,) = job.parts
-    t_end, began = chosen.integrator.t_end, time.perf_counter()
+    kernel, images, columns = part.kernel, part.images, job.grid.columns()
+    t_end, settles, began = chosen.integrator.t_end, chosen.integrator.stop_when_settled, time.perf_counter()
 
     def report() -> None:
-        covered = Simulations(part.kernel, part.images).advanced.sum() * t_end
-        seconds = time.perf_counter() - began
-        reporter.chunk(Progress(len(part.images) * t_end, float(covered), 0, 0, seconds))
+        covered = advanced(kernel, images).sum() * t_end
+        reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, time.perf_counter() - began))
 
-    settles = chosen.integrator.stop_when_settled
-    marks = _run(part.kernel, part.images, settles, report)
-    repeat_all([job], {part.method: (part.kernel, part.images)}, report)
-    halvings = part.kernel.table(part.images)["halvings"]
+    marks = _run(kernel, images, settles, report)
+    repeat_all([job], {part.method: (kernel, images)}, report)
+    halvings = kernel.table(images)["halvings"]
     if halvings.any():
-        marks = _run(part.kernel, cells_of([job], part.method, part.kernel, part.images).start(halvings), settles)
+        marks = _run(kernel, cells_of([job], part.method, kernel, images).start(halvings), settles)
+    _judge(kernel, images)
+    times = _times(kernel, images, every or _intervals(kernel.model, columns).min())
+    series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
     labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
-    interval = np.full(job.grid.size, every) if every else _intervals(part.kernel.model, job.grid.columns())
-    sampled, angles = _sample(part.kernel, marks, part.images, interval), part.kernel.model.turned(job.grid.columns())
-    series = [_series(part.kernel, *found, angle) for found, angle in zip(sampled, angles, strict=True)]
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(job.grid.size), {"units": "1", "long_name": "number of the trajectory"})
-    return flat.assign_coords(trajectory=index).assign(_side_by_side(series, part.kernel.model, chosen.units))
+    return flat.assign_coords(trajectory=index).assign(_described(times, series, kernel.model, chosen.units))
 
 
-def _side_by_side(series: list[dict[str, Array]], model: Model, system: str) -> xr.Dataset:
-    """The series of all trajectories over (trajectory, time), NaN after the end of each."""
-    times = max((one["time"] for one in series), key=len)
+def _described(times: Array, series: dict[str, Array], model: Model, system: str) -> xr.Dataset:
+    """The series over (trajectory, time), with their attributes, in the order of `SERIES`."""
     own = {name: (units, words) for name, units, words in model.series}
-    known = {name: Variable("float64", *words) for name, words in {"time": _TIME, **SERIES, **own}.items()}
-    found: dict[str, Any] = {"time": ("time", times, dataset.described(known["time"], system))}
-    for name in filter({*SERIES, *own}.__contains__, series[0]):
-        padded = np.full((len(series), len(times)), np.nan)
-        for row, one in zip(padded, series, strict=True):
-            row[: len(one[name])] = one[name]
-        found[name] = (("trajectory", "time"), padded, dataset.described(known[name], system))
+    words = {name: dataset.described(Variable("float64", *each), system) for name, each in {**SERIES, **own}.items()}
+    found: dict[str, Any] = {"time": ("time", times, dataset.described(Variable("float64", *_TIME), system))}
+    found |= {name: (("trajectory", "time"), series[name], words[name]) for name in words if name in series}
     return xr.Dataset(found)
 
 
@@ -175,7 +173,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
             f"trajectories: {len(steps)}",
             f"steps:        at most {steps.sum():.3g}",
             f"samples:      at most {samples:.3g}",
-            f"time:         at most about {seconds:.3g} s, if all run to t_end; those that settle stop earlier",
+            f"time:         at most about {seconds:.3g} s",
         ]
     )
 
@@ -235,94 +233,84 @@ def _run(
     return marks
 
 
-def _sample(kernel: Kernel, marks: Marks, ends: Array, intervals: Array) -> Iterator[tuple[Array, Array]]:
-    """For each trajectory the sampled times, shape (samples,), and its images there.
+def _judge(kernel: Kernel, images: Array) -> None:
+    """Give trajectories that have come to their time limit the status `SETTLED` if a sweep would end them there."""
+    looked, at_end = images.copy(), np.flatnonzero(kernel.table(images)["status"] == TIME_LIMIT)
+    kernel.table(looked)["status"][at_end] = RUNNING
+    kernel.advance(looked, at_end, 1, True)
+    kernel.table(images)["status"] = kernel.table(looked)["status"]
 
-    Each is stepped again from the mark before to the samples, and stops at each of them.  The steps are the sweep's
-    own, and so equal to the last bit.  All stretches between two marks are stepped side by side, on all threads.
+
+def _times(kernel: Kernel, ends: Array, interval: float) -> Array:
+    """The times of samples of all trajectories, shape (times,): no denser than steps, and also where one ends."""
+    last = _last(kernel, ends)
+    times = np.union1d(np.arange(0, last.max(), max(interval, kernel.table(ends)["step"].min())), last)
+    different = np.diff(times, prepend=-1) > _SAME * last.max()  # not the same end, rounded in another way
+    return np.asarray(times[different])
+
+
+def _last(kernel: Kernel, ends: Array) -> Array:
+    """The time of the last state of each trajectory."""
+    table = kernel.table(ends)
+    return np.asarray(table["step"] * table["done"])
+
+
+def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Array) -> dict[str, Array]:
+    """The series of all trajectories, each of shape (trajectories, times), NaN after the end of a trajectory.
+
+    From a mark each is stepped again, and stops at each sample before the next mark.  The steps are the sweep's own,
+    and so equal to the last bit.  All stretches between two marks are stepped side by side, on all threads.
     """
-    table, marked = kernel.table(ends), np.array([kernel.table(mark)["done"] for mark in marks])
-    some: list[Array] = []
-    times = _times(table["step"], table["done"], intervals)
-    for i in range(len(ends)):
-        some.append(times[i])
-        if i + 1 == len(ends) or sum(map(len, some)) > _SAMPLES:
-            first = i + 1 - len(some)
-            steps = [_steps_before(each, table["step"][first + j]) for j, each in enumerate(some)]
-            # Of each sample of these trajectories: its trajectory, and the last mark before it.
-            which = np.repeat(np.arange(first, i + 1), [len(each) for each in some])
-            before = [np.searchsorted(marked[:, first + j], each, "right") - 1 for j, each in enumerate(steps)]
-            images = _advance(kernel, marks, which, np.concatenate(before), np.concatenate(steps))
-            _go_on(kernel, images, np.concatenate(some))
-            parts = np.split(images, np.cumsum([len(each) for each in some])[:-1])
-            yield from zip(some, parts, strict=True)
-            some = []
-
-
-def _times(steps: Array, done: Array, intervals: Array) -> list[Array]:
-    """The times at which each trajectory is sampled: the same ones for all, among them those at which one ends."""
-    ends = steps * done
-    interval = intervals.min()
-    if np.ptp(steps) == 0:
-        interval = max(1, round(interval / steps[0]))
-        common = np.union1d(np.arange(0, done.max(), interval), done) * steps[0]
-    else:
-        common = np.union1d(np.arange(0, ends.max(), interval), ends)
-        common = common[np.diff(common, prepend=-1) > _SAME * ends.max()]  # the same end, rounded in other ways
-    return [common[common <= end * (1 + _SAME)] for end in ends]
-
-
-def _steps_before(times: Array, step: float) -> Array:
-    """How many whole steps end before, or at, each of these times."""
-    return np.floor(times / step * (1 + _SAME)).astype(int)
+    which, at = np.nonzero(times <= _last(kernel, ends)[:, None] * (1 + _SAME))  # trajectory and time of each sample
+    steps = np.floor(times[at] / kernel.table(ends)["step"][which] * (1 + _SAME)).astype(int)
+    done = np.array([kernel.table(mark)["done"] for mark in marks])
+    behind = [np.searchsorted(done[:, i], steps[which == i], "right") - 1 for i in range(len(ends))]
+    mark = np.concatenate(behind)
+    firsts = np.flatnonzero(np.diff(which * len(marks) + mark, prepend=-1))
+    counts = np.diff(firsts, append=len(steps))
+    stretches = np.array([marks[mark[i]][which[i]] for i in firsts])
+    table, series = kernel.table(stretches), dict[str, Array]()
+    for i in range(counts.max()):
+        active = np.flatnonzero(counts > i)
+        samples = firsts[active] + i
+        table["goal"][active], table["status"][active] = steps[samples], RUNNING
+        kernel.advance(stretches, active, _UNTIL_ALL_STOP, False)
+        images = stretches[active]
+        _go_on(kernel, images, times[at[samples]])
+        for name, values in _series(kernel, images, angles[which[samples]]).items():
+            if name not in series:
+                series[name] = np.full((len(ends), len(times)), np.nan)
+            series[name][which[samples], at[samples]] = values
+    return series
 
 
 def _go_on(kernel: Kernel, images: Array, times: Array) -> None:
-    """Take `images`, of samples between two steps, on to their `times`, in place, by one shorter step."""
+    """Take `images` between two steps on to their `times`, in place, by one shorter step."""
     table = kernel.table(images)
     rest = times - table["done"] * table["step"]
-    between = rest > 1e-9 * table["step"]
-    if between.any():
-        step, goal = table["step"][between], table["goal"][between]
-        table["step"][between], table["goal"][between] = rest[between], table["done"][between] + 1
-        table["status"][between] = RUNNING
-        kernel.advance(images, np.flatnonzero(between), _UNTIL_ALL_STOP, False)
-        table["step"][between], table["goal"][between] = step, goal
+    between = np.flatnonzero(rest > _SAME_STEP * table["step"])
+    table["step"][between], table["goal"][between] = rest[between], table["done"][between] + 1
+    table["status"][between] = RUNNING
+    kernel.advance(images, between, _UNTIL_ALL_STOP, False)
 
 
-def _advance(kernel: Kernel, marks: Marks, which: Array, before: Array, steps: Array) -> Array:
-    """The images of samples, shape (samples, rows): of the trajectories `which` after so many `steps`, by the marks
-    `before` them; all in the order of trajectories and steps."""
-    begins = np.flatnonzero(np.diff(which * len(marks) + before, prepend=-1))
-    counts = np.diff(begins, append=len(steps))
-    stretches = np.array([marks[before[i]][which[i]] for i in begins])
-    samples = np.empty((len(steps), stretches.shape[1]))
-    table = kernel.table(stretches)
-    for i in range(counts.max()):
-        active = np.flatnonzero(counts > i)
-        table["goal"][active], table["status"][active] = steps[begins[active] + i], RUNNING
-        kernel.advance(stretches, active, _UNTIL_ALL_STOP, False)
-        samples[begins[active] + i] = stretches[active]
-    return samples
-
-
-def _series(kernel: Kernel, times: Array, images: Array, angle: float) -> dict[str, Array]:
-    """The series of a trajectory, each of shape (samples,), from its images at `times`; `angle` is `Model.turned`."""
+def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
+    """The series at the samples `images`, each of shape (samples,); `angles` are those of `Model.turned`."""
     model = kernel.model
     states, constants = kernel.unpack(images)
     spin, rattle, inertia = model.energy(states, constants)
-    series = {"time": times, "spin": spin, **model.observe(states, constants)}
-    for x, y in _VECTORS if angle else ():
-        if x in series:
+    series = {"spin": spin, **model.observe(states, constants)}
+    for x, y in _VECTORS:
+        if x in series and angles.any():
             along, across = series[x], series[y]
-            series[x] = along * np.cos(angle) + across * np.sin(angle)
-            series[y] = across * np.cos(angle) - along * np.sin(angle)
+            series[x] = along * np.cos(angles) + across * np.sin(angles)
+            series[y] = across * np.cos(angles) - along * np.sin(angles)
     if kernel.follows_ripple:
         series["ripple_free_spin"] = kernel.steady_spin(images)
     if "energy_error" in kernel.measure:
         series["energy"] = rattle + 0.5 * inertia * spin**2
         series["dissipated"] = images[:, kernel.row("work")]
-    return {name: np.broadcast_to(values, times.shape) for name, values in series.items()}
+    return series
 
 
 def _intervals(model: Model, columns: Columns) -> Array:

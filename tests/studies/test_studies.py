@@ -22,7 +22,7 @@ STANDARD = "name: standard\nfriction: {mu: [60, 75]}\nintegrator: {t_end: 1500}\
 
 def test_sampling_does_not_touch_the_steps(write: Write) -> None:
     swept = sweep.run(write(STANDARD), method="dopri5")
-    followed = sweep.trajectory(write(STANDARD), mu=[60, 75], every=3.0)
+    followed = sweep.trajectory(write(STANDARD), mu=[60, 75], every=3.0, stop_when_settled=True)
     np.testing.assert_array_equal(followed.spin_final, swept.spin_final)
     np.testing.assert_array_equal(followed.energy_error, swept.energy_error)
     for i in range(2):
@@ -45,8 +45,25 @@ def test_trajectories_of_different_steps_are_sampled_at_the_same_times(write: Wr
             np.testing.assert_allclose(both[name][i], expected, rtol=0, atol=3e-7 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("n0", [-0.006, -0.015])
+def test_a_trajectory_goes_on_to_its_end_and_stays_where_a_sweep_says(n0: float, write: Write) -> None:
+    """A sweep leaves both before t = 20; the rattle of the second grows later, and turns the spin."""
+    config = sweep.load_config(write(STANDARD), {"mu": 75.0, "n0": n0, "t_end": 8000.0})
+    swept, one = sweep.run(config), sweep.trajectory(config, every=20.0).isel(trajectory=0)
+    assert float(swept.t_stop) < 20
+    assert (float(one.t_stop), float(one.time[-1]), one.sizes["time"]) == (8000, pytest.approx(8000), 401)
+    assert float(one.spin[-1]) == pytest.approx(float(swept.spin_rest), rel=4e-3)
+    assert (one.status, one.reversals) == (swept.status, swept.reversals)
+    assert bool(abs(one.spin[-1] / one.spin[0]) < 0.6) == (n0 == -0.015)
+
+
+def test_a_trajectory_without_an_end_ends_when_it_has_settled(write: Write) -> None:
+    assert float(sweep.trajectory(write(STANDARD), mu=75, n0=-0.006, t_end=float("inf")).t_stop[0]) < 20
+
+
 def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
-    both = sweep.trajectory(sweep.load_config(write(STANDARD), {"t_end": 8000.0}), n0=[0.001, 0.05], every=5.0)
+    config = sweep.load_config(write(STANDARD), {"t_end": 8000.0})
+    both = sweep.trajectory(config, n0=[0.001, 0.05], every=5.0, stop_when_settled=True)
     assert both.t_stop[0] < both.t_stop[1] - 5
     for i in range(2):
         np.testing.assert_array_equal(np.isfinite(both.spin[i]), both.time <= both.t_stop[i] * (1 + 1e-12))
