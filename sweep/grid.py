@@ -11,8 +11,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.models.general.starts import point
-from sweep.models.general.surfaces import PARABOLOID
 from sweep.parameters import PARAMETERS, START
 
 Array = NDArray[Any]
@@ -28,8 +26,6 @@ class Sweepable(Protocol):
     def parameters(self) -> Mapping[str, Any]: ...
     @property
     def cases(self) -> Mapping[str, tuple[float, ...]] | None: ...
-    @property
-    def surface(self) -> str: ...
 
 
 @dataclass(frozen=True)
@@ -136,33 +132,8 @@ _TILE = 1 << 18
 BODY = tuple(p.name for p in PARAMETERS.values() if p.section in ("body", ""))
 """Names of the parameters of the body, gravity among them."""
 
-_PLACE = (*BODY, "x0", "y0")
-
-
-def off_the_body(config: Sweepable) -> str:
-    """What is wrong with the first cell whose start point lies off the ellipsoid; "" if no cell's does.
-
-    Every point lies on a paraboloid.
-    """
-    if config.surface == PARABOLOID.name:
-        return ""
-    return next(filter(None, map(_off_the_body, distinct(Grid.of(config), _PLACE))), "")
-
 
 def distinct(grid: Grid, names: tuple[str, ...]) -> Iterator[dict[str, Array]]:
     """Columns of cells that have every combination of the parameters `names`, a bounded number of cells at a time."""
     grid = Grid({n: v if n in names else v[:1] for n, v in grid.axes.items()}, grid.constants, grid.cases)
     return (grid.part(tile).columns() for tile in grid.tiles(_TILE))
-
-
-def _off_the_body(p: Mapping[str, Array]) -> str:
-    if "x0" not in p:
-        return ""
-    with np.errstate(over="ignore"):  # infinity lies off the body as well
-        x, y = point(p)
-        outside = np.flatnonzero((x / p["a"]) ** 2 + (y / p["b"]) ** 2 >= 1)
-    if not len(outside):
-        return ""
-    i = outside[0]
-    at = ", ".join(f"{name}={p[name][i]:g}" for name in ("x0", "y0", "a", "b", "delta") if name in p)
-    return f"start point off the ellipsoid at {at}; allowed: (x/a)² + (y/b)² < 1 in the body's axes"

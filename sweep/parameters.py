@@ -8,6 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, pi
+from sys import float_info
+
+PAPER_UNITS, SI = "paper", "SI"
+"""Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,8 @@ class Parameter:
         return ".".join(self.place)
 
     def allows(self, value: float) -> bool:
-        return self.above < value < self.below and value >= self.at_least
+        within = self.above < value < self.below and value >= self.at_least
+        return within and abs(value) <= float_info.max  # Python's integers may be larger than any float
 
     @property
     def allowed(self) -> str:
@@ -136,16 +141,10 @@ PARAMETERS: dict[str, Parameter] = {
     )
 }  # fmt: skip
 
-PAPER: dict[str, Parameter] = {name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")}
-"""The parameters of the paper's model.  Their defaults are in the paper's units, and they have none in SI."""
-
-ON_PARABOLOID: dict[str, str] = {
-    "a": "coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
-    "b": "coefficient b of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
-    "c": "height of the paraboloid's origin above its lowest point, the unit of length",
-    "offset": "depth of the centre of mass below the paraboloid's origin, in c",
+PAPER_PARAMETERS: dict[str, Parameter] = {
+    name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")
 }
-"""What parameters of the body mean if its surface is a paraboloid; `a` and `b` have no default then."""
+"""The parameters of the paper's models.  Their defaults are in the paper's units, and they have none in SI."""
 
 
 def sections(table: Mapping[str, Parameter]) -> tuple[str, ...]:

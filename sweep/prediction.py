@@ -11,11 +11,11 @@ from sweep.grid import Array, Grid
 from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.stability import stable_ranges
 from sweep.models.general import reversal_time, variants
-from sweep.models.general.selection import PAPER_PARAMETERS
 from sweep.models.ladder import analytic
 from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
 from sweep.models.theory import stability
 from sweep.models.theory.linear import fastest_spin
+from sweep.parameters import PAPER_PARAMETERS
 
 
 @dataclass(frozen=True)
@@ -132,5 +132,5 @@ def formulas(tier: Tier, grid: Grid) -> Prediction:
     found = None
     if FORMULAS in tier.offers:
         found = Formulas(analytic.reversal_count(grid.columns()), analytic.critical_spins(bodies))
-    papers = set(bodies) <= PAPER_PARAMETERS and not (isinstance(tier, Model) and tier.origin)
+    papers = set(bodies) <= PAPER_PARAMETERS.keys() and not (isinstance(tier, Model) and tier.origin)
     return Prediction(analytic.form_factor(bodies) if papers else None, found, None)

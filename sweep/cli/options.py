@@ -61,7 +61,7 @@ def loaded(config: Path, settings: tuple[str, ...]) -> Config:
     for setting in settings:
         path, equals, value = setting.partition("=")
         if not (equals and path):
-            refuse(f"--set {brief(setting)}", "not a setting; allowed: PATH=VALUE")
+            refuse(f"--set {brief(setting)}", "not a setting; write PATH=VALUE, such as friction.mu=60")
         parsed[path] = parse_value(value, f"--set {brief(path)}")
     return load_config(config, parsed, argument=lambda path: f"--set {path}", announce=announce)
 
@@ -80,7 +80,7 @@ def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str
         name = text.partition("=")[0]
         if name not in known:
             meant = suggestion(name, known)
-            refuse(f"--at {brief(text)}", f"unknown parameter{meant}; allowed: {', '.join(known)}")
+            refuse(f"--at {brief(text)}", f"unknown parameter{meant}; the parameters are {', '.join(known)}")
         given.setdefault(name, []).append(parse_pair(text, "--at")[1])
     return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
 
@@ -91,7 +91,7 @@ def parse_pair(text: str, option: str) -> tuple[str, float]:
 
     name, _, value = text.partition("=")
     if (parsed := number(value)) is None:
-        refuse(f"{option} {brief(text)}", "allowed: NAME=NUMBER")
+        refuse(f"{option} {brief(text)}", "must be NAME=NUMBER")
     return name, parsed
 
 
@@ -102,5 +102,5 @@ def parse_span(text: str, option: str) -> tuple[float, float]:
     low, dots, high = text.partition("..")
     ends = number(low), number(high)
     if not dots or ends[0] is None or ends[1] is None or not ends[0] < ends[1]:
-        refuse(f"{option} {brief(text)}", "allowed: LOW..HIGH, two numbers, the lower one first")
+        refuse(f"{option} {brief(text)}", "must be LOW..HIGH, two numbers, the lower one first")
     return ends[0], ends[1]

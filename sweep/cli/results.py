@@ -51,11 +51,11 @@ def plot(
         target = output or files[0].with_name(f"{stem}{f'_{variable}' if variable else ''}.png")
         if picture.suffix(target) == "html":
             if len(files) > 1:
-                refuse(f"--output {target}", f"a page shows one dataset; allowed: {picture.ALLOWED}")
+                refuse(f"--output {target}", f"a page shows one dataset; write {picture.ALLOWED} of several")
             _plot_page(files[0], target, variable, x, y, sel, limits, cmap)
             return
         if picture.suffix(target) not in picture.FORMATS:
-            refuse(f"--output {target}", f"unknown format; allowed: {picture.ALLOWED}, .html")
+            refuse(f"--output {target}", f"unknown format; write {picture.ALLOWED}, .html")
         datasets = [opened(file) for file in files]
         for file, dataset in zip(files, datasets, strict=True):
             with about(file):
@@ -113,7 +113,7 @@ def _plot_page(
         from sweep.explore.page import save_html
     for option, value in (("--limits", limits), ("--cmap", cmap)):
         if value is not None:
-            refuse(option, "not for a page; allowed: with a png, pdf or svg")
+            refuse(option, "not for a page; write a png, pdf or svg")
     with about(file):
         save_html(opened(file), target, variable, x, y, sel)
     say(f"wrote {target}")

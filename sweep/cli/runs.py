@@ -56,7 +56,7 @@ def run(
             click.echo(estimate(checked))
             return
         if workers and scheduler:
-            refuse("--workers", "given with --scheduler; allowed: one of the two")
+            refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
         from sweep.engine.cluster import connected
         from sweep.engine.run import run as run_sweep
         from sweep.progress import Terminal
@@ -77,8 +77,8 @@ def run(
             say(_written(folder, checked.name, before))
         failed = failed_fraction(result)
         if failed > checked.max_failed_fraction:
-            allowed = f"max_failed_fraction {checked.max_failed_fraction:.2%}"
-            click.echo(f"{failed:.2%} of the cells failed; allowed: {allowed}", err=True)
+            most = f"max_failed_fraction allows {checked.max_failed_fraction:.2%}"
+            click.echo(f"{failed:.2%} of the cells failed; {most}", err=True)
             sys.exit(TOO_MANY_FAILED)
 
 

@@ -4,30 +4,34 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
+from itertools import islice
+from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from sweep.config import brought, cases, document, fitting, scenes, schema
-from sweep.config.checked import FIRST_AXES, Config, tier_of
+from sweep.config import cases, cross_checks, document, schema, user_models
+from sweep.config.configuration import FIRST_AXES, Config, model_of
+from sweep.config.document import plain_data
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.messages import describe
-from sweep.config.plain import plain
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
 from sweep.grid import Grid
-from sweep.kernels import methods
+from sweep.kernels import measures, methods
+from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
-from sweep.models.general.selection import PAPER_LAW, SI
-from sweep.models.general.surfaces import ELLIPSOID
+from sweep.models.general.laws import LAWS
+from sweep.models.general.selection import PAPER_LAW, Physics
+from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
-from sweep.parameters import Parameter, sections
+from sweep.parameters import PARAMETERS, SI, Parameter, sections
 
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 
@@ -65,54 +69,52 @@ def load_config(
     source, origin = _opened(config, overrides or {}, argument, announce)
     known = loading.table(origin)
     for key, value in (overrides or {}).items():
-        source.set(_full_path(key, known), plain(value), argument(key))
+        source.set(_full_path(key, known), plain_data(value), argument(key))
     # A name made from the file's must not be refused, since the user did not choose it.
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")
+    kind = schema.schema_of(origin)
     try:
-        checked = schema.schema_of(origin).model_validate(source.values)
+        values = kind.model_validate(source.values)
     except ValidationError as error:
-        found = describe(error.errors(), schema.schema_of(origin))
-        raise ConfigError([source.fault(path, text, at_key=key) for path, text, key in found]) from None
-    resolved = _resolve(checked, source, origin)
-    object.__setattr__(resolved, "source", source)
-    return resolved
+        found = describe(error.errors(), kind).items()
+        raise ConfigError(source.fault(path, text, at_key=key) for path, (text, key) in found) from None
+    return _resolve(values, source, origin)
 
 
 def parameters_of(config: ConfigLike, overrides: Mapping[str, Any]) -> Mapping[str, Parameter]:
     """The parameters that a configuration with these overrides may name; errors as of `load_config`."""
     if isinstance(config, Config) and "model" not in overrides:
         return config.table
-    _, origin = _opened(config, overrides, str, lambda words: None)  # noqa: ARG005
-    return loading.table(origin)
+    return loading.table(_opened(config, overrides)[1])
 
 
 def _opened(
     config: ConfigLike,
     overrides: Mapping[str, Any],
-    argument: Callable[[str], str],
-    announce: Callable[[str], None] | None,
+    argument: Callable[[str], str] = str,
+    announce: Callable[[str], None] | None = lambda words: None,  # noqa: ARG005
 ) -> tuple[document.Document, Origin | None]:
     """The document of a configuration, and where its model comes from, if a user brings it."""
     source = _source(config)
     for key in {"model", "model_sha256"} & set(overrides):  # what the code to run depends on
-        source.set((key,), plain(overrides[key]), argument(key))
-    return source, brought.named(source, announce)
+        source.set((key,), plain_data(overrides[key]), argument(key))
+    return source, user_models.named(source, announce)
 
 
 def _source(config: ConfigLike) -> document.Document:
     """The document of a configuration, to be changed freely."""
-    if isinstance(config, Config):
-        if config.source:
-            return deepcopy(config.source)
-        values, table = config.document(), None
-        if config.cases is not None:
-            table = config.cases_file or "cases", config.cases
-            values["cases"] = table[0]
-        return document.Document("", values, table=table, model=config.origin)
     if isinstance(config, Mapping):
-        return document.Document("", plain(config))
-    return document.read(Path(config))
+        return document.Document("", plain_data(config))
+    if not isinstance(config, Config):
+        return document.read(Path(config))
+    if config.source:
+        return deepcopy(config.source)
+    values, table = config.document(), None
+    if config.cases is not None:
+        values["cases"] = config.cases_file or "cases"
+        table = values["cases"], config.cases
+    return document.Document("", values, table=table, model=config.origin)
 
 
 def _full_path(key: str, known: Mapping[str, Parameter]) -> tuple[str, ...]:
@@ -122,82 +124,57 @@ def _full_path(key: str, known: Mapping[str, Parameter]) -> tuple[str, ...]:
     return ("integrator", key) if key in Integrator.model_fields else tuple(key.split("."))
 
 
-def _resolve(checked: Any, source: document.Document, origin: Origin | None) -> Config:
-    """Fill in defaults, order the axes, and check that the values fit together."""
+def _resolve(values: Any, source: document.Document, origin: Origin | None) -> Config:
+    """Fill in defaults, order the axes, and check that everything fits together."""
     known = loading.table(origin)
-    given = _given(checked, source, known)
-    if not origin and "offset" in given and given["offset"].spec == 0.0:
-        del given["offset"]  # the default: it does not make a body other than the paper's
-    columns = _table(checked.cases, source, known) if checked.cases is not None else None
-    model, law, units, surface = _model(checked, origin, (*given, *(columns or ())), source)
-    needed = scenes.without_default(units, surface)
-    checked = _with_method(checked, model)
-    faults = list(fitting.misfits(checked, model, given, columns, source, known))
-    order = sorted(model.parameters, key=lambda n: (_rank(n, FIRST_AXES), _rank(n, tuple(given))))
-    parameters = {}
-    for name in order:
-        default = None if known[name] in needed else known[name].default
-        if name in given:
-            parameters[name] = given[name]
-        elif name in (columns or {}):
-            continue
-        elif default is None:
-            faults.append(source.fault(known[name].place, f"missing; allowed: {known[name].allowed}"))
-        else:
-            parameters[name] = Values((default,), False, default)
-    if faults:
-        raise ConfigError(faults)
+    given = _given(values, source, known)
+    columns = _table(values.cases, source, known) if values.cases is not None else None
+    physics = _physics(values, origin, frozenset((*given, *(columns or ()))))
+    _refuse(source, cross_checks.of_physics(values, physics, origin))
+    model = model_of(values.model, origin, physics)
+    parameters = _parameters(model, given, columns or {}, known, physics)
+    rattleback = not origin or loading.law(origin) is not None
+    numbers = {name: value.numbers for name, value in parameters.items()} | (columns or {})
     config = Config(
-        name=checked.name,
-        model=checked.model,
+        name=values.name,
+        model=values.model,
         parameters=parameters,
-        integrator=checked.integrator,
-        measure=fitting.measured(checked.measure, model),
-        max_failed_fraction=checked.max_failed_fraction,
-        verify=checked.verify or 0.0,
-        refine=checked.refine,
+        integrator=_integrator(values, model, numbers if physics.units == SI and rattleback else {}),
+        measure=tuple(measures.default(model) if values.measure is None else values.measure),
+        max_failed_fraction=values.max_failed_fraction,
+        verify=values.verify or 0.0,
+        refine=values.refine,
         cases=columns,
-        cases_file=checked.cases,
-        units=units,
-        law=law,
-        surface=surface,
+        cases_file=values.cases,
+        units=physics.units,
+        law=physics.law.name,
+        surface=physics.surface.name,
         origin=origin,
     )
-    brought.try_out(config)
-    if units == SI and config.of_rattlebacks and "t_end" not in checked.integrator.model_fields_set:
-        config = config.with_time()
-    for path, check in fitting.CHECKS:
-        if reason := check(config):
-            raise ConfigError([source.fault(path, reason)])
-    if checked.verify is None and config.integrator.method == methods.AUTO and not config.refine:
-        return replace(config, verify=schema.VERIFIED if Grid.of(config).size * schema.VERIFIED >= 1 else 0.0)
+    if values.verify is None and config.integrator.method == methods.AUTO and not config.refine:
+        config = replace(config, verify=schema.VERIFIED if Grid.of(config).size * schema.VERIFIED >= 1 else 0.0)
+    object.__setattr__(config, "source", source)
+    _refuse(source, cross_checks.of_values(config, given))
+    user_models.try_out(config)
+    _refuse(source, islice(cross_checks.of_all_cells(config), 1))
     return config
 
 
-def _model(
-    checked: Any, origin: Origin | None, names: Collection[str], source: document.Document
-) -> tuple[Tier, str, str, str]:
-    """The model of a configuration that names these parameters, with its law of friction, its units and its surface."""
-    law, units = loading.law(origin) if origin else None, checked.units
-    surface = checked.body.surface if law or not origin else ELLIPSOID.name
-    found = scenes.misfits_of_own(checked, law, names, source) if origin else scenes.misfits(checked, names, source)
-    if faults := list(found):
-        raise ConfigError(faults)
-    if not origin:
-        law_name = checked.friction.name
-        return tier_of(checked.model, law_name, units, names, surface), law_name, units, surface
-    model = loading.find(origin, units, names, surface)
-    return (model, law.name, units, surface) if law else (model, PAPER_LAW, model.units, surface)
+def _refuse(source: document.Document, misfits: Iterable[cross_checks.Misfit]) -> None:
+    if found := list(misfits):
+        raise ConfigError(source.fault(path, words, at_key=True) for path, words in found)
 
 
-def _given(checked: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:
+def _given(values: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:
     """The physical parameters that the document names, in its order."""
     found: dict[str, Values] = {}
     for key, value in source.values.items():
         if key in sections(known):
-            found |= {name: getattr(getattr(checked, key), name) for name in value if name in known}
+            found |= {name: getattr(getattr(values, key), name) for name in value if name in known}
         elif key in known:
-            found[key] = getattr(checked, key)
+            found[key] = getattr(values, key)
+    if known is PARAMETERS and "offset" in found and found["offset"].spec == 0.0:
+        del found["offset"]  # the default: it does not make a body other than the paper's
     return found
 
 
@@ -208,15 +185,45 @@ def _table(name: str, source: document.Document, known: Mapping[str, Parameter])
     return source.table[1]
 
 
-def _with_method(checked: Any, model: Tier) -> Any:
-    """The default method, filled in: `auto` where there is a choice and the step is not given."""
-    integrator = checked.integrator
-    alone = any(MEASURES[name].follows_tangent for name in fitting.names_of(checked.measure or ()))
-    if "method" in integrator.model_fields_set and not (alone and integrator.method == methods.AUTO):
-        return checked
-    choice = not alone and isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
-    method = methods.AUTO if choice else methods.PLAIN
-    return checked.model_copy(update={"integrator": integrator.model_copy(update={"method": method})})
+def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physics:
+    """What a configuration that names these parameters says beside numbers."""
+    made = loading.load(origin) if origin else None
+    if isinstance(made, Model):  # of any body: it says its units itself
+        return Physics(made.units, LAWS[PAPER_LAW], ELLIPSOID, names)
+    law = made.law if made else LAWS[values.friction.name]
+    return Physics(values.units, law, SURFACES[values.body.surface], names)
+
+
+def _parameters(
+    model: Tier, given: Mapping[str, Values], columns: Collection[str], known: Mapping[str, Parameter], physics: Physics
+) -> dict[str, Values]:
+    """The parameters of the model but those of the table, in the order of the axes; without one that is missing."""
+    found = {}
+    for name in sorted(model.parameters, key=lambda n: (_rank(n, FIRST_AXES), _rank(n, tuple(given)))):
+        default = None if known[name] in physics.required else known[name].default
+        if name in given:
+            found[name] = given[name]
+        elif name not in columns and default is not None:
+            found[name] = Values((default,), False, default)
+    return found
+
+
+def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]) -> Integrator:
+    """The settings of the integrator, with the defaults that depend on the rest.
+
+    `in_si` are the numbers of all parameters if they are in SI; the default time is then in seconds.
+    """
+    integrator, said, found = values.integrator, values.integrator.model_fields_set, dict[str, Any]()
+    asked = [spec.partition("=")[0] for spec in values.measure or ()]
+    alone = any(MEASURES[name].follows_tangent for name in asked)
+    if "method" not in said or (alone and integrator.method == methods.AUTO):
+        choice = isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
+        found["method"] = methods.AUTO if choice and not alone else methods.PLAIN
+    if "t_end" not in said and {"c", "gravity"} <= in_si.keys():
+        longest = schema.T_END * sqrt(max(in_si["c"]) / min(in_si["gravity"]))
+        # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
+        found["t_end"] = STRETCH * ceil(min(longest, schema.LATEST) / STRETCH)
+    return Integrator(**{**dict(integrator), **found})
 
 
 def _rank(name: str, names: tuple[str, ...]) -> int:

@@ -7,29 +7,28 @@ end, or override an earlier line unseen.
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import inf, nan
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sweep.config import files
-from sweep.config.faults import ConfigError, Fault, Path, brief
+from sweep.config.faults import ConfigError, Fault, Path, brief, fault_of
 from sweep.models.origin import Origin
-
-LIMIT = 1 * files.MIB
-"""Largest document, in bytes: reading takes some 20 s per megabyte."""
 
 _NUMBER = r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
 _FLOAT = re.compile(_NUMBER)
 _RANGE = re.compile(rf"(?P<start>{_NUMBER})\.\.(?P<stop>{_NUMBER}):(?P<num>{_NUMBER})")
-_SPECIAL = {".inf": float("inf"), "-.inf": float("-inf"), ".nan": float("nan")}
-_WORDS: dict[str, bool | None] = {
-    "true": True, "True": True, "false": False, "False": False, "null": None, "~": None, "": None,
-}  # fmt: skip
+_WORDS = {"true": True, "false": False, "null": None, "~": None, "": None, ".inf": inf, "-.inf": -inf, ".nan": nan}
+
+Place = tuple[int, int]
+"""Line and column, which count from one."""
 
 
 @dataclass
@@ -39,10 +38,8 @@ class Document:
     file: str
     """"" for a mapping, which is no file."""
     values: Any = None
-    keys: dict[Path, tuple[int, int]] = field(default_factory=dict)
-    """Line and column of each key of a mapping, by the path to its value."""
-    places: dict[Path, tuple[int, int]] = field(default_factory=dict)
-    """Line and column of each value, by its path."""
+    places: dict[Path, tuple[Place, Place]] = field(default_factory=dict)
+    """Where the key of each value stands, and where the value; an item of a list has no key but itself."""
     arguments: dict[Path, tuple[str, Path]] = field(default_factory=dict)
     """For each value that an argument gave, and each section that it added: the argument, and the path that it set."""
     table: tuple[str, Any] | None = None
@@ -50,32 +47,24 @@ class Document:
     model: Origin | None = None
     """Where the model comes from that a user brings, once it is read."""
 
-    def read_beside(self, key: str, name: str, limit: int) -> tuple[FilePath, str]:
+    def read_beside(self, key: str, name: str) -> tuple[FilePath, str]:
         """Path and text of the file `name`, relative to this document's folder, that it names by `key`.
 
         Raises
         ------
         ConfigError
-            if the file cannot be read, or is larger than `limit` bytes.
+            if the file cannot be read.
         """
         path = FilePath(self.file).parent / name
-        try:
-            return path, files.read(path, limit)
-        except FileNotFoundError:
-            reason = f"no such file in {path.parent}"
-        except OSError as error:
-            reason = f"cannot be read: {error.strerror}"
-        except UnicodeDecodeError as error:
-            reason = f"not UTF-8 text: byte {error.start}"
-        raise ConfigError([self.fault((key,), f"{brief(name)}: {reason}")])
+        return path, _read(path, lambda reason: ConfigError([self.fault((key,), f"{brief(str(path))}: {reason}")]))
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
         """A fault at `path`; it is placed at the nearest section above if the document lacks that path."""
-        table, known = (self.keys if at_key else self.places), path
-        while known and known not in table and known not in self.arguments:
+        known = path
+        while known and known not in self.places and known not in self.arguments:
             known = known[:-1]
         if known not in self.arguments:
-            line, column = table.get(known, (None, None))
+            line, column = self.places[known][0 if at_key else 1] if known in self.places else (None, None)
             return Fault(self.file, line, column, path, message)
         argument, target = self.arguments[known]
         if path[: len(target)] == target:
@@ -90,33 +79,37 @@ class Document:
                 self.arguments[path[:depth]] = argument, path
             section = section.setdefault(part, {})
             if not isinstance(section, dict):
-                message = f"{part} is not a section; allowed: a path through sections to a key"
-                raise ConfigError([Fault("", None, None, (argument,), message)])
+                raise fault_of(f"{part} is a value, not a section; name a key such as friction.mu", argument)
         section[path[-1]] = value
-        for table in (self.keys, self.places, self.arguments):
+        for table in (self.places, self.arguments):
             for old in [p for p in table if p[: len(path)] == path]:
                 del table[old]
         self.arguments[path] = argument, path
 
 
+def plain_data(value: Any) -> Any:
+    """Python's `value` as a YAML file could hold it: mappings, lists, words and numbers.
+
+    Tuples, ranges and arrays become lists; an array is whatever NumPy can read as one, such as an `xarray.DataArray` or
+    a `pandas.Series`.  Values of any other type are returned as they are, and refused by the schema.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain_data(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [plain_data(item) for item in value]
+    if hasattr(value, "__array__"):
+        return np.asarray(value).tolist()
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
+
+
 def read(path: FilePath) -> Document:
     """Read a YAML file; a `ConfigError` says what is wrong with it and where."""
-    document = Document(str(path))
-    try:
-        text = files.read(path, LIMIT)
-    except FileNotFoundError:
-        raise ConfigError([Fault(str(path), None, None, (), "no such file")]) from None
-    except OSError as error:
-        raise ConfigError([Fault(str(path), None, None, (), f"cannot be read: {error.strerror}")]) from None
-    except UnicodeDecodeError as error:
-        raise ConfigError([Fault(str(path), None, None, (), f"not UTF-8 text: byte {error.start}")]) from None
+    text = _read(path, lambda reason: fault_of(reason, file=str(path)))
     node = _compose(text, str(path))
     if not isinstance(node, MappingNode):
         raise ConfigError([Fault(str(path), 1, 1, (), "a configuration is a mapping of keys to values")])
-    faults: list[Fault] = []
-    document.values = _convert(node, (), document, faults)
-    if faults:
-        raise ConfigError(faults)
+    document = Document(str(path))
+    document.values = _values(node, document)
     return document
 
 
@@ -125,73 +118,79 @@ def parse_value(text: str, source: str) -> Any:
     if span := _RANGE.fullmatch(text):
         return {"start": float(span["start"]), "stop": float(span["stop"]), "num": float(span["num"])}
     node = _compose(text, source)
-    scratch, faults = Document(source), list[Fault]()
-    value = None if node is None else _convert(node, (), scratch, faults)
-    if faults:
-        raise ConfigError(faults)
-    return value
-
-
-def _compose(text: str, file: str) -> Node | None:
-    try:
-        return YAML(pure=True).compose(text)  # type: ignore[no-any-return]
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
-        problem = (error.problem or error.context or "not YAML").split("\n")[0]
-        raise ConfigError([Fault(file, line, column, (), f"not YAML: {problem}")]) from None
-    except Exception as error:  # ruamel lets errors of chr(), of its own recursion and others escape
-        problem = "nested too deeply" if isinstance(error, RecursionError) else str(error).split("\n")[0]
-        raise ConfigError([Fault(file, None, None, (), f"not YAML: {problem}")]) from None
-
-
-def _convert(node: Node, path: Path, document: Document, faults: list[Fault]) -> Any:
-    def place(of: Node) -> tuple[int, int]:
-        return of.start_mark.line + 1, of.start_mark.column + 1
-
-    def refuse(of: Node, at: Path, message: str) -> None:
-        faults.append(Fault(document.file, *place(of), at, message))
-
-    document.places[path] = place(node)
-    # An alias leads back to a node with an anchor; as anchors are refused, no alias is ever followed.
-    # A tag stands at the start of its node.  Types that ruamel infers without one, such as timestamps,
-    # do not matter: `_scalar` reads the text itself.
-    if node.anchor or node.start_mark.buffer[node.start_mark.pointer] == "!":
-        refuse(node, path, "a YAML tag or anchor; allowed: plain values")
-        return None
-    if isinstance(node, ScalarNode):
-        return _scalar(node)
-    if isinstance(node, SequenceNode):
-        return [_convert(item, (*path, i), document, faults) for i, item in enumerate(node.value)]
-    result: dict[str, Any] = {}
-    for key_node, value_node in node.value:
-        if not isinstance(key_node, ScalarNode):
-            refuse(key_node, path, "a key must be a word")
-            continue
-        key = key_node.value
-        if key in result:
-            line, _ = document.keys[(*path, key)]
-            refuse(key_node, (*path, key), f"duplicate key, first on line {line}")
-            continue
-        document.keys[(*path, key)] = place(key_node)
-        result[key] = _convert(value_node, (*path, key), document, faults)
-    return result
-
-
-def _scalar(node: ScalarNode) -> str | float | int | bool | None:
-    text: str = node.value
-    if node.style is not None:  # quoted
-        return text
-    if text in _WORDS:
-        return _WORDS[text]
-    if text.lower() in _SPECIAL:
-        return _SPECIAL[text.lower()]
-    value = number(text)
-    if value is None:
-        return text
-    return int(text) if text.lstrip("+-").isdigit() and len(text) < 19 else value
+    return None if node is None else _values(node, Document(source))
 
 
 def number(text: str) -> float | None:
     """The number that `text` spells in decimal digits; None if it does not spell one."""
     return float(text) if _FLOAT.fullmatch(text) else None
+
+
+def _read(path: FilePath, error_of: Callable[[str], ConfigError]) -> str:
+    """The text of a file; if it cannot be read, what `error_of` makes of the reason is raised."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        reason = "no such file"
+    except UnicodeDecodeError as error:
+        reason = f"not UTF-8 text: byte {error.start}"
+    except (OSError, ValueError) as error:  # the name of a file may contain a NUL
+        reason = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+    raise error_of(reason)
+
+
+def _compose(text: str, file: str) -> Node | None:
+    try:
+        return YAML(pure=True).compose(text)  # type: ignore[no-any-return]
+    except Exception as error:  # ruamel lets errors of chr(), of its own recursion and others escape
+        mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+        words = getattr(error, "problem", None) or getattr(error, "context", None) or str(error)
+        problem = "nested too deeply" if isinstance(error, RecursionError) else words.split("\n")[0]
+        line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
+        raise ConfigError([Fault(file, line, column, (), f"not YAML: {problem}")]) from None
+
+
+def _values(root: Node, document: Document) -> Any:
+    """The values of a tree of nodes, whose places are noted in `document`."""
+    faults: list[Fault] = []
+
+    def convert(node: Node, path: Path, key: Place | None = None) -> Any:
+        document.places[path] = key or _place(node), _place(node)
+        # An alias leads back to a node with an anchor; as anchors are refused, no alias is ever followed.
+        # A tag stands at the start of its node.  Types that ruamel infers without one, such as timestamps,
+        # do not matter: `_scalar` reads the text itself.
+        if node.anchor or node.start_mark.buffer[node.start_mark.pointer] == "!":
+            faults.append(document.fault(path, "a YAML tag or anchor; write the plain value"))
+            return None
+        if isinstance(node, ScalarNode):
+            return _scalar(node)
+        if isinstance(node, SequenceNode):
+            return [convert(item, (*path, i)) for i, item in enumerate(node.value)]
+        result: dict[str, Any] = {}
+        for name, value in node.value:
+            inner = (*path, name.value) if isinstance(name, ScalarNode) else path
+            if inner == path:
+                faults.append(Fault(document.file, *_place(name), path, "a key must be a word"))
+            elif name.value in result:
+                (line, _), _ = document.places[inner]
+                faults.append(Fault(document.file, *_place(name), inner, f"duplicate key, first on line {line}"))
+            else:
+                result[name.value] = convert(value, inner, _place(name))
+        return result
+
+    values = convert(root, ())
+    if faults:
+        raise ConfigError(faults)
+    return values
+
+
+def _place(node: Node) -> Place:
+    return node.start_mark.line + 1, node.start_mark.column + 1
+
+
+def _scalar(node: ScalarNode) -> str | float | bool | None:
+    text: str = node.value
+    if node.style is not None:  # quoted
+        return text
+    value = number(text)
+    return value if value is not None else _WORDS.get(text.lower(), text)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -10,33 +9,26 @@ from difflib import get_close_matches
 Path = tuple[str | int, ...]
 """Keys and list indices from the top of a document."""
 
+_MAX_LINES = 20
+
 
 def spell(path: Path) -> str:
     """A path as text: body.b[2] for ("body", "b", 2)."""
     text = ""
-    for part in (brief(part, 60) if isinstance(part, str) else part for part in path):
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{brief(part, 60)}" if text else brief(part, 60)
     return text
 
 
-_MAX_LINES = 100
-
-_REPR = reprlib.Repr()
-_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 60
-
-
 def quote(value: object) -> str:
-    """A value as YAML has it; only its beginning and end if it is long."""
+    """A value as YAML has it, without its middle if it is long."""
     if value is None or isinstance(value, bool):
         return "nothing" if value is None else str(value).lower()
-    try:
-        return _REPR.repr(value).removesuffix(".0") if isinstance(value, float) else _REPR.repr(value)
-    except ValueError:  # Python refuses to spell integers of more than 4300 digits
-        return "a number with thousands of digits"
+    return brief(repr(value).removesuffix(".0") if isinstance(value, float) else repr(value), 60)
 
 
 def brief(text: str, limit: int = 200) -> str:
-    """`text`; without its middle if it is long."""
+    """`text`, without its middle if it is long."""
     return text if len(text) <= limit else f"{text[: limit // 2]}…{text[-limit // 2 :]}"
 
 
@@ -45,21 +37,30 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+def either(names: Iterable[str]) -> str:
+    """Names among which to choose: "a, b or c"."""
+    *most, last = names
+    return f"{', '.join(most)} or {last}" if most else last
+
+
 def suggestion(word: object, names: Iterable[str], paths: Mapping[str, str] | None = None) -> str:
     """The one of `names` that may be meant by a misspelt `word`, as words to add to a message; "" if none is close.
 
-    Parameters
-    ----------
-    paths : what to write for a name, where that is not the name itself
+    `paths` tells what to write for a name, where that is not the name itself.
     """
-    spelled = {name.lower(): name for name in names}
+    spelled = {name.lower(): (paths or {}).get(name, name) for name in names}
     close = get_close_matches(word.lower()[:100], spelled, n=1) if isinstance(word, str) else []
-    return f" (did you mean {(paths or {}).get(spelled[close[0]], spelled[close[0]])}?)" if close else ""
+    return f" (did you mean {spelled[close[0]]}?)" if close else ""
+
+
+def refusal(given: object, wanted: str, names: Iterable[str] = ()) -> str:
+    """Say that a value is `given` where it must be `wanted`, and which of `names` may be meant."""
+    return f"must be {wanted}, not {quote(given)}{suggestion(given, names)}"
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong, where, and what is allowed; `line` and `column` count from one."""
+    """What is wrong and what to do about it, with its place; `line` and `column` count from one."""
 
     file: str
     """The file, or "" for a value that comes from no file; `path` then begins with the argument that gave it."""
@@ -74,13 +75,16 @@ class Fault:
 
 
 class ConfigError(Exception):
-    """A configuration that cannot be run; `faults` has an entry for each thing to correct."""
+    """A configuration that cannot be run; `faults` has an entry for each thing to correct, in the order of lines."""
 
-    def __init__(self, faults: list[Fault]) -> None:
-        """`faults` in any order; those of a file are told in the order of its lines."""
-        faults = sorted(faults, key=lambda fault: (fault.line or 0, fault.column or 0))
-        lines = [str(fault) for fault in faults[:_MAX_LINES]]
-        if more := len(faults) - len(lines):
-            lines.append(str(Fault(faults[0].file, None, None, (), f"and {more} more")))
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults = sorted(faults, key=lambda fault: (fault.line or 0, fault.column or 0))
+        lines = [str(fault) for fault in self.faults[:_MAX_LINES]]
+        if more := len(self.faults) - len(lines):
+            lines.append(str(Fault(self.faults[0].file, None, None, (), f"{more} more faults")))
         super().__init__("\n".join(lines))
-        self.faults = faults
+
+
+def fault_of(message: str, *path: str | int, file: str = "") -> ConfigError:
+    """The error of one fault that has no line."""
+    return ConfigError([Fault(file, None, None, path, message)])

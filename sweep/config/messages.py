@@ -5,29 +5,24 @@ Of pydantic's errors only the type and the place are used, never the text.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from collections.abc import Iterable
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from sweep.config.faults import Path, quote, suggestion
-
-Error = Any
-"""An entry of `ValidationError.errors()`."""
+from sweep.config.faults import Path, either, refusal, suggestion
 
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _KINDS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a word"}
 
 
-@dataclass(frozen=True)
-class Allowed:
+class Allowed(str):
     """What a field allows, in words; in the `Annotated` type of a field whose type and bounds do not say it."""
 
-    words: str
+    __slots__ = ()
 
 
 def wrong(reason: str, *at: str | int) -> PydanticCustomError:
@@ -35,81 +30,56 @@ def wrong(reason: str, *at: str | int) -> PydanticCustomError:
     return PydanticCustomError("value", "{reason}", {"reason": reason, "at": at})
 
 
-def describe(errors: Iterable[Error], schema: type[BaseModel]) -> Iterator[tuple[Path, str, bool]]:
-    """Of each error in a document of `schema`: its path, its message, and whether the key itself is at fault."""
+def describe(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple[str, bool]]:
+    """By the path of each of pydantic's errors: the message, and whether the key itself is at fault."""
+    found, sections = {}, _sections(schema)
     for error in errors:
-        path, model, field = _find(error["loc"], schema)
-        if error["type"] == "extra_forbidden":
-            yield path, f"unknown key{_other_key(path, model, schema)}; allowed: {', '.join(model.model_fields)}", True
-        elif error["type"] == "value":
-            yield (*path, *error["ctx"]["at"]), error["ctx"]["reason"], False
-        elif error["type"] == "missing":
-            yield path, f"missing; allowed: {allowed(field)}", False
+        place, kind = error["loc"], error["type"]
+        section = sections.get(place[0], schema) if len(place) > 1 else schema
+        path = place[:1] if section is schema else place[:2]  # beyond, places name members of unions
+        if not path:
+            found[path] = "a key that is no text; correct its spelling", False
+        elif kind == "extra_forbidden":
+            meant = _other_key(path[-1], section, sections)
+            found[path] = f"unknown key{meant}; the keys here are {', '.join(section.model_fields)}", True
+        elif kind == "value":
+            found[*path, *error["ctx"]["at"]] = error["ctx"]["reason"], False
+        elif kind == "missing":
+            found[path] = f"missing; give {allowed(section.model_fields[path[-1]])}", False
         else:
-            yield path, refusal(error["input"], allowed(field), choices(field.annotation if field else None)), False
+            field = section.model_fields[path[-1]]
+            found[path] = refusal(error["input"], allowed(field), _choices(field)), False
+    return found
 
 
-def refusal(given: object, words: str, names: Sequence[str] = ()) -> str:
-    """That `given` is not what is allowed, with the one of `names` that may be meant."""
-    return f"{quote(given)}{suggestion(given, names)}; allowed: {words}"
-
-
-def allowed(field: FieldInfo | None) -> str:
+def allowed(field: FieldInfo) -> str:
     """What a field of the schema allows, in words."""
-    if field is None:
-        return "a mapping of keys to values"
-    if words := [mark.words for mark in field.metadata if isinstance(mark, Allowed)]:
+    if words := [mark for mark in field.metadata if isinstance(mark, Allowed)]:
         return words[0]
-    kind = _kind(field.annotation)
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
+    kind = next(kind for kind in (*get_args(field.annotation), field.annotation) if kind is not NoneType)
+    if names := _choices(field):
+        return either(names)
+    if issubclass(kind, BaseModel):
         return f"a section with {', '.join(kind.model_fields)}"
-    if names := choices(kind):
-        return ", ".join(names)
-    bounds = [
-        f"{sign} {getattr(mark, name):.15g}"
-        for name, sign in _SIGNS.items()
-        for mark in field.metadata
-        if hasattr(mark, name)
-    ]
-    return _KINDS[kind] + (f" {' and '.join(bounds)}" if bounds else "")
+    marks = [(sign, getattr(mark, name, None)) for name, sign in _SIGNS.items() for mark in field.metadata]
+    bounds = " and ".join(f"{sign} {bound:.15g}" for sign, bound in marks if bound is not None)
+    return f"{_KINDS[kind]} {bounds}".rstrip()
 
 
-def choices(annotation: Any) -> tuple[str, ...]:
-    """The words among which a field lets choose; none if it takes other values."""
-    kind = _kind(annotation)
-    return get_args(kind) if get_origin(kind) is Literal else ()
+def _choices(field: FieldInfo) -> list[str]:
+    """The words among which a field lets choose."""
+    kinds = (field.annotation, *get_args(field.annotation))
+    return [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
 
 
-def _kind(annotation: Any) -> Any:
-    """The type of a value that is not None."""
-    parts = [part for part in get_args(annotation) if part is not NoneType]
-    return parts[0] if get_origin(annotation) in (Union, UnionType) and len(parts) == 1 else annotation
+def _sections(schema: type[BaseModel]) -> dict[str, type[BaseModel]]:
+    kinds = {name: field.annotation for name, field in schema.model_fields.items()}
+    return {name: kind for name, kind in kinds.items() if isinstance(kind, type) and issubclass(kind, BaseModel)}
 
 
-def _find(place: Path, schema: type[BaseModel]) -> tuple[Path, type[BaseModel], FieldInfo | None]:
-    """The key that pydantic's `place` leads to, the section that has it, and its field if there is such a key.
-
-    Places also name the members of unions, which are no keys.
-    """
-    model, field = schema, None
-    for depth, key in enumerate(place, start=1):
-        field = model.model_fields.get(str(key))
-        kind = _kind(field.annotation) if field else None
-        if not (isinstance(kind, type) and issubclass(kind, BaseModel)) or depth == len(place):
-            return place[:depth], model, field
-        model = kind
-    return (), model, field
-
-
-def _other_key(path: Path, model: type[BaseModel], schema: type[BaseModel]) -> str:
+def _other_key(key: str, section: type[BaseModel], sections: dict[str, type[BaseModel]]) -> str:
     """The key that may be meant by an unknown one: of the same section, or the path of one in another."""
-    key = path[-1]
-    elsewhere = {
-        name: f"{section}.{name}"
-        for section, field in schema.model_fields.items()
-        if isinstance(kind := _kind(field.annotation), type) and issubclass(kind, BaseModel)
-        for name in kind.model_fields
-    }
+    elsewhere = {inner: f"{name}.{inner}" for name, kind in sections.items() for inner in kind.model_fields}
     if key in elsewhere:
-        return suggestion(elsewhere[str(key)], [elsewhere[str(key)]])
-    return suggestion(key, model.model_fields) or suggestion(key, elsewhere, elsewhere)
+        return suggestion(key, [key], elsewhere)
+    return suggestion(key, section.model_fields) or suggestion(key, elsewhere, elsewhere)

@@ -2,64 +2,52 @@
 
 from __future__ import annotations
 
-import math
-import sys
 from collections.abc import Mapping
 from functools import cache
+from math import inf
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, create_model
+from pydantic import BeforeValidator, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
 
-from sweep.config.faults import quote, suggestion
-from sweep.config.messages import Allowed, refusal, wrong
+from sweep.config.faults import either, refusal
+from sweep.config.messages import Allowed, wrong
 from sweep.config.values import Strict, Whole, parse_values, whole
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
-from sweep.models.general.selection import PAPER, SI
+from sweep.models.general.laws import LAWS
+from sweep.models.general.selection import PAPER_LAW
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.origin import Origin
 from sweep.models.user import loading
-from sweep.parameters import PARAMETERS, Parameter, sections
-
-_STEP = Allowed("auto, or a finite number > 0")
-_MEASURE = Allowed(f"a list of {', '.join(MEASURES)}")
-
-
-def _step(raw: Any) -> Any:
-    if raw == "auto" or (isinstance(raw, int | float) and not isinstance(raw, bool) and 0 < raw <= sys.float_info.max):
-        return raw
-    raise wrong(refusal(raw, _STEP.words, ["auto"]))
+from sweep.parameters import PAPER_UNITS, PARAMETERS, SI, Parameter, sections
 
 
 def _measures(raw: Any) -> Any:
     """Specs of the measurements: "reversals" for `reversals`, "reversal_times=12" for `{reversal_times: 12}`."""
-    if raw is None:
-        return raw
     if not isinstance(raw, list):
-        raise wrong(refusal(raw, _MEASURE.words))
+        return raw
     specs = [_measure(item, i) for i, item in enumerate(raw)]
     if len({spec.partition("=")[0] for spec in specs}) < len(specs):
-        raise wrong("a name twice; allowed: each once")
+        raise wrong("a measurement twice; name each once")
     return specs
 
 
 def _measure(raw: Any, i: int) -> str:
     name, setting = next(iter(raw.items())) if isinstance(raw, dict) and len(raw) == 1 else (raw, None)
     if not isinstance(name, str) or name not in MEASURES:
-        meant = suggestion(name, MEASURES)
-        raise wrong(f"{quote(raw)} is not a measurement{meant}; allowed: {', '.join(MEASURES)}", i)
+        raise wrong(refusal(name, either(MEASURES), MEASURES), i)
     kind = MEASURES[name]
     if not isinstance(raw, dict):
         return kind().spec
     if kind.bounds is None:
-        raise wrong(f"{name} has no setting; allowed: {name}", i)
+        raise wrong(f"{name} takes no setting; write the name alone", i)
     low, high = kind.bounds
     setting = whole(setting)
-    if isinstance(setting, bool) or not isinstance(setting, int) or not low <= setting <= high:
-        raise wrong(f"{quote(setting)}; allowed: a whole number from {low} to {high}", i, name)
+    if type(setting) is not int or not low <= setting <= high:
+        raise wrong(refusal(setting, f"a whole number from {low} to {high}"), i, name)
     return kind(setting).spec  # type: ignore[call-arg]
 
 
@@ -71,7 +59,7 @@ FOREVER = 1e7
 then has the status `time_limit` all the same."""
 
 T_END = 30_000.0
-"""Default of `t_end`, in sqrt(c/g); what that is in seconds says `Config.with_time`."""
+"""Default of `t_end`, in sqrt(c/g); in SI it is as long for the body."""
 
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
@@ -86,7 +74,7 @@ class Integrator(Strict):
     )
     """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time.  With a number
     for `step`, and for a model that only one method can integrate, that is the default."""
-    step: Annotated[float | Literal["auto"], BeforeValidator(_step), _STEP] = Field(
+    step: Annotated[Annotated[float, Field(gt=0)] | Literal["auto"], Allowed("auto or a finite number > 0")] = Field(
         default="auto", description="fixed step in sqrt(c/g) or, with `units: SI`, in s; or `auto`"
     )
     tolerance: float = Field(
@@ -95,8 +83,8 @@ class Integrator(Strict):
     )  # fmt: skip
     t_end: Annotated[
         float,
-        BeforeValidator(lambda raw: FOREVER if isinstance(raw, float) and raw == math.inf else raw),
-        Allowed(f"a number > 0 and <= {LATEST:g}, or .inf"),
+        BeforeValidator(lambda raw: FOREVER if raw == inf else raw),
+        Allowed(f".inf or a number > 0 and <= {LATEST:g}"),
     ] = Field(
         default=T_END, gt=0, le=LATEST,
         description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}; "
@@ -124,52 +112,63 @@ class _Words(Strict):
     """What a section has beside physical parameters: of most, nothing."""
 
 
-class Law(_Words):
-    law: Literal["viscous", "coulomb", "stribeck", "contensou", "none"] = Field(
-        default="viscous", description="law of slip friction"
-    )
-    regularisation: Literal["sqrt", "tanh", "cubic"] = Field(
-        default="sqrt", description="how Coulomb friction passes through zero slip, within `speed`"
+def _parts(which: int) -> tuple[str, ...]:
+    """The laws of friction (0), or the regularisations of those that have several (2), from the names of `LAWS`."""
+    return tuple(dict.fromkeys(part for name in LAWS if (part := name.partition("-")[which])))
+
+
+class Friction(_Words):
+    law: Literal[_parts(0)] = Field(default=PAPER_LAW, description="law of slip friction")  # type: ignore[valid-type]
+    regularisation: Literal[_parts(2)] = Field(  # type: ignore[valid-type]
+        default=_parts(2)[0], description="how Coulomb friction passes through zero slip, within `speed`"
     )
 
     @property
     def name(self) -> str:
-        """As in `sweep.models.general.laws.LAWS`."""
-        return f"{self.law}-{self.regularisation}" if self.law == "coulomb" else self.law
+        """The name of the law in `sweep.models.general.laws.LAWS`."""
+        return self.law if self.law in LAWS else f"{self.law}-{self.regularisation}"
+
+    @model_validator(mode="after")
+    def _regularised(self) -> Friction:
+        if self.name not in LAWS:
+            raise wrong(f"the law {self.law} has no regularisation {self.regularisation}; choose another", "law")
+        if self.law in LAWS and "regularisation" in self.model_fields_set:
+            raise wrong(f"the law {self.law} needs no regularisation; leave it out", "regularisation")
+        return self
 
 
-class Shape(_Words):
+class Body(_Words):
     surface: Literal[tuple(SURFACES)] = Field(  # type: ignore[valid-type]
         default=ELLIPSOID.name, description="surface of the body, which says what `a`, `b` and `c` mean"
     )
 
 
-_WORDS: dict[str, type[_Words]] = {"body": Shape, "friction": Law}
+_WORDS: dict[str, type[_Words]] = {"body": Body, "friction": Friction}
 
 
 class _Top(Strict):
-    name: Annotated[str, Allowed("up to 100 of A-Z, a-z, 0-9, '.', '_', '-', the first a letter or digit")] = Field(
+    name: Annotated[str, Allowed("up to 100 letters, digits, '.', '_' or '-', not '.', '_' or '-' first")] = Field(
         default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
         description="name of the run and of its files; by default that of the configuration file",
     )  # fmt: skip
     model: Annotated[
         Literal[tuple(TIERS)],  # type: ignore[valid-type]
-        Allowed(f"{', '.join(TIERS)}, a Python file such as my_model.py, or an entry point of a package"),
+        Allowed(f"{', '.join(TIERS)}, a Python file such as my_model.py or an entry point of a package"),
     ] = Field(default="slip", description="which model to integrate; the code of a file or a package is run")
     model_sha256: Annotated[str | None, Allowed("64 hexadecimal digits")] = Field(
         default=None, pattern="^[0-9a-f]{64}$",
         description="SHA-256 that the file or the package of `model` has to have; a dataset tells its own",
     )  # fmt: skip
-    units: Literal[PAPER, SI] = Field(  # type: ignore[valid-type]
-        default=PAPER, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
+    units: Literal[PAPER_UNITS, SI] = Field(  # type: ignore[valid-type]
+        default=PAPER_UNITS, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
     )
     cases: Annotated[str | None, Allowed("the name of a CSV file")] = Field(
         default=None,
         description="CSV table with a column for each parameter and a row for each trajectory, instead of axes",
     )
     integrator: Integrator = Integrator()
-    measure: Annotated[list[str] | None, BeforeValidator(_measures), _MEASURE] = Field(
-        default=None, description="what to compute; by default the measurements marked so that the model supports"
+    measure: Annotated[list[str] | None, BeforeValidator(_measures), Allowed(f"a list of {', '.join(MEASURES)}")] = (
+        Field(default=None, description="what to compute; by default the usual measurements that the model supports")
     )
     verify: float | None = Field(
         default=None, ge=0, le=1,
@@ -195,7 +194,7 @@ def _section(name: str, table: Mapping[str, Parameter], words: type[_Words]) -> 
 def schema_of(origin: Origin | None) -> Any:
     """The schema of the configurations of a user's model, or, without one, of the models of this package."""
     table = loading.table(origin)
-    words = _WORDS if not origin else {"body": Shape} if loading.law(origin) else {}
+    words = _WORDS if not origin else {"body": Body} if loading.law(origin) else {}
     found: dict[str, Any] = {name: _section(name, table, words.get(name, _Words)) for name in sections(table)}
     if origin:
         found["model"] = str, ...

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from sweep.config.document import number
-from sweep.config.faults import ConfigError, Fault, quote
+from sweep.config.document import number, plain_data
+from sweep.config.faults import fault_of, refusal
 from sweep.config.messages import describe, wrong
-from sweep.config.plain import plain
 from sweep.parameters import Parameter
 
 MAX_AXIS = 1_000_000
@@ -23,6 +20,8 @@ MAX_AXIS = 1_000_000
 
 
 class Strict(BaseModel):
+    """A part of the schema: no value is converted, and no key is unknown."""
+
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
 
 
@@ -36,6 +35,8 @@ Whole = Annotated[int, BeforeValidator(whole)]
 
 
 class Range(Strict):
+    """`num` numbers from `start` to `stop`."""
+
     start: float
     stop: float
     num: Whole = Field(ge=1, le=MAX_AXIS)
@@ -44,7 +45,7 @@ class Range(Strict):
     def values(self) -> list[float]:
         if self.spacing == "linear":
             return _divided(self.start, self.stop, self.num)
-        if np.sign(self.start) * np.sign(self.stop) <= 0:
+        if not (min(self.start, self.stop) > 0 or max(self.start, self.stop) < 0):
             raise wrong("a log range needs start and stop of one sign, both not zero", "spacing")
         logs = _divided(math.log10(abs(self.start)), math.log10(abs(self.stop)), self.num)
         inside = [math.copysign(10.0**log, self.start) for log in logs[1:-1]]
@@ -70,7 +71,29 @@ class Values:
     """The value as it stands in the configuration."""
 
 
-_DEGREES = re.compile(r"\s*(\S+)\s+deg\s*")
+def parse_values(parameter: Parameter, raw: Any) -> Values:
+    """The value of a parameter from what a configuration says; `wrong` tells what is wrong with it."""
+    if parameter.units == "radian":
+        raw = _in_radians(raw)
+    if isinstance(raw, dict):
+        return _parse_range(parameter, raw)
+    if not isinstance(raw, list):
+        _check_number(raw, parameter)
+        return Values((float(raw),), False, float(raw))
+    if not raw:
+        raise wrong("an empty axis; give it one number or more")
+    for i, item in enumerate(raw):
+        _check_number(item, parameter, i)
+    return _axis([float(item) for item in raw])
+
+
+def numbers_of(parameter: Parameter, raw: Any) -> tuple[float, ...]:
+    """The numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter."""
+    try:
+        return parse_values(parameter, plain_data(raw)).numbers
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise fault_of(context["reason"], parameter.name, *context["at"]) from None
 
 
 def _in_radians(raw: Any) -> Any:
@@ -79,55 +102,32 @@ def _in_radians(raw: Any) -> Any:
         return [_in_radians(item) for item in raw]
     if isinstance(raw, dict):
         return {key: _in_radians(item) for key, item in raw.items()}
-    spelled = _DEGREES.fullmatch(raw) if isinstance(raw, str) else None
+    spelled = re.fullmatch(r"\s*(\S+)\s+deg\s*", raw) if isinstance(raw, str) else None
     degrees = number(spelled[1]) if spelled else None
     return raw if degrees is None else math.radians(degrees)
 
 
-def parse_values(parameter: Parameter, raw: Any) -> Values:
-    if parameter.units == "radian":
-        raw = _in_radians(raw)
-    spec: Any = raw
-    if isinstance(raw, dict):
-        try:
-            span = Range.model_validate(raw)
-        except ValidationError as error:
-            # An unknown key first: it tells why another is missing.
-            path, message, _ = max(describe(error.errors(), Range), key=lambda found: found[2])
-            raise wrong(message, *path) from None
-        numbers, spec = span.values(), span.model_dump()
-    elif isinstance(raw, list):
-        if not raw:
-            raise wrong("an empty axis; allowed: one number or more")
-        for i, item in enumerate(raw):
-            _check_number(item, parameter, i)
-        numbers = spec = [float(item) for item in raw]
-    else:
-        _check_number(raw, parameter)
-        return Values((float(raw),), False, float(raw))
-    for value in numbers:
-        if not parameter.allows(value):
-            raise wrong(f"{value:g} is out of bounds; allowed: {parameter.allowed}")
-    if len(set(numbers)) < len(numbers):
-        raise wrong("an axis with equal values; allowed: distinct numbers")
-    return Values(tuple(numbers), True, spec)
-
-
-def numbers_of(parameter: Parameter, raw: Any) -> tuple[float, ...]:
-    """The numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter."""
+def _parse_range(parameter: Parameter, raw: dict[str, Any]) -> Values:
     try:
-        return parse_values(parameter, plain(raw)).numbers
-    except PydanticCustomError as error:
-        context = error.context or {}
-        raise ConfigError([Fault("", None, None, (parameter.name, *context["at"]), context["reason"])]) from None
+        span = Range.model_validate(raw)
+    except ValidationError as error:
+        # An unknown key first: it tells why another is missing.
+        path, (message, _) = max(describe(error.errors(), Range).items(), key=lambda found: found[1][1])
+        raise wrong(message, *path) from None
+    for value in (numbers := span.values()):
+        if not parameter.allows(value):
+            raise wrong(f"reaches {value:g}, but must be {parameter.allowed}")
+    return _axis(numbers, span.model_dump())
+
+
+def _axis(numbers: list[float], spec: Any = None) -> Values:
+    if len(set(numbers)) < len(numbers):
+        raise wrong("equal values on one axis; keep each once")
+    return Values(tuple(numbers), True, spec or numbers)
 
 
 def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
-    if isinstance(raw, bool) or not isinstance(raw, int | float):
-        raise wrong(
-            f"{quote(raw)} is not a number; allowed: {parameter.allowed}"
-            + ("" if at else ", a list of such, or {start, stop, num, spacing: linear|log}"),
-            *at,
-        )
-    if not (abs(raw) <= sys.float_info.max and parameter.allows(raw)):
-        raise wrong(f"{quote(raw)} is out of bounds; allowed: {parameter.allowed}", *at)
+    is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
+    if not is_number or not parameter.allows(raw):
+        axis = "" if is_number or at else ", a list of such, or {start, stop, num, spacing: linear|log}"
+        raise wrong(refusal(raw, parameter.allowed + axis), *at)

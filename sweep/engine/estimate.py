@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.config import Config
-from sweep.config.brought import explained
+from sweep.config.user_models import explained
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import GROUP
 from sweep.engine.plan import choose

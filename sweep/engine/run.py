@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigLike, load_config
-from sweep.config.brought import explained
+from sweep.config.user_models import explained
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.earlier import RERUN, Earlier, reason_against, taken_over

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from sweep.config import Config, ConfigError, Fault, load_config
-from sweep.config.brought import SUFFIX
 from sweep.config.faults import brief
+from sweep.config.user_models import SUFFIX
 from sweep.explore.slices import Source
 from sweep.explore.state import Cell
 from sweep.models.user.loading import entry_point

@@ -38,7 +38,7 @@ from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.models.user.blame import blamed
-from sweep.parameters import PAPER
+from sweep.parameters import PAPER_PARAMETERS
 
 Piece = tuple[str, ...]
 """Something to be compiled: the arguments of this module."""
@@ -137,7 +137,7 @@ def main(what: str, *which: str) -> None:
         make_kernel(method, model, measure).compile()
     elif what == "images":
         kernel = make_kernel(which[0], model, ())
-        body = {name: np.full(1, p.default if p.default is not None else 1.5) for name, p in PAPER.items()}
+        body = {name: np.full(1, p.default if p.default is not None else 1.5) for name, p in PAPER_PARAMETERS.items()}
         body |= {name: np.full(1, 1.5) for name in kernel.model.parameters if name not in body}
         kernel.images(body, np.full(1, 0.1), 10.0)
     elif what == "approach":

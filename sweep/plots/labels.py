@@ -7,7 +7,7 @@ import re
 import xarray as xr
 
 from sweep.kernels import status
-from sweep.models.general.surfaces import PARABOLOID
+from sweep.models.general.surfaces import SURFACES
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 from sweep.results.kind import is_of_own_body, parameters
@@ -44,12 +44,6 @@ _PARAMETER_WORDS = {
     "omega3": "start angular velocity ω₃ about z",
     "case": "case",
     "trajectory": "trajectory",
-}
-
-_PARABOLOID_WORDS = {
-    "a": "coefficient a of the paraboloid",
-    "b": "coefficient b of the paraboloid",
-    "c": "height c of the paraboloid's origin over the table",
 }
 
 _VARIABLE_WORDS = {
@@ -106,7 +100,7 @@ def unit(dataset: xr.Dataset, name: str) -> str:
 
 def words(dataset: xr.Dataset, name: str) -> str:
     """What a variable or coordinate is, without its unit."""
-    of_surface = _PARABOLOID_WORDS if dataset.attrs.get("surface") == PARABOLOID.name else {}
+    of_surface = SURFACES[surface].labels if (surface := dataset.attrs.get("surface")) in SURFACES else {}
     of_parameters = {} if is_of_own_body(dataset) else _PARAMETER_WORDS
     short = {**of_parameters, **_VARIABLE_WORDS, **of_surface}.get(name)
     return short or _SCALE.sub("", _long_name(dataset, name)) or name.replace("_", " ")

@@ -16,7 +16,7 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import TOLERANCE
 from sweep.models import MODELS
 from sweep.models.model import Columns, Model
-from sweep.parameters import PAPER
+from sweep.parameters import PAPER_PARAMETERS
 from sweep.prediction import predict
 from sweep.results.dataset import measured
 
@@ -43,7 +43,7 @@ class Ends:
 
 def standard(**parameters: Any) -> dict[str, Array]:
     """The paper's standard case at μ = 75, with some parameters replaced, as columns."""
-    values = {name: p.default for name, p in PAPER.items()} | {"mu": 75.0} | parameters
+    values = {name: p.default for name, p in PAPER_PARAMETERS.items()} | {"mu": 75.0} | parameters
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in values.values()))
     return {name: array.copy() for name, array in zip(values, arrays, strict=True)}
 

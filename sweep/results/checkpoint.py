@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from sweep.config import files
 from sweep.grid import Array
 from sweep.results.identity import Identity, require_same
 from sweep.results.store import Running, StoreError
@@ -39,7 +38,7 @@ class Checkpoint:
         head = folder / "identity.json"
         if head.exists():
             try:
-                found = Identity.of(json.loads(files.read(head, files.MIB)))
+                found = Identity.of(json.loads(head.read_text(encoding="utf-8")))
             except (OSError, ValueError, RecursionError) as error:
                 raise StoreError(f"{head}: damaged ({error}); start again with --fresh") from None
             require_same(folder, found, identity)

@@ -16,8 +16,8 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
 from sweep.models.general import reversal_time
-from sweep.models.general.selection import PAPER, SI
 from sweep.models.general.surfaces import ELLIPSOID
+from sweep.parameters import PAPER_UNITS, SI
 from sweep.prediction import Prediction
 from sweep.variables import Variable, in_si, without_unit
 
@@ -228,10 +228,10 @@ def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr
     return result
 
 
-def described(spec: Variable, system: str = PAPER) -> dict[str, Any]:
+def described(spec: Variable, system: str = PAPER_UNITS) -> dict[str, Any]:
     """The CF attributes of a variable in a system of units."""
     units, long_name = spec.units, spec.long_name
-    if system != PAPER:
+    if system != PAPER_UNITS:
         units, long_name = in_si(units, long_name) if system == SI else (units, without_unit(long_name))
     words: dict[str, Any] = {"long_name": long_name, "units": units}
     if spec.flags:

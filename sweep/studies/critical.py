@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, Values
-from sweep.config.brought import explained
-from sweep.config.scenes import described_impossible
+from sweep.config.bodies import described_impossible
+from sweep.config.user_models import explained
 from sweep.engine.reporter import Reporter
 from sweep.grid import Array, Grid
 from sweep.interrupt import deferred

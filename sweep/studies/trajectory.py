@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
-from sweep.config.brought import explained
+from sweep.config.bodies import misplaced, unfit
 from sweep.config.faults import suggestion
-from sweep.config.scenes import misplaced, unfit
 from sweep.config.schema import FOREVER
+from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS

@@ -76,7 +76,7 @@ def test_too_many_failures(write: Write, tmp_path: Path) -> None:
     settings = ("--set", "n0=[0.05, 3.0]", "--set", "x0=1", "--set", "mu=20", "--set", "b=3", "--set", "t_end=5")
     result = invoke("run", write(), "--output", tmp_path / "out", *settings)
     assert result.exit_code == 3
-    assert "50.00% of the cells failed; allowed: max_failed_fraction 1.00%" in result.stderr
+    assert "50.00% of the cells failed; max_failed_fraction allows 1.00%" in result.stderr
     assert (tmp_path / "out" / "small.nc").exists()
     assert (
         invoke("run", write(), "--output", tmp_path / "b", *settings, "--set", "max_failed_fraction=0.5").exit_code == 0

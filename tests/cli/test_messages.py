@@ -28,16 +28,16 @@ TEXT = "name: quick\nmodel: averaged\nfriction: {mu: [40, 60]}\nintegrator: {t_e
 MEANT = {
     "rnu": "Did you mean 'run'?",
     "run c.yaml --outptu x": "Did you mean '--output'?",
-    "run c.yaml --set fricton.mu=3": "--set fricton.mu: fricton: unknown key (did you mean friction?); allowed: name",
-    "run c.yaml --set body.detla=3": "--set body.detla: unknown key (did you mean delta?); allowed: surface, a, b, c",
+    "run c.yaml --set fricton.mu=3": "--set fricton.mu: fricton: unknown key (did you mean friction?); the keys",
+    "run c.yaml --set body.detla=3": "--set body.detla: unknown key (did you mean delta?); the keys here are surf",
     "run c.yaml --set mux=3": "--set mux: unknown key (did you mean friction.mu?)",
-    "run c.yaml --set model=sllip": "--set model: 'sllip' (did you mean slip?); allowed: slip",
-    "run c.yaml --set method=ADAM": "--set method: 'ADAM' (did you mean adams?); allowed: dopri5",
-    "run c.yaml --set measure=[noise_limit]": "(did you mean noise_limited?); allowed: reversals",
-    "trajectory c.yaml --at mux=3": "--at mux=3: unknown parameter (did you mean mu?); allowed: a, b",
-    "trajectory c.yaml --at mu=-3 --dry-run": "--at mu: -3 is out of bounds; allowed",
-    "trajectory c.yaml --at mu=3 --at mu=-3": "--at mu[1]: -3 is out of bounds; allowed",
-    "run c.yaml --set mu=20..60:0": "--set mu.num: 0; allowed: a whole number >= 1",
+    "run c.yaml --set model=sllip": "point of a package, not 'sllip' (did you mean slip?)",
+    "run c.yaml --set method=ADAM": "--set method: must be dopri5, adams or auto, not 'ADAM' (did you mean adams?)",
+    "run c.yaml --set measure=[noise_limit]": "not 'noise_limit' (did you mean noise_limited?)",
+    "trajectory c.yaml --at mux=3": "--at mux=3: unknown parameter (did you mean mu?); the parameters are a, b",
+    "trajectory c.yaml --at mu=-3 --dry-run": "--at mu: must be a finite number >= 0 and < 1e+12, not -3",
+    "trajectory c.yaml --at mu=3 --at mu=-3": "--at mu[1]: must be a finite number >= 0",
+    "run c.yaml --set mu=20..60:0": "--set mu.num: must be a whole number >= 1 and <= 1000000, not 0",
 }  # fmt: skip
 
 

@@ -269,14 +269,18 @@ def test_in_other_processes(file: Path, refined: xr.Dataset) -> None:
 @pytest.mark.parametrize(
     ("text", "place", "said"),
     [
-        (MAP.replace("refine: 2", "refine: -1"), "6:9: refine", "-1; allowed: a whole number >= 0"),
-        (MAP.replace("refine: 2", "refine: 1.5"), "6:9: refine", "1.5; allowed: a whole number"),
-        (MAP.replace("refine: 2", "refine: 25"), "6:9: refine", "25; allowed: a whole number >= 0 and <= 24"),
-        (MAP + "verify: 0.1\n", "7:9: verify", "allowed: 0"),
-        (MAP + "measure: [energy_error]\n", "7:10: measure", "allowed: reversals among them"),
-        (MAP + "model: analytic\n", "6:9: refine", "allowed: 0"),
-        (MAP.replace("num: 11", "num: 5000").replace("num: 14", "num: 5000"), "6:9: refine", "at most 16777216"),
-        ("cases: c.csv\nrefine: 1\n", "2:9: refine", "with cases, which have no neighbours; allowed: 0"),
+        (MAP.replace("refine: 2", "refine: -1"), "6:9: refine", "must be a whole number >= 0 and <= 24, not -1"),
+        (MAP.replace("refine: 2", "refine: 1.5"), "6:9: refine", "must be a whole number >= 0 and <= 24, not 1.5"),
+        (MAP.replace("refine: 2", "refine: 25"), "6:9: refine", "and <= 24, not 25"),
+        (MAP + "verify: 0.1\n", "7:1: verify", "cannot be combined with refine; set it to 0"),
+        (MAP + "measure: [energy_error]\n", "7:1: measure", "must have reversals, on which refine depends"),
+        (MAP + "model: analytic\n", "6:1: refine", "is a formula; set it to 0"),
+        (
+            MAP.replace("num: 11", "num: 5000").replace("num: 14", "num: 5000"),
+            "6:1: refine",
+            "keep to 16777216",
+        ),
+        ("cases: c.csv\nrefine: 1\n", "2:1: refine", "cannot be combined with cases, which have no neighbours"),
     ],
 )
 def test_what_cannot_be_refined(text: str, place: str, said: str, write: Write, tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_nor_is_the_one_beside_a_dataset_that_tells_no_hash(
 
 @pytest.mark.parametrize(
     ("model", "message"),
-    [("missing.py", "no such file in "), ("sliip", "sliip is neither a Python file nor an entry point")],
+    [("missing.py", "no such file"), ("sliip", "sliip is neither a Python file nor an entry point")],
 )
 def test_a_model_that_is_not_there_is_told(
     source: Source, folder: Path, model: str, message: str, monkeypatch: pytest.MonkeyPatch

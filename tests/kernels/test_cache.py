@@ -20,9 +20,9 @@ import numpy as np
 from sweep.engine.executor import execute
 from sweep.kernels.methods import make_kernel
 from sweep.models import MODELS
-from sweep.parameters import PAPER
+from sweep.parameters import PAPER_PARAMETERS
 
-body = {name: np.array([60.0 if name == "mu" else p.default]) for name, p in PAPER.items()}
+body = {name: np.array([60.0 if name == "mu" else p.default]) for name, p in PAPER_PARAMETERS.items()}
 for measure in sys.argv[1:]:
     kernel = make_kernel("dopri5", MODELS["averaged"], measure.split("+"))
     found = kernel.is_compiled()

@@ -177,5 +177,5 @@ def test_auto_is_dopri5_with_it(method: str | None, write: Write) -> None:
 
 
 def test_adams_refuses_it(write: Write) -> None:
-    with pytest.raises(ConfigError, match="not measured with method: adams; allowed: dopri5"):
+    with pytest.raises(ConfigError, match="cannot be measured with method: adams; choose dopri5"):
         sweep.load_config(write("friction: {mu: 60}\n"), {"measure": ["lyapunov"], "method": "adams"})

@@ -93,7 +93,7 @@ def test_only_what_is_asked_for_is_measured(write: Write) -> None:
     for method in ("adams", "dopri5"):
         assert not set(noise.NoiseLimited().rows) & set(kernel(method, measure=["reversals"]).layout.names)
     assert "noise_limited" not in sweep.run(write(), measure=["reversals"])
-    with pytest.raises(ConfigError, match="measured with the reversals; allowed: reversals beside it"):
+    with pytest.raises(ConfigError, match="measured with the reversals; add reversals"):
         sweep.load_config(write(), {"measure": ["noise_limited"]})
 
 

@@ -66,11 +66,11 @@ def test_on_disk_and_in_memory_are_the_same(found: xr.Dataset, write: Write) -> 
 @pytest.mark.parametrize(
     ("measure", "words"),
     [
-        ([{"reversal_times": 3}], "measured with the reversals; allowed: reversals beside it"),
-        (["reversals", {"reversal_times": 0}], "0; allowed: a whole number from 1 to 1000"),
-        (["reversals", {"reversal_times": 2.5}], "2.5; allowed: a whole number from 1 to 1000"),
-        (["reversals", {"energy_error": 3}], "energy_error has no setting; allowed: energy_error"),
-        (["reversals", "reversal_times", {"reversal_times": 3}], "a name twice; allowed: each once"),
+        ([{"reversal_times": 3}], "measured with the reversals; add reversals"),
+        (["reversals", {"reversal_times": 0}], "must be a whole number from 1 to 1000, not 0"),
+        (["reversals", {"reversal_times": 2.5}], "must be a whole number from 1 to 1000, not 2.5"),
+        (["reversals", {"energy_error": 3}], "energy_error takes no setting; write the name alone"),
+        (["reversals", "reversal_times", {"reversal_times": 3}], "a measurement twice; name each once"),
     ],
 )
 def test_a_wrong_setting_is_refused(measure: list[object], words: str, write: Write) -> None:

@@ -195,7 +195,7 @@ def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkey
     assert "2" in told.stdout.splitlines()[0]
     assert not out.exists()
     refused(invoke("critical", config, "--dry-run", "--set", "model=analytic"), "not simulated")
-    refused(invoke("trajectory", config, "--dry-run", "--at", "mu=-1"), "--at mu: -1 is out of bounds; allowed")
+    refused(invoke("trajectory", config, "--dry-run", "--at", "mu=-1"), "--at mu: must be a finite number >= 0")
 
 
 def test_progress_is_told(config: Path) -> None:

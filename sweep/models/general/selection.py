@@ -2,75 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from dataclasses import dataclass
 
 from sweep.models.general import rigid_body, starts, variants
 from sweep.models.general.couples import COUPLES
 from sweep.models.general.laws import LAWS, Law
-from sweep.models.general.surfaces import ELLIPSOID, SURFACES
+from sweep.models.general.surfaces import ELLIPSOID, Surface
 from sweep.models.model import Model
-
-PAPER, SI = "paper", "SI"
-"""Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
+from sweep.parameters import PAPER_PARAMETERS, PAPER_UNITS, PARAMETERS, SI, Parameter
 
 PAPER_LAW = "viscous"
-
-PAPER_PARAMETERS = frozenset({"a", "b", "c", "delta", "mu", *starts.POINT})
-"""Parameters of the paper's models."""
 
 INERTIA = (*rigid_body.MOMENTS, *rigid_body.PRODUCTS)
 
 
-def is_papers(law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> bool:
-    """Whether the paper's models know all of a scene: law of friction, units, the parameters `names`, and surface."""
-    return law == PAPER_LAW and units == PAPER and set(names) <= PAPER_PARAMETERS and surface == ELLIPSOID.name
+@dataclass(frozen=True)
+class Physics:
+    """What a configuration says of bodies, friction and starts, beside the numbers."""
+
+    units: str
+    """`PAPER_UNITS` or `SI`."""
+    law: Law
+    """The law of slip friction: one of `LAWS`, or a user's."""
+    surface: Surface
+    names: frozenset[str]
+    """The parameters that the configuration names."""
+
+    @property
+    def beyond(self) -> list[str]:
+        """What the paper's models do not know of it."""
+        found = sorted(self.names - PAPER_PARAMETERS.keys())
+        found += [f"law: {self.law.name}"] if self.law.name != PAPER_LAW else []
+        found += [f"units: {self.units}"] if self.units != PAPER_UNITS else []
+        return found + ([f"surface: {self.surface.name}"] if self.surface != ELLIPSOID else [])
+
+    @property
+    def required(self) -> frozenset[Parameter]:
+        """The parameters that have to be given, because their defaults are of other bodies."""
+        names = PAPER_PARAMETERS if self.units == SI else self.surface.required
+        return frozenset(PARAMETERS[name] for name in names)
+
+    def variant(self, base: str) -> Model:
+        """The variant of `slip` or `noslip` for it, whose parameters are those that follow from what is named."""
+        homogeneous = self.surface.homogeneous and not self.names & {*INERTIA}
+        moments = ("delta",) if homogeneous else INERTIA
+        system = ("mass", "gravity") if self.units == SI else ()
+        by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
+        start = by_angles if self.names & {*starts.ANGLES, *starts.SLIP} else starts.POINT
+        couples = [name for name, couple in COUPLES.items() if self.names & {*couple.parameters}]
+        parameters = ("a", "b", "c", "offset", *moments, *system, *start)
+        name = variants.name_of(base, self.law.name, couples, self.surface.name)
+        return variants.variant(name, parameters, None if self.law.name in LAWS else self.law)
+
+    def misfits(self) -> dict[str, str]:
+        """The named parameters that do not go with the rest, and why."""
+        inertia, angles = self.names & {*INERTIA}, self.names & {*starts.ANGLES, *starts.SLIP}
+        found: dict[str, str] = {}
+        if inertia:
+            found["delta"] = f"cannot be combined with {_some(inertia)}; leave out either"
+        elif not self.surface.homogeneous:
+            found["delta"] = f"means nothing with surface: {self.surface.name}; give the elements of inertia instead"
+        if angles:
+            ways = f"either {', '.join(starts.POINT)} or angles, omega1 … omega3 and slip"
+            found |= dict.fromkeys(starts.POINT, f"cannot be combined with {_some(angles)}; give {ways}")
+        if self.units == PAPER_UNITS:
+            found |= dict.fromkeys(("mass", "gravity"), "is 1 in the paper's units; leave it out, or set units: SI")
+        known = {*self.law.parameters, "mu"}  # one file with mu serves every law
+        takes = ", ".join((*self.law.parameters, *(name for couple in COUPLES.values() for name in couple.parameters)))
+        for name in {name for law in LAWS.values() for name in law.parameters} - known:
+            found[name] = f"does not belong to the law {self.law.name}; leave it out (friction takes {takes})"
+        return {name: words for name, words in found.items() if name in self.names}
 
 
-def variant(
-    base: str,
-    law: str,
-    units: str,
-    names: Collection[str],
-    surface: str = ELLIPSOID.name,
-    own: Law | None = None,
-) -> Model:
-    """The variant of `slip` or `noslip` for a scene; its parameters are those that follow from `names`.
-
-    `own` is the law of the name `law`, if it is not one of `LAWS`.
-    """
-    homogeneous = SURFACES[surface].homogeneous and not set(INERTIA) & set(names)
-    moments = ("delta",) if homogeneous else INERTIA
-    system = ("mass", "gravity") if units == SI else ()
-    by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
-    start = by_angles if {*starts.ANGLES, *starts.SLIP} & set(names) else starts.POINT
-    couples = [name for name, couple in COUPLES.items() if set(couple.parameters) & set(names)]
-    parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-    return variants.variant(variants.name_of(base, law, couples, surface), parameters, own)
-
-
-def strangers(
-    law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name, own: Law | None = None
-) -> dict[str, str]:
-    """The parameters that do not belong to a scene, with the reason; `own` as of `variant`."""
-    theirs = (own or LAWS[law]).parameters
-    names = set(names)
-    found: dict[str, str] = {}
-    inertia, angles, point = names & set(INERTIA), names & {*starts.ANGLES, *starts.SLIP}, names & set(starts.POINT)
-    if inertia:
-        found |= {"delta": f"beside {_some(inertia)}; allowed: delta or the elements of inertia"}
-    elif not SURFACES[surface].homogeneous:
-        found |= {"delta": f"with surface: {surface}; allowed: the elements of inertia"}
-    if angles:
-        words = f"beside {_some(angles)}; allowed: {', '.join(starts.POINT)}, or angles, omega1 … omega3 and slip"
-        found |= dict.fromkeys(starts.POINT, words)
-    if units == PAPER:
-        found |= dict.fromkeys(("mass", "gravity"), "with units: paper, in which it is 1; allowed: with units: SI")
-    for other in LAWS.values():
-        foreign = set(other.parameters) - set(theirs) - {"mu"}
-        words = ", ".join((*theirs, *(name for couple in COUPLES.values() for name in couple.parameters)))
-        found |= dict.fromkeys(foreign, f"not of the law {law}; allowed: {words}")
-    return {name: words for name, words in found.items() if name in names and (name not in point or angles)}
-
-
-def _some(names: Collection[str]) -> str:
+def _some(names: frozenset[str]) -> str:
     return ", ".join(sorted(names))

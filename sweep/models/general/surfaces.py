@@ -2,7 +2,8 @@
 
 The axes are those of the surface, x and y along its principal curvatures at the lowest point of the body at rest, z
 down; they begin at the centre of mass G, at the height h = c - offset above that point.  u is the upward normal of the
-plane.  A variant of the equations is made for one surface and has no instruction of the other.
+plane.  A variant of the equations is made for one surface and has no instruction of the other.  To add a surface, enter
+its `Surface` in `SURFACES`.
 
 Ellipsoid with the semi-axes a, b and c, its centre `offset` above G.  With A = diag(a², b², c²) and r = sqrt(uᵀ A u),
 
@@ -16,8 +17,8 @@ and b are pure numbers.  With the radii of curvature at its lowest point, s1 = c
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -52,11 +53,21 @@ class Surface:
     homogeneous: bool
     """Whether the inertia is that of a homogeneous body unless it is given."""
     interior: str
-    """What the centre of mass has to lie in, in words, with the offsets that are allowed."""
+    """Where the centre of mass has to lie, and what to do if it does not, in words."""
     outside: Callable[[Columns], Array]
     """(columns) -> whether it lies elsewhere, shape (cells,)."""
     bounds: str
     """For which offsets upright rest is stable, in words."""
+    off: Callable[[Columns, Array, Array], Array] = lambda columns, x, y: np.zeros(np.shape(x), bool)  # noqa: ARG005
+    """(columns, x, y) -> whether no point of it lies at x and y, shape (cells,); by default some does anywhere."""
+    outline: str = ""
+    """What holds of x and y within it, in words."""
+    required: frozenset[str] = frozenset()
+    """Parameters that have to be given, because their defaults in `sweep.parameters` are of an ellipsoid."""
+    meanings: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """What parameters mean here, as a `long_name` of `sweep.parameters`, where that is of an ellipsoid."""
+    labels: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """What these are called in figures."""
 
 
 def offset(columns: Columns) -> Array:
@@ -176,9 +187,11 @@ ELLIPSOID = Surface(
     height=_ellipsoid_height,
     normal=_ellipsoid_normal,
     homogeneous=True,
-    interior="the ellipsoid; allowed: |offset| < c",
+    interior="the ellipsoid; keep |offset| < c",
     outside=lambda columns: np.abs(offset(columns)) >= columns["c"],
     bounds="offset > c - a²/c and offset > c - b²/c",
+    off=lambda columns, x, y: (x / columns["a"]) ** 2 + (y / columns["b"]) ** 2 >= 1,
+    outline="(x/a)² + (y/b)² < 1 in the body's axes",
 )
 
 PARABOLOID = Surface(
@@ -192,9 +205,21 @@ PARABOLOID = Surface(
     height=_paraboloid_height,
     normal=_paraboloid_normal,
     homogeneous=False,
-    interior="the paraboloid; allowed: offset < c",
+    interior="the paraboloid; keep offset < c",
     outside=lambda columns: offset(columns) >= columns["c"],
     bounds="offset > c - c/(2 a) and offset > c - c/(2 b)",
+    required=frozenset({"a", "b"}),
+    meanings={
+        "a": "coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
+        "b": "coefficient b of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
+        "c": "height of the paraboloid's origin above its lowest point, the unit of length",
+        "offset": "depth of the centre of mass below the paraboloid's origin, in c",
+    },
+    labels={
+        "a": "coefficient a of the paraboloid",
+        "b": "coefficient b of the paraboloid",
+        "c": "height c of the paraboloid's origin over the table",
+    },
 )
 
 SURFACES: dict[str, Surface] = {surface.name: surface for surface in (ELLIPSOID, PARABOLOID)}

@@ -1,4 +1,4 @@
-"""Which bodies of `sweep.models.general.rigid_body` cannot be, or do not stand upright at rest, and why."""
+"""Find bodies of `sweep.models.general.rigid_body` that cannot be, or do not stand upright at rest, and say why."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ _ROUNDING = 1e-12
 
 
 def impossible(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
-    """Whether a body cannot be or does not stand, shape (cells,)."""
+    """Tell which bodies cannot be or do not stand, shape (cells,)."""
     return np.asarray(np.any([bad for bad, _ in wrongs(columns, surface)], axis=0))
 
 
 def wrongs(columns: Columns, surface: Surface = ELLIPSOID) -> Iterator[tuple[Array, str]]:
-    """Everything that may be wrong: for which bodies it is, shape (cells,), and in words, with what is allowed."""
+    """Yield everything that may be wrong: for which bodies it is, shape (cells,), and, in words, what to do."""
     yield surface.outside(columns), f"centre of mass outside {surface.interior}"
     moments = np.linalg.eigvalsh(rigid_body.matrix(rigid_body.inertia(columns)))
-    yield moments[:, 0] <= 0, "matrix of inertia not positive definite; allowed: three positive principal moments"
+    yield moments[:, 0] <= 0, "matrix of inertia not positive definite; all three principal moments must be positive"
     least, middle, largest = moments.T
     yield (
         largest > (least + middle) * (1 + _ROUNDING),
-        "no body has such moments of inertia; allowed: no principal moment above the sum of the other two",
+        "no body has such moments of inertia; none of the principal ones may exceed the sum of the other two",
     )
     k1, k2 = rigid_body.stiffness(columns, surface)
     yield (
         np.minimum(k1, k2) <= 0,
-        f"upright rest is unstable; allowed: the centre of mass below both centres of curvature, {surface.bounds}",
+        f"upright rest is unstable; keep the centre of mass below both centres of curvature, {surface.bounds}",
     )

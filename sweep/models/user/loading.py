@@ -16,8 +16,8 @@ from typing import Any
 
 from sweep.models.general import variants
 from sweep.models.general.laws import Law
-from sweep.models.general.selection import variant
-from sweep.models.general.surfaces import ELLIPSOID
+from sweep.models.general.selection import Physics
+from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.general.variants import SlipWith
 from sweep.models.model import Model
 from sweep.models.origin import ModelError, Origin
@@ -109,7 +109,7 @@ def find(origin: Origin, units: str, names: Collection[str], surface: str = ELLI
     made = load(origin)
     if isinstance(made, Model):
         return made
-    found = variant("slip", made.law.name, units, names, surface, made.law)
+    found = Physics(units, made.law, SURFACES[surface], frozenset(names)).variant("slip")
     return replace(found, origin=origin, own_parameters=made.own_parameters)
 
 

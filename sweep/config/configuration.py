@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -15,29 +13,28 @@ from ruamel.yaml.compat import StringIO
 
 from sweep.config.document import Document
 from sweep.config.faults import Fault, Path
-from sweep.config.schema import LATEST, T_END, Integrator
+from sweep.config.schema import Integrator
 from sweep.config.values import Values
-from sweep.kernels.kernel import STRETCH
 from sweep.models import TIERS
 from sweep.models.general import laws
-from sweep.models.general.selection import PAPER, PAPER_LAW, SI, is_papers, variant
-from sweep.models.general.surfaces import ELLIPSOID, PARABOLOID
+from sweep.models.general.selection import PAPER_LAW, Physics
+from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.general.variants import BASES
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
-from sweep.parameters import ON_PARABOLOID, Parameter, sections
+from sweep.parameters import PAPER_UNITS, SI, Parameter, sections
 from sweep.variables import in_si
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
 
 
-def tier_of(model: str, law: str, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> Tier:
-    """The model of a configuration that names these parameters."""
-    if model not in BASES or is_papers(law, units, names, surface):
-        return TIERS[model]
-    return variant(model, law, units, names, surface)
+def model_of(name: str, origin: Origin | None, physics: Physics) -> Tier:
+    """The model of this name, a variant of it for what the paper's does not know, or the one that a user brings."""
+    if origin:
+        return loading.find(origin, physics.units, physics.names, physics.surface.name)
+    return physics.variant(name) if physics.beyond and name in BASES else TIERS[name]
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,7 @@ class Config:
     cases: dict[str, tuple[float, ...]] | None = None
     """Columns of the table of cases, if there is one."""
     cases_file: str | None = None
-    units: str = PAPER
+    units: str = PAPER_UNITS
     law: str = PAPER_LAW
     """Name of the law of friction, as in `sweep.models.general.laws.LAWS`."""
     surface: str = ELLIPSOID.name
@@ -68,8 +65,8 @@ class Config:
     """What it was made from, so that single values can be replaced; a copy with other values has none."""
 
     def fault(self, path: Path, message: str) -> Fault:
-        """A fault at `path`, with the place where the user can correct it if that is known."""
-        return (self.source or Document("")).fault(path, message)
+        """A fault at the key `path`, with the place where the user can correct it if that is known."""
+        return (self.source or Document("")).fault(path, message, at_key=True)
 
     @property
     def axes(self) -> dict[str, tuple[float, ...]]:
@@ -77,15 +74,14 @@ class Config:
 
     @property
     def tier(self) -> Tier:
-        """The model that runs it: that of its name, or a variant for what the paper's model does not know."""
-        names = (*self.parameters, *(self.cases or ()))
-        if self.origin:
-            return loading.find(self.origin, self.units, names, self.surface)
-        return tier_of(self.model, self.law, self.units, names, self.surface)
+        """The model that runs it."""
+        names = frozenset((*self.parameters, *(self.cases or ())))
+        law = self.own_law or laws.LAWS[self.law]
+        return model_of(self.model, self.origin, Physics(self.units, law, SURFACES[self.surface], names))
 
     @property
     def simulated(self) -> bool:
-        """Whether the model is simulated rather than a formula."""
+        """Whether the model is simulated, and no formula."""
         return isinstance(self.tier, Model)
 
     @property
@@ -109,22 +105,12 @@ class Config:
         assert isinstance(self.tier, Model)
         return self.tier
 
-    def with_time(self) -> Config:
-        """The same with a `t_end` in seconds for bodies in SI, which have given none."""
-        columns = {name: value.numbers for name, value in self.parameters.items()} | (self.cases or {})
-        longest = min(T_END * math.sqrt(max(columns["c"]) / min(columns["gravity"])), LATEST)
-        # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
-        t_end = STRETCH * math.ceil(longest / STRETCH)
-        return replace(self, integrator=self.integrator.model_copy(update={"t_end": t_end}))
-
     def described(self, name: str) -> dict[str, str]:
         """The CF attributes of a physical parameter."""
         parameter = self.table[name]
         if name in (self.own_law or laws.LAWS[self.law]).pure:
             return {"long_name": "coefficient of friction", "units": "1"}
-        units, long_name = parameter.units, parameter.long_name
-        if self.surface == PARABOLOID.name:
-            long_name = ON_PARABOLOID.get(name, long_name)
+        units, long_name = parameter.units, SURFACES[self.surface].meanings.get(name, parameter.long_name)
         if self.units == SI:
             units, long_name = in_si(units, long_name)
         return {"long_name": long_name, "units": units}
@@ -136,7 +122,7 @@ class Config:
         # In the order of the axes, so that they keep it when the document is read again.
         found: dict[str, dict[str, Any]] = {section: {} for section in (*written, *sections(table)) if section}
         top: dict[str, Any] = {"model_sha256": self.origin.digest} if self.origin else {}
-        if self.units != PAPER and self.of_rattlebacks:
+        if self.units != PAPER_UNITS and self.of_rattlebacks:
             top["units"] = self.units
         if self.law != PAPER_LAW and not self.origin:
             law, _, regularisation = self.law.partition("-")
@@ -152,17 +138,14 @@ class Config:
             **({"cases": self.cases_file} if self.cases_file else {}),
             **{section: values for section, values in found.items() if values},
             "integrator": self.integrator.model_dump(),
-            "measure": [_written(spec) for spec in self.measure],
+            "measure": [{name: int(n)} if n else name for name, _, n in (m.partition("=") for m in self.measure)],
             "verify": self.verify,
             "refine": self.refine,
             "max_failed_fraction": self.max_failed_fraction,
         }
 
     def to_yaml(self) -> str:
-        return self._yaml
-
-    @cached_property
-    def _yaml(self) -> str:
+        """The whole configuration as the text of a file."""
         stream = StringIO()
         yaml = YAML(typ="safe", pure=True)
         yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
@@ -177,9 +160,3 @@ class Config:
             decisive.pop(key, None)
         text = json.dumps([decisive, list(self.axes), self.cases], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _written(spec: str) -> str | dict[str, int]:
-    """The spec of a measurement in the form in which a configuration gives it."""
-    name, _, setting = spec.partition("=")
-    return {name: int(setting)} if setting else name

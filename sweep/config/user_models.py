@@ -10,16 +10,13 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from sweep.config import files
-from sweep.config.checked import Config
+from sweep.config.configuration import Config
 from sweep.config.document import Document
 from sweep.config.faults import ConfigError, Fault, brief
 from sweep.models import TIERS
 from sweep.models.origin import ModelError, Origin
 from sweep.models.user import loading, trial
 from sweep.models.user.blame import blamed
-
-LIMIT = 1 * files.MIB
 
 SUFFIX = ".py"
 
@@ -60,7 +57,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
 
 def of_file(source: Document, name: str) -> Origin:
     """The model in a file that a document names, whose code is not run; a `ConfigError` if it cannot be read."""
-    path, text = source.read_beside("model", name, LIMIT)
+    path, text = source.read_beside("model", name)
     return Origin.of_file(name, str(path), text)
 
 

@@ -1,0 +1,152 @@
+"""What has to fit together in a configuration whose values are valid by themselves.
+
+Each check yields the path of the key to be changed, and what is wrong with it and what to do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from sweep.config import bodies
+from sweep.config.configuration import Config
+from sweep.config.faults import Path, either
+from sweep.config.schema import MAX_REFINED_CELLS
+from sweep.config.values import Values
+from sweep.grid import BODY, Grid, distinct
+from sweep.kernels import measures, methods
+from sweep.kernels.differentiate import undifferentiable
+from sweep.models.general.selection import Physics
+from sweep.models.general.variants import BASES
+from sweep.models.model import Model
+from sweep.models.origin import Origin
+from sweep.models.user import loading
+from sweep.parameters import PARAMETERS
+
+MAX_CELLS = 1_000_000_000
+MAX_STEPS = 1e15
+
+Misfit = tuple[Path, str]
+
+
+def of_physics(values: Any, physics: Physics, origin: Origin | None) -> Iterator[Misfit]:
+    """Parameters, law, units and surface that do not belong together, or that the model does not know."""
+    if origin and not loading.law(origin):  # of any body
+        if "units" in values.model_fields_set:
+            yield ("units",), "are said by the model's own file; leave them out"
+        return
+    if not origin and values.model_sha256 is not None:
+        yield ("model_sha256",), f"the {values.model} model comes from no file; leave it out"
+    if not origin and physics.beyond and values.model not in BASES:
+        unknown = ", ".join(physics.beyond)
+        yield ("model",), f"the {values.model} model knows no {unknown}; choose {either(BASES)}"
+    else:
+        yield from ((PARAMETERS[name].place, reason) for name, reason in physics.misfits().items())
+
+
+def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
+    """Values that do not fit the model, the method or each other; `given` are those of all parameters."""
+    yield from _of_parameters(config, given)
+    yield from _of_integrator(config)
+    if config.refine:
+        yield from _of_refinement(config)
+    for i, spec in enumerate(config.measure):
+        yield from ((("measure", i), reason) for reason in _unmeasurable(spec.partition("=")[0], config))
+
+
+def of_all_cells(config: Config) -> Iterator[Misfit]:
+    """What is wrong with all cells together; each check relies on those before it."""
+    cells = math.prod(map(len, config.axes.values()))
+    if cells > MAX_CELLS:
+        yield (), f"{cells} cells are too many; keep to {MAX_CELLS}"
+    if config.refine and cells > MAX_REFINED_CELLS:
+        yield ("refine",), f"cannot hold {cells} cells in memory; keep to {MAX_REFINED_CELLS}, or set it to 0"
+    for path, check in (
+        (("body",), bodies.impossible),
+        (("start", "x0"), bodies.misplaced),
+        (("integrator", "step"), _unusable_step),
+    ):
+        if reason := check(config):
+            yield path, reason
+
+
+def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
+    model, columns = config.tier, config.cases or {}
+    for name, value in given.items():
+        path = config.table[name].place
+        # A number that the model does not use may stay, so that one file serves every model.
+        if name not in model.parameters and value.is_axis:
+            yield path, f"the {model.name} model has no {name}; its parameters are {', '.join(model.parameters)}"
+        elif name in columns:
+            yield path, f"is also a column of {config.cases_file}; remove one of the two"
+        elif config.cases is not None and value.is_axis:
+            yield path, "cannot be an axis beside cases; give a number, or a column of the table"
+        if name in model.positive and 0.0 in value.numbers:
+            yield path, f"must be > 0 for the {model.name} model, not 0"
+    for name, column in columns.items():
+        if name not in model.parameters:
+            yield ("cases",), f"column {name}: the {model.name} model has no {name}; remove it"
+        elif name in model.positive and 0.0 in column:
+            yield ("cases",), f"column {name}: must be > 0 for the {model.name} model, not 0"
+    for name in model.parameters:
+        if name not in config.parameters and name not in columns:
+            yield config.table[name].place, f"missing; give {config.table[name].allowed}"
+
+
+def _of_integrator(config: Config) -> Iterator[Misfit]:
+    model, integrator = config.tier, config.integrator
+    if not isinstance(model, Model):
+        if config.verify:
+            yield ("verify",), f"the {model.name} model takes no steps to be verified; set it to 0"
+        return
+    usable = (*methods.allowed(model), methods.AUTO)
+    if integrator.method not in usable:
+        yield ("integrator", "method"), f"cannot run the {model.name} model; choose {either(usable)}"
+    if integrator.method == methods.AUTO and integrator.step != "auto":
+        yield ("integrator", "step"), "must be auto with method: auto; or choose a method"
+
+
+def _of_refinement(config: Config) -> Iterator[Misfit]:
+    if not config.simulated:
+        yield ("refine",), f"needs a simulation, but the {config.model} model is a formula; set it to 0"
+    if config.cases is not None:
+        yield ("refine",), "cannot be combined with cases, which have no neighbours; set it to 0"
+    if config.verify:
+        yield ("verify",), "cannot be combined with refine; set it to 0"
+    if "reversals" not in config.measure:
+        yield ("measure",), "must have reversals, on which refine depends; add them, or set refine to 0"
+
+
+def _unmeasurable(name: str, config: Config) -> Iterator[str]:
+    """What is wrong with asking for the measurement `name`."""
+    model, kind, method = config.tier, measures.MEASURES[name], methods.METHODS.get(config.integrator.method)
+    possible = measures.possible(model)
+    if name not in possible:
+        yield f"{name} cannot be measured on the {model.name} model; choose from {', '.join(possible)}"
+    for needed in set(kind.needs) - {spec.partition("=")[0] for spec in config.measure}:
+        yield f"{name} is measured with the {needed}; add {needed}"
+    if kind.follows_tangent and method and not method.follows_tangents:
+        able = either(each for each, found in methods.METHODS.items() if found.follows_tangents)
+        yield f"{name} cannot be measured with method: {method.name}; choose {able}"
+    elif kind.follows_tangent and isinstance(model, Model) and (reason := undifferentiable(model)):
+        yield f"{name} cannot be measured on the {model.name} model: {reason}; leave it out"
+
+
+def _unusable_step(config: Config) -> str:
+    """What is wrong with a step that the configuration fixes; "" if nothing is."""
+    step, model = config.integrator.step, config.tier
+    if step == "auto" or not isinstance(model, Model):
+        return ""
+    if config.integrator.t_end / step > MAX_STEPS:
+        return f"takes {config.integrator.t_end / step:.2g} steps to t_end; keep to {MAX_STEPS:.0e}, or choose auto"
+    with np.errstate(all="ignore"):  # the period of a vanishingly small body is NaN
+        names = BODY if config.of_rattlebacks else model.parameters
+        longest = min(
+            float(methods.longest_step(model, columns)[~model.impossible(columns)].min(initial=np.inf))
+            for columns in distinct(Grid.of(config), names)
+        )
+    too_long = f"must be auto or at most {longest:.3g}, a quarter of the rattle's period, not {step:g}"
+    return "" if step <= longest else too_long

@@ -1,0 +1,222 @@
+"""What is said of a configuration that cannot be run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from support import SMALL
+from support.cli import invoke, refused
+from support.physics import MOMENTS, stone
+
+from sweep import ConfigError, load_config
+
+Write = Callable[..., Path]
+
+
+def small(old: str, new: str) -> str:
+    assert old in SMALL
+    return SMALL.replace(old, new)
+
+
+def step(setting: str) -> str:
+    return small("{method: dopri5, t_end: 1500}", f"{{{setting}}}")
+
+
+def mu(value: str) -> str:
+    return small("[40, 60]", value)
+
+
+BOWL = ("{a: 0.2", "{surface: paraboloid, a: 0.01")
+
+# ruff: noqa: E501  (a table)
+# (configuration, line of the fault, path, part of what is said)
+BROKEN: list[tuple[str, int, str, str]] = [
+    (SMALL + "colour: 3\n", 6, "colour", "unknown key; the keys here are name, model,"),
+    (small("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); the keys here are surface, a, b, c, delta"),
+    ("mu: 60\n", 1, "mu", "unknown key (did you mean friction.mu?); the keys here are name"),
+    ("friction: {mu: 60}\nt_end: 3\n", 2, "t_end", "unknown key (did you mean integrator.t_end?)"),
+    ("friction: {mu: 60, b: 3}\n", 1, "friction.b", "unknown key (did you mean body.b?); the keys here are law"),
+    ("friction: {mu: 60}\nBody: {a: 9}\n", 2, "Body", "unknown key (did you mean body?)"),
+    (SMALL + "name: again\n", 6, "name", "duplicate key, first on line 1"),
+    (mu("40, mu: 60"), 3, "friction.mu", "first on line 3"),
+    (mu("[]"), 3, "friction.mu", "an empty axis; give it one number or more"),
+    (mu(".nan"), 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, not nan"),
+    (mu("[40, .inf]"), 3, "friction.mu[1]", "must be a finite number >= 0"),
+    (mu("[-40, 60]"), 3, "friction.mu[0]", "must be a finite number >= 0 and < 1e+12, not -40"),
+    (small("10.0", "ten"), 2, "body.a", "a list of such, or {start, stop, num, spacing: linear|log}, not 'ten'"),
+    (small("10.0", "true"), 2, "body.a", "not true"),
+    (small("a: 10.0", "a: "), 2, "body.a", "not nothing"),
+    (small("a: 10.0", "a: 0"), 2, "body.a", "must be a finite number > 0 and < 1e+06, not 0"),
+    (mu("{start: 1, num: 3}"), 3, "friction.mu.stop", "missing; give a finite number"),
+    (mu("{start: 1, stop: 2, num: 0}"), 3, "friction.mu.num", "must be a whole number >= 1 and <= 1000000, not 0"),
+    (mu("{start: 1, stop: 2, num: 2, spacing: cubic}"), 3, "friction.mu.spacing", "must be linear or log, not 'cubic'"),
+    (mu("{start: -1, stop: 1, num: 3, spacing: log}"), 3, "friction.mu.spacing", "one sign"),
+    (mu("{start: -5, stop: 5, num: 3}"), 3, "friction.mu", "reaches -5, but must be a finite number >= 0"),
+    (mu("[40, 40.0]"), 3, "friction.mu", "equal values on one axis; keep each once"),
+    (small("friction: {mu: [40, 60]}\n", ""), 1, "friction.mu", "missing; give a finite number >= 0"),
+    (small("x0: 0.01", "x0: 11"), 4, "start.x0", "start point off the ellipsoid at x0=11, y0=0.01, a=10, b=2, delta=0.03; keep (x/a)² + (y/b)² < 1"),
+    (SMALL + "model: slippery\n", 6, "model", "must be slip, noslip, effective, averaged, analytic, a Python file such as my_model.py or an entry point of a package, not 'slippery' (did you mean slip?)"),
+    (SMALL + f"model_sha256: {64 * 'a'}\n", 6, "model_sha256", "the slip model comes from no file; leave it out"),
+    (step("method: euler"), 5, "integrator.method", "must be dopri5, adams or auto, not 'euler'"),
+    ("model: averaged\nfriction: {mu: 60}\nintegrator: {method: adams}\n", 3, "integrator.method", "cannot run the averaged model; choose dopri5 or auto"),
+    (step("step: 0"), 5, "integrator.step", "must be auto or a finite number > 0, not 0"),
+    (step("step: aut"), 5, "integrator.step", "not 'aut' (did you mean auto?)"),
+    (step("step: 5"), 5, "integrator.step", "must be auto or at most 0.802, a quarter of the rattle's period, not 5"),
+    (step("step: 1.0e-320"), 5, "integrator.step", "steps to t_end; keep to 1e+15, or choose auto"),
+    (step("method: auto, step: 0.1"), 5, "integrator.step", "must be auto with method: auto; or choose a method"),
+    (step("t_end: -1"), 5, "integrator.t_end", "must be .inf or a number > 0 and <= 1e+12, not -1"),
+    (step("t_end: 1e308"), 5, "integrator.t_end", "not 1e+308"),
+    (step("tolerance: 5e-324"), 5, "integrator.tolerance", "must be a finite number >= 1e-14 and < 1, not 5e-324"),
+    (step("stop_when_settled: no"), 5, "integrator.stop_when_settled", "must be true or false, not 'no'"),
+    (SMALL + "measure: [colour]\n", 6, "measure[0]", "must be reversals, energy_error"),
+    (SMALL + "measure: [reversals, [reversals]]\n", 6, "measure[1]", "or lyapunov, not ['reversals']"),
+    (SMALL + "measure: {a: 1}\n", 6, "measure", "must be a list of reversals"),
+    (SMALL + "measure: [reversals, reversals]\n", 6, "measure", "a measurement twice; name each once"),
+    (SMALL + "max_failed_fraction: 2\n", 6, "max_failed_fraction", "must be a finite number >= 0 and <= 1, not 2"),
+    (small("name: small", "name: ../small"), 1, "name", "must be up to 100 letters, digits"),
+    (small("{mu: [40, 60]}", "40"), 3, "friction", "must be a section with law, regularisation, mu, speed"),
+    (SMALL + "cases: nowhere.csv\n", 6, "cases", "nowhere.csv: no such file"),
+    (SMALL + "cases: .\n", 6, "cases", "cannot be read: Is a directory"),
+    (mu("[40, 60"), 3, "", "not YAML"),
+    (small("10.0", "!!python/name:os.system 1"), 2, "body.a", "a YAML tag or anchor; write the plain value"),
+    (small("10.0", "!ten 10.0"), 2, "body.a", "a YAML tag or anchor"),
+    (small("10.0", "!<tag:yaml.org,2002:str> 10"), 2, "body.a", "a YAML tag or anchor"),
+    (small("body: {", "body: !!set {"), 2, "body", "a YAML tag or anchor"),
+    (small("10.0", "&a 10.0"), 2, "body.a", "a YAML tag or anchor"),
+    (mu("&a [*a]"), 3, "friction.mu", "a YAML tag or anchor"),
+    ("- 1\n- 2\n", 1, "", "a configuration is a mapping of keys to values"),
+    ("", 1, "", "a configuration is a mapping of keys to values"),
+    (SMALL + "---\nname: b\n", 6, "", "not YAML"),
+    # Beyond the paper: bodies, friction, starts and units.
+    (stone(("1.7e-3", "1.9e-3")), 4, "body", "none of the principal ones may exceed the sum"),
+    (stone(("Ixy: -2.0e-5", "Ixy: 6.0e-4")), 4, "body", "not positive definite"),
+    (stone(("Ixy: -2.0e-5", "Ixy: 5.0e-4")), 4, "body", "no body has such"),
+    (stone(("Ixx: 2", "Ixx: -2")), 4, "body.Ixx", "> 0 and < 1e+24, not -0.0002"),
+    (stone(("mass: 1.0", "mass: 0")), 4, "body.mass", "not 0"),
+    (stone((" mass: 1.0,", "")), 4, "body.mass", "missing"),
+    (stone((" Iyy: 1.6e-3,", "")), 4, "body.Iyy", "missing"),
+    (stone(("offset: 0.01", "offset: 0.03")), 4, "body", "centre of mass outside the ellipsoid; keep |offset| < c (at a=0.2"),
+    (stone(("offset: 0.01", "offset: -0.02")), 4, "body", "centre of mass outside"),
+    (stone(("b: 0.03", "b: 0.012"), ("offset: 0.01", "offset: 0.002")), 4, "body", "upright rest is unstable"),
+    (stone(("b: 0.03", "b: [0.01, 0.012]"), ("offset: 0.01", "offset: 0.002")), 4, "body", "offset > c - b²/c (at a=0.2, b=0.01"),
+    (stone(("offset", "delta: 0.03, offset")), 4, "body.delta", "cannot be combined with Ixx, Ixy, Iyy, Izz; leave out either"),
+    (stone((MOMENTS, "")), 4, "body.delta", "missing"),
+    (stone(("units: SI\ngravity: 9.81\n", "")), 2, "body.mass", "is 1 in the paper's units; leave it out, or set units: SI"),
+    (stone(("units: SI", "units: paper"), (" mass: 1.0,", "")), 3, "gravity", "is 1 in the paper's units"),
+    (stone(("9.81", "0")), 3, "gravity", "must be a finite number > 0 and < 1e+06, not 0"),
+    (stone(("SI", "cgs")), 2, "units", "must be paper or SI, not 'cgs'"),
+    (stone(("coulomb", "coulumb")), 5, "friction.law", "did you mean coulomb?"),
+    (stone(("law: coulomb, ", "law: viscous, "), ("regularisation: tanh, ", "")), 5, "friction.speed", "does not belong to the law viscous"),
+    (stone(("law: coulomb", "law: none"), ("speed: 1.0e-3, ", "")), 5, "friction.regularisation", "the law none needs no regularisation; leave it out"),
+    (stone((" speed: 1.0e-3,", "")), 5, "friction.speed", "missing"),
+    (stone(("speed: 1.0e-3", "speed: 0")), 5, "friction.speed", "not 0"),
+    (stone(("sigma: 1.0e-4", "mu_spinning: 0.1, radius_spinning: 1.0e-3")), 5, "friction.speed_spinning", "missing"),
+    (stone(("law: coulomb", "law: contensou"), ("regularisation: tanh, ", "")), 5, "friction.radius_contact", "missing"),
+    (stone(("sigma: 1.0e-4", "mu_rolling: 0.1")), 5, "friction.radius", "missing"),
+    (stone(("slip1: 0,", "n0: 1,")), 6, "start.n0", "with omega1, omega2, omega3, pitch, roll, slip2; give either n0, x0, y0 or angles"),
+    (stone(("roll: 0.5 deg", "roll: 30 min")), 6, "start.roll", "not '30 min'"),
+    (stone(("roll: 0.5 deg", "roll: 91 deg")), 6, "start.roll", "< 1.5708, not 1.588"),
+    (stone(("{a:", "{surface: cone, a:")), 4, "body.surface", "must be ellipsoid or paraboloid, not 'cone'"),
+    (stone(("{a: 0.2", "{surface: paraboloid, delta: 0, a: 0.01"), (MOMENTS, "")), 4, "body.delta", "means nothing with surface: paraboloid; give the elements of inertia instead"),
+    (stone(BOWL, (MOMENTS, "")), 4, "body.Ixx", "missing"),
+    ("body: {surface: paraboloid, b: 0.2, Ixx: 1, Iyy: 1, Izz: 1}\nfriction: {mu: 1}", 1, "body.a", "missing"),
+    (stone(BOWL, ("offset: 0.01", "offset: 0.02")), 4, "body", "centre of mass outside the paraboloid; keep offset < c (at a=0.01"),
+    (stone(("{a: 0.2", "{surface: paraboloid, a: 1.1")), 4, "body", "upright rest is unstable"),
+    (stone(("model: slip", "model: averaged"), ("{a:", "{surface: paraboloid, a:")), 1, "model", "units: SI, surface: paraboloid; choose slip or noslip"),
+    (stone(("t_end: 5", "t_end: 5, method: adams")), 7, "integrator.method", "model; choose dopri5 or auto"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("number", range(len(BROKEN)), ids=lambda i: f"{i} {BROKEN[i][2]} {BROKEN[i][3][:20]}")
+def test_a_broken_configuration_is_refused_with_its_place(number: int, write: Write, tmp_path: Path) -> None:
+    text, line, path, said = BROKEN[number]
+    file = write(text)
+    result = invoke("run", file, "--output", tmp_path / "out")
+    assert (result.exit_code, result.stdout) == (2, "")
+    message, *_ = result.stderr.splitlines()
+    assert message.startswith(f"{file}:{line}:")
+    assert said in message
+    assert f": {path}: " in message if path else message.count(": ") >= 1
+    assert sorted(tmp_path.iterdir()) == [file]
+
+
+def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None:
+    text = "colour: red\nintegrator: {t_end: -1}\nstart: {n0: x}\nmeasure: [spin]\nfriction: {nu: 3}\nbody: {a: 0}\n"
+    with pytest.raises(ConfigError) as error:
+        load_config(write(text))
+    assert [fault.line for fault in error.value.faults] == [1, 2, 3, 4, 5, 6]
+    assert [int(line.split(":")[1]) for line in str(error.value).splitlines()] == [1, 2, 3, 4, 5, 6]
+    file = write(text + "".join(f"colour{i}: red\n" for i in range(50)))
+    lines = invoke("run", file).stderr.splitlines()
+    assert (len(lines), lines[-1]) == (21, f"{file}: 36 more faults")
+
+
+@pytest.mark.parametrize(
+    ("bytes_", "said"), [(b"name: \xff\n", "not UTF-8"), (b"a: \x00\n", "not YAML"), (b"[" * 1000, "nested too deeply")]
+)
+def test_bytes_that_are_not_yaml(bytes_: bytes, said: str, tmp_path: Path) -> None:
+    (tmp_path / "config.yaml").write_bytes(bytes_)
+    refused(invoke("run", tmp_path / "config.yaml"), said)
+
+
+@pytest.mark.parametrize(("name", "said"), [("none.yaml", "no such file"), (".", "cannot be read: Is a directory")])
+def test_a_file_that_cannot_be_read(name: str, said: str, tmp_path: Path) -> None:
+    assert invoke("run", tmp_path / name).stderr == f"{tmp_path / name}: {said}\n"
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [("friction.mu=-1", "--set friction.mu: must be a finite number >= 0 and < 1e+12, not -1"),
+     ("mu", "--set mu: not a setting; write PATH=VALUE, such as friction.mu=60"),
+     ("friction.nu=3", "the keys here are law, regularisation, mu"), ("friction.mu=[", "not YAML"),
+     ("name.first=3", "--set name.first: name is a value, not a section; name a key such as friction.mu")],
+)  # fmt: skip
+def test_broken_setting(setting: str, said: str, write: Write) -> None:
+    refused(invoke("run", write(), "--set", setting), said)
+
+
+CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
+
+
+@pytest.mark.parametrize(
+    ("table", "place", "said"),
+    [
+        ("mu,colour\n60,1\n", "cells.csv:1:2: colour", "unknown parameter; the parameters are a, b,"),
+        ("mu,detla\n60,1\n", "cells.csv:1:2: detla", "unknown parameter (did you mean delta?)"),
+        ("mu,mu\n60,1\n", "cells.csv:1:2: mu", "a second column of this name"),
+        ("mu,b\n60\n", "cells.csv:2", "1 values, but 2 columns in line 1"),
+        ("mu,b\n60,wide\n", "cells.csv:2:2: b", "must be a finite number > 0 and < 1e+06, not 'wide'"),
+        ("mu\n60\n\n-1\n", "cells.csv:4:1: mu", ">= 0"),
+        ("mu\ninf\n", "cells.csv:2:1: mu", "'inf'"),
+        ("mu\n", "cells.csv", "must have 1 to 1000000 rows under its first line, not 0"),
+        ("", "cells.csv", "empty; its first line has to name the columns"),
+        ("mu,x0\n60,0.01\n", "small.yaml:3:9: start.x0", "is also a column of cells.csv; remove one of the two"),
+        ('mu\n"60', "small.yaml:2:8: cases", "cells.csv: not a readable CSV file"),
+        ("b\n2\n", "small.yaml:1:1: friction.mu", "missing"),
+    ],
+)
+def test_broken_cases(table: str, place: str, said: str, write: Write, tmp_path: Path) -> None:
+    (tmp_path / "cells.csv").write_text(table, encoding="utf-8")
+    result = invoke("run", write(CASES))
+    refused(result, said)
+    assert result.stderr.startswith(f"{tmp_path}/{place}: ")
+
+
+def test_an_axis_beside_cases_is_refused(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "cells.csv").write_text("mu\n60\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"small\.yaml:4:8: body\.b: cannot be an axis beside cases"):
+        load_config(write(CASES + "body: {b: [1, 2]}\n"))
+
+
+@pytest.mark.parametrize("model", ["effective", "averaged"])
+def test_models_of_strong_friction_need_some(model: str, write: Write, tmp_path: Path) -> None:
+    """Their slip is a term of order 1/μ."""
+    text = f"model: {model}\nfriction: {{mu: [0, 60]}}\n"
+    with pytest.raises(ConfigError, match=rf"2:12: friction\.mu: must be > 0 for the {model} model, not 0"):
+        load_config(write(text))
+    (tmp_path / "cells.csv").write_text("mu\n60\n0\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=f"column mu: must be > 0 for the {model} model"):
+        load_config(write(f"model: {model}\ncases: cells.csv\n"))
+    assert load_config(write(text.replace(model, "slip"))).axes["mu"] == (0.0, 60.0)
