@@ -18,6 +18,8 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
+import numpy as np
+
 # contract: fuse a*b + c into one FMA.  nsz, arcp: harmless on the values met here.
 # Not nnan or ninf: these let the compiler assume that no NaN or infinity occurs, so tests such as `x > 0`
 # and isfinite(x) become constants for exactly the states that they have to catch.
@@ -36,23 +38,14 @@ _waiting: list[tuple[Callable[..., Any], bool]] = []
 """Functions that Numba does not know yet, because it is not imported, and whether they are inlined."""
 
 
-class NotCompiled(RuntimeError):
-    """Numba was told not to compile, and uncompiled kernels are thousands of times slower."""
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+"""Whether Numba is told not to compile: everything then runs in plain Python, on one thread, where a debugger stops."""
 
 
 @cache
 def load_numba() -> Any:
-    """The module `numba`, which from now on knows the inline functions: others that compile them take it from here.
-
-    Raises
-    ------
-    NotCompiled
-        if the environment switches compilation off.
-    """
+    """Return the module `numba`, which from now on knows the inline functions: who compiles them takes it from here."""
     import numba
-
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # set when it is imported
-        raise NotCompiled("NUMBA_DISABLE_JIT is set, but kernels have to be compiled; allowed: unset, or 0")
     from llvmlite import binding
     from numba.core.bytecode import FunctionIdentity
 
@@ -116,12 +109,12 @@ def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -
     specialisation : tells apart what is made from the same function; one of them has one signature only
     modules : files of models from outside the package
     """
-    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), specialisation, fingerprint(*modules))
+    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), specialisation, *modules)
 
 
 def serial(function: Callable[..., Any], specialisation: str) -> Cached:
     """As `parallel`, but on the thread that calls it, while other threads go on."""
-    return Cached(load_numba().njit(function, nogil=True, **OPTIONS), specialisation, fingerprint())
+    return Cached(load_numba().njit(function, nogil=True, **OPTIONS), specialisation)
 
 
 @cache
@@ -131,6 +124,8 @@ def full_width() -> Any:
     For many of Intel's CPUs with AVX-512 LLVM prefers vectors of 256 bits, because wide ones used to slow the clock
     down.  It adds no instruction, only an attribute of the caller; what that is inlined into has to call it as well.
     """
+    if INTERPRETED:
+        return lambda: None
     from numba.core import types
     from numba.extending import intrinsic
 
@@ -160,13 +155,14 @@ def vector_bits() -> int:
 
 def threads() -> int:
     """Number of threads on which parallel functions run."""
-    return int(load_numba().get_num_threads())
+    return 1 if INTERPRETED else int(load_numba().get_num_threads())
 
 
 def on_all_threads(function: Callable[[Any], None], items: Sequence[Any]) -> None:
     """Call `function` for each of `items`; it has to spend its time in functions of `serial`."""
     shares = [items[i :: 4 * threads()] for i in range(min(len(items), 4 * threads()))]
-    list(_pool(threads()).map(lambda share: [*map(function, share)], shares))
+    over = map if INTERPRETED else _pool(threads()).map
+    list(over(lambda share: [*map(function, share)], shares))
 
 
 @cache
@@ -185,7 +181,7 @@ def fingerprint(*modules: str) -> str:
 
     root = Path(__file__).parent
     files = [path for pattern in _NUMERIC_SOURCES for path in sorted(root.glob(pattern))]
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(b"interpreted" if INTERPRETED else b"")
     for path in [*files, *map(Path, modules)]:
         name = path.relative_to(root) if path.is_relative_to(root) else Path(path.name)
         digest.update(name.as_posix().encode() + b"\0" + path.read_bytes())
@@ -223,32 +219,36 @@ class Cached:
     specialisation and of the hash of all numeric sources and of the libraries that compile them.
     """
 
-    def __init__(self, dispatcher: Any, specialisation: str, sources: str) -> None:
+    def __init__(self, dispatcher: Any, specialisation: str, *modules: str) -> None:
         self._dispatcher, self._cache, self._found = dispatcher, None, False
+        if INTERPRETED:  # Numba has returned the function as it was
+            return
         with suppress(RuntimeError):  # Numba finds no folder to write to: each process compiles for itself
+            sources = fingerprint(*modules)
             self._cache = dispatcher._cache = _disk_cache()(dispatcher.py_func, specialisation, sources)
 
     def __call__(self, *arguments: Any) -> None:
-        if not self._dispatcher.signatures:
+        if not self.is_ready():
             self._load(arguments)
-        self._dispatcher(*arguments)
+        # Compiled code does not warn of a division by zero.
+        with np.errstate(all="ignore") if INTERPRETED else nullcontext():
+            self._dispatcher(*arguments)
 
     def _load(self, arguments: tuple[Any, ...]) -> None:
         # Numba compiles on one thread at a time, but while it loads from disk another thread finds it half ready.
         with _LOADING:
-            if not self._dispatcher.signatures:
+            if not self.is_ready():
                 with nullcontext() if self.is_compiled() else compiling():
                     self._dispatcher.compile(tuple(map(load_numba().typeof, arguments)))
 
-    @property
-    def signatures(self) -> list[Any]:
-        """The types of arguments for which there is machine code in memory."""
-        return list(self._dispatcher.signatures)
+    def is_ready(self) -> bool:
+        """Whether there is machine code in memory, or none is needed."""
+        return INTERPRETED or bool(self._dispatcher.signatures)
 
     def is_compiled(self) -> bool:
         """Whether the first call will find machine code, in memory or on disk."""
         # To look it up on disk takes a millisecond.
-        self._found |= bool(self._dispatcher.signatures) or (self._cache is not None and self._cache.holds())
+        self._found |= self.is_ready() or (self._cache is not None and self._cache.holds())
         return self._found
 
     def is_missing(self) -> bool:

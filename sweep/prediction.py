@@ -9,7 +9,7 @@ import numpy as np
 
 from sweep.grid import Array, Grid
 from sweep.kernels.measures.first_reversal import FirstReversal
-from sweep.kernels.stability import stable_ranges
+from sweep.kernels.stability import nearest_ranges
 from sweep.models.general import reversal_time, variants
 from sweep.models.ladder import analytic
 from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
@@ -115,14 +115,14 @@ def _stability(model: Model, grid: Grid) -> Stability:
 
 
 def _ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
-    """As `stable_ranges`; NaN for impossible bodies."""
+    """As `nearest_ranges`; NaN for impossible bodies."""
     impossible = model.impossible(columns)
     if not impossible.any():
-        return stable_ranges(model, columns)
+        return nearest_ranges(model, columns)
     ranges, covered = np.full((6, len(impossible)), np.nan), np.full(len(impossible), np.inf)
     if len(possible := np.flatnonzero(~impossible)):
         theirs = {name: values[possible] for name, values in columns.items()}
-        ranges[:, possible], covered[possible] = stable_ranges(model, theirs)
+        ranges[:, possible], covered[possible] = nearest_ranges(model, theirs)
     return ranges, covered
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
@@ -50,6 +51,14 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     writer = config.get_terminal_writer()
     with showing(lambda: nullcontext(writer.line("compiling kernels", flush=True))):
         build(kernel(*each) for each in KERNELS)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip what looks at instructions of x86 CPUs on others."""
+    if platform.machine().lower() not in ("x86_64", "amd64"):
+        for item in items:
+            if item.get_closest_marker("x86"):
+                item.add_marker(pytest.mark.skip(reason="looks at instructions of x86 CPUs"))
 
 
 @pytest.fixture(scope="session")

@@ -107,11 +107,11 @@ def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
     table = np.concatenate([kernel.images(reference.columns, step, t) for t in reference.times])
     execute(kernel, table, stop_when_settled=False)
     spin = kernel.model.energy(*kernel.unpack(table))[0]
-    error = np.where(table[:, kernel.row("status")] == TIME_LIMIT, np.abs(spin - reference.spins.T.ravel()), np.inf)
+    error = np.where(kernel.table(table)["status"] == TIME_LIMIT, np.abs(spin - reference.spins.T.ravel()), np.inf)
     violation = np.full(len(step), np.nan)
     if "energy_error" in kernel.measure:
         last = table[-len(step) :]
-        violation = last[:, kernel.row("violation")] / last[:, kernel.row("energy_start")]
+        violation = kernel.table(last)["violation"] / kernel.table(last)["energy_start"]
     return np.stack([error.reshape(len(reference.times), -1).max(axis=0), violation])
 
 

@@ -98,10 +98,9 @@ class Explained:
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
             sys.exit(CLOSED_PIPE)
         from sweep.config.faults import ConfigError
-        from sweep.jit import NotCompiled
         from sweep.results.store import StoreError
 
-        if isinstance(error, ConfigError | StoreError | NotCompiled):
+        if isinstance(error, ConfigError | StoreError):
             say(str(error), err=True)
             sys.exit(WRONG_INPUT)
         if isinstance(error, OSError):

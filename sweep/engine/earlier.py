@@ -139,7 +139,7 @@ def _depends_on_limit(config: Config, grid: Grid, there: xr.Dataset, cells: Arra
         step = config.integrator.t_end / steps_to(config.integrator.t_end, choice.step)
         depends[at] |= (left < METHODS[choice.method].foresight) | (step != before("step")[at])
         if "method" in there:
-            depends[at] |= before("method")[at] != list(METHODS).index(choice.method)
+            depends[at] |= before("method")[at] != METHODS[choice.method].code
     return depends
 
 

@@ -10,7 +10,6 @@ from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import GROUP
 from sweep.engine.plan import choose
 from sweep.grid import Grid
-from sweep.kernels.stability import uncompiled
 
 _SAMPLE = 4096
 """Cells whose steps are chosen to judge all the others by."""
@@ -27,7 +26,7 @@ def estimate(config: Config) -> str:
     if not config.simulated:
         return cells
     sample = grid.sample(_SAMPLE)
-    with uncompiled(), explained(config.origin):
+    with explained(config.origin):
         chosen, share = choose(config, sample), grid.size / sample.size
     steps = [np.ceil(config.integrator.t_end / each.step) for each in chosen if len(each.cells)]
     total, seconds = sum(each.sum() for each in steps) * share, sum(map(nominal_seconds, steps)) * share

@@ -49,8 +49,8 @@ def execute(
     are always a fair sample, from which the time left can be estimated.  Neither the order nor the
     size of the chunks changes a result.
     """
-    status = images[:, kernel.row("status")]
-    steps = images[:, kernel.row("done")]
+    status = kernel.table(images)["status"]
+    steps = kernel.table(images)["done"]
     order = np.random.default_rng(0).permutation(len(images))
     blocks = chunk_blocks or 1
     while len(pending := order[status[order] == RUNNING]):

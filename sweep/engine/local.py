@@ -89,7 +89,7 @@ def run_group(
         began -= left.seconds
 
     def statuses() -> Array:
-        return np.concatenate([table[:, kernel.row("status")] for kernel, table in tables.values()])
+        return np.concatenate([kernel.table(table)["status"] for kernel, table in tables.values()])
 
     def chunk() -> None:
         # Images are saved only here, between two chunks: anywhere else an interrupt may find half of them advanced.

@@ -49,7 +49,7 @@ class Part(Choice):
 
     @property
     def status(self) -> Array:
-        return np.asarray(self.images[:, self.kernel.row("status")])
+        return np.asarray(self.kernel.table(self.images)["status"])
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Plan:
             repeated = np.where(table["missed"] > 0, MISSED, REPEAT)
             found["step_rule"] = np.where(table["halvings"] > 0, repeated, part.step_rule)
             if self.config.integrator.method == AUTO:
-                found["method"] = np.full(len(part.cells), list(METHODS).index(part.method))
+                found["method"] = np.full(len(part.cells), METHODS[part.method].code)
             for name, values in found.items():
                 nothing = np.nan if dataset.VARIABLES[name].dtype.startswith("float") else 0
                 blank = np.full((self.grid.size, *values.shape[1:]), nothing)
@@ -121,14 +121,15 @@ def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
     if integrator.method == AUTO:
         chosen, steps, rules = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:
-        chosen = np.full(len(possible), list(METHODS).index(integrator.method))
+        chosen = np.full(len(possible), integrator.method)
         if integrator.step == "auto":
             steps, rules = methods.automatic_step(integrator.method, model, columns, integrator.tolerance)
         else:
             steps, rules = np.full(len(possible), integrator.step), np.full(len(possible), FIXED)
     choices = []
-    for i in np.unique(chosen):
-        method, cells = list(METHODS)[i], np.flatnonzero(chosen == i)
+    for method in METHODS:
+        if not len(cells := np.flatnonzero(chosen == method)):
+            continue
         theirs = {name: values[cells] for name, values in columns.items()}
         choices.append(Choice(method, possible[cells], kernel_of(method, config), theirs, steps[cells], rules[cells]))
     return tuple(choices)

@@ -1,11 +1,9 @@
 """Compiles into the cache what kernels need, each piece in a process of its own, side by side.
 
-    python -m sweep.kernels.build kernel METHOD MODEL [MEASURE …]
-    python -m sweep.kernels.build images METHOD MODEL
-    python -m sweep.kernels.build approach MODEL
-    python -m sweep.kernels.build theory MODEL
+    python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
-A MODEL that a user brings is "name@digest", and the record of its origin comes as a line of standard input.
+A PIECE is `kernel`, or what else runs need: `images`, `approach` or `theory`.  A MODEL that a user brings is
+"name@digest", and the record of its origin comes as a line of standard input.
 
 Processes, because the code that Numba executes right after compiling is not the code that it caches: functions that a
 kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of sums differ (seen
@@ -30,21 +28,18 @@ from sweep.interrupt import point
 from sweep.jit import compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compile_approach, compiled_approach
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.methods import make_kernel
-from sweep.kernels.quartic import compiled_modes, has_fast_slip
-from sweep.kernels.stability import compile_theory, compiled_search
+from sweep.kernels.methods import PLAIN, make_kernel
+from sweep.kernels.quartic import has_fast_slip
+from sweep.kernels.stability import compile_search, compiled_search
 from sweep.models import find
-from sweep.models.model import Model
+from sweep.models.model import Columns, Model
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.models.user.blame import blamed
 from sweep.parameters import PAPER_PARAMETERS
 
-Piece = tuple[str, ...]
-"""Something to be compiled: the arguments of this module."""
-
-Job = tuple[Piece, Origin | None]
-"""A piece, and where its model comes from."""
+Job = tuple[tuple[str, ...], Origin | None]
+"""The arguments of this module, and where the model comes from."""
 
 _POLL = 0.05
 """Time in seconds between two looks at the processes."""
@@ -62,10 +57,10 @@ def build(kernels: Iterable[Kernel]) -> None:
         if a model that a user brings cannot be compiled.
     """
     kernels = list(kernels)
-    if brought := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.is_compiled()]:
+    if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.is_compiled()]:
         with compiling():
-            try_compiling(brought[0])
-    jobs = dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel))
+            try_compiling(users[0])
+    jobs = dict.fromkeys((job, kernel.model.origin) for kernel in kernels for job in _missing(kernel))
     if jobs:
         with compiling():
             _compile(list(jobs))
@@ -81,20 +76,17 @@ def try_compiling(model: Model) -> None:
             compiled(function).compile(tuple(map(numba.typeof, arguments)))
 
 
-def _missing(kernel: Kernel) -> Iterator[Piece]:
-    """What the cache lacks to run `kernel`, the longest first."""
+def _missing(kernel: Kernel) -> Iterator[tuple[str, ...]]:
+    """Name what the cache lacks to run `kernel`, by the arguments of this module, the longest first."""
     model = kernel.model.key
-    advance, filling = kernel.compiled_functions()
-    if advance.is_missing():
+    if kernel.advancing.is_missing():
         yield "kernel", kernel.method, model, *(each.spec for each in kernel.measurements if each.in_kernel)
-    if any(function.is_missing() for function in filling):
+    if any(function.is_missing() for function in kernel.filling()):
         yield "images", kernel.method, model
     if compiled_approach(kernel.model).is_missing():
-        yield "approach", model
-    if has_fast_slip(kernel.model) and any(
-        function(kernel.model).is_missing() for function in (compiled_search, compiled_modes)
-    ):
-        yield "theory", model
+        yield "approach", PLAIN, model
+    if has_fast_slip(kernel.model) and compiled_search(kernel.model).is_missing():
+        yield "theory", PLAIN, model
 
 
 def _compile(jobs: list[Job]) -> None:
@@ -110,11 +102,10 @@ def _compile(jobs: list[Job]) -> None:
             running = [process for process in running if process.poll() is None]
 
 
-def _start(piece: Piece, origin: Origin | None) -> subprocess.Popen[bytes]:
+def _start(job: tuple[str, ...], origin: Origin | None) -> subprocess.Popen[bytes]:
     # Nothing else is ever written to stdin: it closes when this process ends, however it ends.
-    command = [sys.executable, "-m", __name__, *piece]
-    nothing = subprocess.DEVNULL
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing)
+    command = [sys.executable, "-m", __name__, *job]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     if origin and process.stdin:
         with suppress(BrokenPipeError):  # it has failed: what it was to compile stays missing
             process.stdin.write(json.dumps(vars(origin)).encode() + b"\n")
@@ -127,27 +118,26 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def main(what: str, *which: str) -> None:
+def main(piece: str, method: str, name: str, *measure: str) -> None:
     """Compile one piece into the cache."""
-    name = which[what in ("kernel", "images")]
-    model = _brought(name) if "@" in name else find(name)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    if what == "kernel":
-        method, _, *measure = which
-        make_kernel(method, model, measure).compile()
-    elif what == "images":
-        kernel = make_kernel(which[0], model, ())
-        body = {name: np.full(1, p.default if p.default is not None else 1.5) for name, p in PAPER_PARAMETERS.items()}
-        body |= {name: np.full(1, 1.5) for name in kernel.model.parameters if name not in body}
-        kernel.images(body, np.full(1, 0.1), 10.0)
-    elif what == "approach":
-        compile_approach(model)
+    if "@" in name:
+        origin = Origin(**json.loads(sys.stdin.buffer.readline()))
+        model = loading.compiled_as(origin, name.partition("@")[0])
     else:
-        compile_theory(model)
+        model = find(name)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    if piece == "approach":
+        compile_approach(model)
+    elif piece == "theory":
+        compile_search(model)
+    else:
+        kernel = make_kernel(method, model, measure)
+        kernel.compile() if piece == "kernel" else kernel.images(_any_body(model), np.full(1, 0.1), 10.0)
 
 
-def _brought(name: str) -> Model:
-    return loading.compiled_as(Origin(**json.loads(sys.stdin.buffer.readline())), name.partition("@")[0])
+def _any_body(model: Model) -> Columns:
+    body = {name: 1.5 if p.default is None else p.default for name, p in PAPER_PARAMETERS.items()}
+    return {name: np.full(1, body.get(name, 1.5)) for name in {*body, *model.parameters}}
 
 
 if __name__ == "__main__":

@@ -2,7 +2,8 @@
 
 A loop over states would need arrays, and arrays inside the loop over lanes prevent LLVM from vectorising across
 trajectories.  So whatever depends on the number of states, or on a list of functions, is written out.
-`python -m sweep.kernels.source METHOD MODEL` prints the source that is generated for a kernel.
+`python -m sweep.kernels.source METHOD MODEL` prints the source that is generated for a kernel, and tells what each
+function in it is bound to.
 """
 
 from __future__ import annotations
@@ -15,15 +16,19 @@ from typing import Any
 from sweep.jit import compiled, full_width, inline
 from sweep.kernels.layout import LANES
 
-PREFIX = "<sweep "
-"""Beginning of the file names of generated sources."""
+GENERATED: dict[str, dict[str, Any]] = {}
+"""What the names in each generated source are bound to, by the source's file name."""
 
 
 def make_load(names: Sequence[str], layout: Any, record: Any = None) -> Any:
     """Compiled (group, lane) -> the quantities `names` of one lane, as a tuple or as the `NamedTuple` `record`."""
-    values = " ".join(f"group[{layout.at(name)} + lane]," for name in names)
-    made = f"record({values})" if record else f"({values})"
-    return compile_inline("load", f"def load(group, lane):\n    return {made}", {"record": record})
+    return make_gather("group, lane", (f"group[{layout.at(name)} + lane]" for name in names), record)
+
+
+def make_gather(arguments: str, places: Iterable[str], record: Any = None) -> Any:
+    """Compiled (arguments) -> what is at `places`, expressions, as a tuple or as the `NamedTuple` `record`."""
+    made = f"{'record' if record else ''}{tuple_of(places)}"
+    return compile_inline("load", f"def load({arguments}):\n    return {made}", {"record": record})
 
 
 def make_store(names: Sequence[str], layout: Any) -> Any:
@@ -66,8 +71,9 @@ def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[s
 def compile_inline(name: str, source: str, names: dict[str, Any]) -> Any:
     """Compile generated source that may use `names`.  Equal sources have equal file names in every process."""
     digest = hashlib.sha256(source.encode()).hexdigest()[:16]
-    filename = f"{PREFIX}{name} {digest}>"
+    filename = f"<sweep {name} {digest}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    GENERATED[filename] = names
     namespace = dict(names)
     exec(compile(source, filename, "exec"), namespace)
     return inline(namespace[name])

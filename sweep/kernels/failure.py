@@ -1,4 +1,4 @@
-"""Whether a trajectory really meets what stopped it: approaches a failure in ever shorter steps.
+"""Finds out whether a trajectory really meets what stopped it: approaches a failure in ever shorter steps.
 
 A step that is too long has stages at states that the trajectory never visits.  If one of these has no positive normal
 force, or no positive Painlevé denominator, the kernel stops, but the failure may be one of the step alone.  So from the
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import Cached, compiled, parallel
-from sweep.kernels.codegen import compile_inline, tuple_of
+from sweep.kernels.codegen import compile_inline, make_gather
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
 from sweep.kernels.tableau import DOPRI5
@@ -38,7 +38,7 @@ _MOST_STEPS = 3_000_000
 
 
 def approach(model: Model, states: Array, constants: Any, stretch: Array) -> tuple[Array, Array]:
-    """What happens to trajectories within a stretch of time.
+    """Find what happens to trajectories within a stretch of time.
 
     Parameters
     ----------
@@ -70,12 +70,8 @@ def compiled_approach(model: Model) -> Cached:
     from numba import prange
 
     n, record = len(model.states), model.constants
-    names = tuple_of(f"rows[i, {j}]" for j in range(n))
-    load = compile_inline("load_states", f"def load_states(rows, i):\n    return {names}", {})
-    fields = " ".join(f"rows[i, {n + j}]," for j in range(len(record._fields)))
-    load_constants = compile_inline(
-        "load_constants", f"def load_constants(rows, i):\n    return record({fields})", {"record": record}
-    )
+    load = make_gather("rows, i", (f"rows[i, {j}]" for j in range(n)))
+    load_constants = make_gather("rows, i", (f"rows[i, {n + j}]" for j in range(len(record._fields))), record)
     follow = _make_follow(model)
 
     def run(rows: Any, stretch: Any, status: Any, time: Any) -> None:
@@ -98,7 +94,7 @@ def _make_follow(model: Model) -> Any:
 
     @compiled
     def kind(y: Any, p: Any, infinite: Any) -> Any:
-        """What a step from `y` that is next to nothing has met.
+        """Return what a very short step from `y` has met.
 
         Its stages do not tell.  Where the denominator goes to zero the force goes to infinity, or stays finite because
         the numerator goes to zero as well; then either sign may come first.  Where the body lifts off the force alone
@@ -110,7 +106,7 @@ def _make_follow(model: Model) -> Any:
 
     @compiled
     def probe(y: Any, p: Any) -> Any:
-        """What lies just ahead of `y`, where errors allow no step that is as long as the shortest.
+        """Return what lies just ahead of `y`, where errors allow no step that is as long as the shortest.
 
         Near the paradox the denominator goes to zero as the root of the time left.
         """

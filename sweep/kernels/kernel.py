@@ -16,7 +16,7 @@ import numpy as np
 
 from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, call_all, make_load
-from sweep.kernels.lanes import STABLE, Look, make_advance, make_look
+from sweep.kernels.lanes import STABLE, make_advance, make_look
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement
 from sweep.models.model import Array, Columns, Model, stack
@@ -57,12 +57,14 @@ class Kernel:
     model: Model
     layout: Layout
     measurements: tuple[Measurement, ...]
+    advancing: Cached
+    """The compiled function behind `advance`."""
 
     def _lay_out(self, model: Model, measurements: Sequence[Measurement], more: Iterable[str] = ()) -> None:
         """Name the quantities of an image: states, constants, what every kernel needs, measurements, and `more`."""
         self.model, self.measurements = model, tuple(measurements)
         self.constants = tuple(f"constant.{name}" for name in model.constants._fields)
-        measured = (row for each in self.measurements for row in each.rows)
+        measured = (name for each in self.measurements for name in each.quantities)
         self.ripple = tuple(f"ripple.{name}" for name in model.ripple.names if self.follows_ripple)
         self.layout = Layout((*model.states, *self.constants, *_BASE, *self.ripple, *measured, *more))
 
@@ -114,26 +116,20 @@ class Kernel:
         """Set up `advance` around `run_block`, compiled (group) -> None."""
         settles = [f for each in self.measurements if (f := each.make_may_settle(self.layout))]
         looks = [f for each in self.measurements if (f := each.make_look(self.layout))]
-        look = Look(
-            may_settle=all_true("may_settle", "group, lane, spin, at_rest", settles),
-            measure=call_all("measure", "group, lane, running, ended, spin, rattle, inertia, total", looks),
-            energy_gain=self.energy_gain,
-        )
-        advance = make_advance(run_block, make_look(self.model, self.constants, self.layout, look), self.layout)
+        may_settle = all_true("may_settle", "group, lane, spin, at_rest", settles)
+        measure = call_all("measure", "group, lane, running, ended, spin, rattle, J, total", looks)
+        look = make_look(self.model, self.constants, self.layout, may_settle, measure, self.energy_gain)
+        advance = make_advance(run_block, look, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
-        self._advance = parallel(advance, name, *self.model.files)
-
-    def row(self, name: str) -> int:
-        """Index of the column of the images that holds a quantity."""
-        return self.layout.row(name)
+        self.advancing = parallel(advance, name, *self.model.files)
 
     def table(self, images: Array) -> Table:
         """`images`, accessed by the names of their quantities."""
         return Table(images, self.layout)
 
     def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
-        """Images of trajectories at t = 0, shape (cells, rows).
+        """Images of trajectories at t = 0, shape (cells, quantities).
 
         Parameters
         ----------
@@ -173,7 +169,7 @@ class Kernel:
 
         Returns after `blocks` blocks of steps in every lane, or earlier when all cells have ended.
         """
-        self._advance(images, cells, blocks, stop_when_settled, threads())
+        self.advancing(images, cells, blocks, stop_when_settled, threads())
 
     def carry(self, images: Array) -> None:
         """Carry the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""
@@ -210,19 +206,15 @@ class Kernel:
 
     def is_compiled(self) -> bool:
         """Whether the first call of `advance` will find machine code, in memory or on disk."""
-        return self._advance.is_compiled()
+        return self.advancing.is_compiled()
 
     def compile(self) -> None:
         """Compile `advance`, or load it from disk, so that no timing of a run includes that."""
-        if self._advance.signatures:
-            return  # a parallel call wakes all threads, which takes some milliseconds
-        self.advance(np.empty((0, len(self.layout.names))), np.empty(0, dtype=np.int64), 0, False)
+        if not self.advancing.is_ready():  # a parallel call wakes all threads, which takes some milliseconds
+            self.advance(np.empty((0, len(self.layout.names))), np.empty(0, dtype=np.int64), 0, False)
 
-    def compiled_functions(self) -> tuple[Cached, tuple[Cached, ...]]:
-        """The function behind `advance`, and those that `images` calls."""
-        return self._advance, self._image_functions()
-
-    def _image_functions(self) -> tuple[Cached, ...]:
+    def filling(self) -> tuple[Cached, ...]:
+        """The compiled functions that `images` calls."""
         return ()
 
 

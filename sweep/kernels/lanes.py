@@ -8,7 +8,6 @@ the trajectory of a lane ends, its image is written back and the lane takes the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -97,31 +96,28 @@ def make_advance(run_block: Any, look: Any, layout: Layout) -> Any:
     return advance
 
 
-@dataclass(frozen=True)
-class Look:
-    """What a look needs to know of the method and of the measurements."""
+def make_look(
+    model: Model, constants: Sequence[str], layout: Layout, may_settle: Any, measure: Any, energy_gain: float
+) -> Any:
+    """Compiled (group, stop_when_settled) -> None: checks all lanes between two blocks, and decides which ones end.
 
-    may_settle: Any
-    """Inline (group, lane, spin, at_rest) -> bool: whether all measurements allow the trajectory to settle."""
-    measure: Any
-    """Inline function of what the measurements do at a look, with the arguments of `Measurement.make_look`."""
-    energy_gain: float
-    """Share by which the energy of a body may apparently grow from one look to the next."""
-
-
-def make_look(model: Model, constants: Sequence[str], layout: Layout, given: Look) -> Any:
-    """Compiled (group, stop_when_settled) -> None: checks all lanes between two blocks, and decides which ones end."""
+    Parameters
+    ----------
+    may_settle : inline (group, lane, spin, at_rest) -> whether all measurements allow the trajectory to settle
+    measure : inline, what the measurements do at a look, with the arguments of `Measurement.make_look`
+    energy_gain : share by which the energy of a body may apparently grow from one look to the next
+    """
     load_states, load_constants = make_load(model.states, layout), make_load(constants, layout, model.constants)
     store_states = make_store(model.states, layout)
     energy, rest = model.energy, make_rest(len(model.states), model.spin_state)
     saturates = bool(model.faint)
-    will_settle, measure = _make_will_settle(layout, given.may_settle, saturates), given.measure
+    will_settle = _make_will_settle(layout, may_settle, saturates)
     FAINT = layout.at(f"constant.{model.faint}") if saturates else 0
     stops = bool(model.still)
     STILL = layout.at(f"constant.{model.still}") if stops else 0
     decides, decided = model.decided is not never_decided, model.decided
     GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP = map(layout.at, ("goal", "done", "status", "energy", "stable_step"))
-    lanes, allowed, conserved = LANES, 1.0 + given.energy_gain, ENERGY in model.offers
+    lanes, allowed, conserved = LANES, 1.0 + energy_gain, ENERGY in model.offers
     wide = full_width()
     pauses = "quiet_energy" in layout
     QUIET_ENERGY, QUIET_AFTER = (layout.at(f"quiet_{name}") if pauses else 0 for name in ("energy", "after"))

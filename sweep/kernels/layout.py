@@ -1,7 +1,7 @@
 """Where the quantities of a trajectory are kept: in the table of images, and in the group of lanes of a thread.
 
 In the table an image is a row, so that a quantity is a column.  A group is transposed: there a quantity is a row, with
-one value per lane.  Functions and attributes called `row` or `rows` refer to the quantities.
+one value per lane.
 """
 
 from __future__ import annotations
@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from sweep.jit import INTERPRETED
 from sweep.models.model import Array
 
 # Time per step and lane on one thread of a Zen 5 (slip model, AVX-512): 22.4 ns with 16 lanes, 24.2 ns with 8,
-# 24.4 ns with 32.
-LANES = 16
+# 24.4 ns with 32.  In plain Python idle lanes would cost as much as the others.
+LANES = 1 if INTERPRETED else 16
 
 # Steps between two looks at a lane.  With 128, looks add 1 % to the cost of a step on the slip model, and a
 # trajectory that has settled runs on for 64 steps on average, out of 10^5.
@@ -29,13 +30,13 @@ class Layout:
     def __contains__(self, name: str) -> bool:
         return name in self.names
 
-    def row(self, name: str) -> int:
-        """Index of the column of a quantity in the table of images."""
+    def index(self, name: str) -> int:
+        """Index of a quantity: of its column in the table of images, and of its row in a group."""
         return self.names.index(name)
 
     def at(self, name: str) -> int:
-        """Index in a group at which the lanes of a quantity begin."""
-        return self.row(name) * LANES
+        """Index in a group, as one array, at which the lanes of a quantity begin."""
+        return self.index(name) * LANES
 
 
 @dataclass(frozen=True)
@@ -43,21 +44,21 @@ class Table:
     """Images, accessed by the names of their quantities: `table["spin"]` is a view of shape (cells,)."""
 
     images: Array
-    """Shape (cells, rows)."""
+    """Shape (cells, quantities)."""
     layout: Layout
 
     def __getitem__(self, name: str) -> Array:
-        column: Array = self.images[:, self.layout.row(name)]
+        column: Array = self.images[:, self.layout.index(name)]
         return column
 
     def __setitem__(self, name: str, values: Array | float) -> None:
-        self.images[:, self.layout.row(name)] = values
+        self.images[:, self.layout.index(name)] = values
 
     def columns(self, names: Iterable[str]) -> Array:
         """A copy of several quantities, shape (cells, names)."""
-        columns: Array = self.images[:, [self.layout.row(name) for name in names]]
+        columns: Array = self.images[:, [self.layout.index(name) for name in names]]
         return columns
 
     def set_columns(self, names: Iterable[str], values: Array) -> None:
         """Set several quantities to `values`, of shape (cells, names)."""
-        self.images[:, [self.layout.row(name) for name in names]] = values
+        self.images[:, [self.layout.index(name) for name in names]] = values

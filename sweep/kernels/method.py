@@ -1,8 +1,9 @@
 """What an integration method is, and how to add one.
 
-A method is a `Method` record and a subclass of `sweep.kernels.kernel.Kernel`, in a file of its own; `runge_kutta` is
-the shorter of the two examples.  Enter the record in `METHODS` of `sweep.kernels.methods`: the configuration, the
-choice of the cheapest method, the provenance and the benchmark then know it.  Times and steps are in sqrt(c/g),
+An explicit Runge-Kutta method is a record in `sweep.kernels.tableau`.  Any other is a `Method` record and a subclass of
+`sweep.kernels.kernel.Kernel`, in a file of its own, like `runge_kutta`; enter the record in `METHODS` of
+`sweep.kernels.methods`.  The configuration, the choice of the cheapest method, the provenance and the benchmark then
+know it.  Times and steps are in sqrt(c/g),
 spins in sqrt(g/c).
 
 The constructor of the kernel calls three functions of `Kernel`, in this order:
@@ -17,7 +18,7 @@ status to `PARADOX`, `LIFT_OFF` or `DIVERGED`.  Lanes that are not active comput
 states, `done` and status.
 
 A kernel has to name its `method`, and to implement `images`, which makes images at t = 0 with the help of `_start`.
-It overrides `_image_functions` if `images` calls compiled functions, `_reached` if its images do not begin at t = 0,
+It overrides `filling` if `images` calls compiled functions, `_reached` if its images do not begin at t = 0,
 `model_states` if its states are not those of the model, and `carry` if it can cross stretches of small rattle without
 steps.
 """
@@ -46,6 +47,8 @@ class Method:
 
     name: str
     """As in the configuration."""
+    code: int
+    """What stands for it in datasets; never to be changed."""
     summary: str
     """One line for the documentation."""
     kernel: Callable[[Model, Sequence[Measurement], float], Kernel]

@@ -10,10 +10,11 @@ from sweep.kernels import measures, runge_kutta
 from sweep.kernels.adams import method as adams
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method
-from sweep.kernels.stability import fastest_motion
-from sweep.models.model import Array, Columns, Model, zeros
+from sweep.kernels.tableau import TABLEAUS
+from sweep.models.model import Array, Columns, Model
+from sweep.models.theory.linear import fastest_motion
 
-METHODS: dict[str, Method] = {method.name: method for method in (runge_kutta.DOPRI5_METHOD, adams.METHOD)}
+METHODS: dict[str, Method] = {method.name: method for method in (*map(runge_kutta.method, TABLEAUS), adams.METHOD)}
 """The first is the plain one, which runs every model."""
 
 PLAIN = next(iter(METHODS))
@@ -28,23 +29,17 @@ def allowed(model: Model) -> tuple[str, ...]:
 
 
 def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> tuple[Array, Array, Array]:
-    """The method that reaches `t_end` within `tolerance` in the least time, with its automatic step.
+    """Choose the method that reaches `t_end` within `tolerance` in the least time, with its automatic step.
 
-    Returns the index in `METHODS`, and step and rule as `automatic_step` gives them, each of shape (cells,).
+    Returns the names of the methods, and step and rule as `automatic_step` gives them, each of shape (cells,).
     """
-    motion = fastest_motion(model, columns)
-    steps, rules, costs = [], [], []
-    for method in METHODS.values():
-        if method.runs(model):
-            step, rule = _step(method, model, columns, motion, tolerance)
-            costs.append(method.step_cost * (t_end / step + method.start_up_cost))
-        else:
-            step = rule = zeros(columns)
-            costs.append(zeros(columns) + np.inf)
-        steps.append(step)
-        rules.append(rule)
+    motion, names = fastest_motion(model, columns), allowed(model)
+    found = [_step(METHODS[name], model, columns, motion, tolerance) for name in names]
+    costs = [METHODS[name].step_cost * (t_end / step + METHODS[name].start_up_cost)
+             for name, (step, _) in zip(names, found, strict=True)]  # fmt: skip
     chosen, cells = np.argmin(costs, axis=0), np.arange(len(motion))
-    return chosen, np.stack(steps)[chosen, cells], np.stack(rules)[chosen, cells]
+    steps, rules = (np.stack(values)[chosen, cells] for values in zip(*found, strict=True))
+    return np.array(names)[chosen], steps, rules
 
 
 def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:

@@ -13,12 +13,11 @@ is that of A + B X,
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 
-from sweep.jit import Cached, called, compiled, serial
+from sweep.jit import called, compiled
 from sweep.kernels.codegen import compile_inline, tuple_of
 from sweep.models.model import MODES, Model
 
@@ -103,47 +102,3 @@ def _characteristic(G: Any, c: Any) -> None:
         k, m = 1 + j % 3, 1 + (j + 1) % 3
         c[0] += (G[0, 0] * G[1, j] - G[0, j] * G[1, 0]) * (G[2, k] * G[3, m] - G[2, m] * G[3, k])
         c[0] += (G[0, k] * G[1, m] - G[0, m] * G[1, k]) * (G[2, 0] * G[3, j] - G[2, j] * G[3, 0])
-
-
-@called
-def _pairs(c: Any, pairs: Any) -> None:
-    """Write Re λ and |λ|² of both pairs of complex roots of a quartic to `pairs`.
-
-    NaN if there are real roots.
-    One pair by Newton's method; the other from the sum and the product of the roots.
-    """
-    pairs[:] = np.nan
-    if c[2] * c[2] < 4.0 * c[0] or c[2] <= 0.0:
-        return
-    root = 1j * np.sqrt(0.5 * (c[2] + np.sqrt(c[2] * c[2] - 4.0 * c[0])))
-    for _ in range(20):
-        value = (((root + c[3]) * root + c[2]) * root + c[1]) * root + c[0]
-        change = value / (((4.0 * root + 3.0 * c[3]) * root + 2.0 * c[2]) * root + c[1])
-        root = root - change
-        if abs(change) <= 1e-12 * abs(root):
-            square = root.real * root.real + root.imag * root.imag
-            real, other = -0.5 * c[3] - root.real, c[0] / square
-            if other > real * real and root.imag != 0.0:
-                pairs[0], pairs[1], pairs[2], pairs[3] = root.real, square, real, other
-            return
-
-
-@cache
-def compiled_modes(model: Model) -> Cached:
-    """Compiled (rows, spin, pairs) -> None: the roots of the rocking of each cell, as `_pairs` writes them.
-
-    NaN for a cell that remains in doubt.
-    """
-    jacobian = make_jacobian(model)
-
-    def modes(rows: Any, spin: Any, pairs: Any) -> None:
-        J, X, c = np.empty((6, 6)), np.zeros((2, 4)), np.empty(4)
-        for cell in range(len(rows)):
-            X[:] = 0.0
-            jacobian(rows, cell, spin[cell], J)
-            sound = quartic(J, X, c)
-            _pairs(c, pairs[cell])
-            if not sound:
-                pairs[cell] = np.nan
-
-    return serial(modes, f"modes-{model.name}")

@@ -8,6 +8,7 @@ states, as plain assignments, which the compiler keeps in registers.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.method import TOLERANCE, Method
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
-from sweep.kernels.tableau import DOPRI5, Tableau
+from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
 from sweep.models.model import Array, Columns, Model
 
 
@@ -31,7 +32,7 @@ class RungeKuttaKernel(Kernel):
     def __init__(self, model: Model, tableau: Tableau, measurements: Sequence[Measurement]) -> None:
         self.method, self.tableau = tableau.name, tableau
         self.follows_tangent = any(each.follows_tangent for each in measurements)
-        self._lay_out(model, measurements, tangent.rows(model) if self.follows_tangent else ())
+        self._lay_out(model, measurements, tangent.quantities(model) if self.follows_tangent else ())
         run_block = self._make_run_block()
         self._compile_with(self._with_tangent(run_block) if self.follows_tangent else run_block)
 
@@ -129,16 +130,29 @@ def _sum(terms: Iterable[str]) -> str:
 
 
 _STABILITY_SHARE = 0.9
-"""Share of the stability interval of dopri5 that an automatic step uses for the fastest decay."""
+"""Share of the stability interval that an automatic step uses for the fastest decay."""
 
 
-# Share of the slip's change that steps of `_UNRESOLVED` decay times get wrong while the slip, at first zero, comes to
-# the value that follows from the slow motion.  It falls as the fifth power of the step.
-_LAYER_ERROR, _UNRESOLVED = 0.02, 3.0
+def method(tableau: Tableau) -> Method:
+    """The record of the method of a tableau."""
+    return Method(
+        name=tableau.name,
+        code=tableau.code,
+        summary=tableau.summary,
+        kernel=lambda model, measurements, tolerance: RungeKuttaKernel(model, tableau, measurements),  # noqa: ARG005
+        accurate_step=partial(_accurate_step, tableau),
+        stable_step=partial(_stable_step, tableau),
+        step_words=f"{_STABILITY_SHARE:g} of the stability limit",
+        step_cost=tableau.stages / DOPRI5.stages,
+        balance=tableau.balance,
+        stops_anywhere=True,
+        follows_tangents=True,
+    )
 
 
-def _accurate_step(model: Model, columns: Columns, motion: Array, tolerance: float) -> Array:
-    step = model.radians_a_step * (tolerance / TOLERANCE) ** (1 / DOPRI5.order) / motion
+def _accurate_step(tableau: Tableau, model: Model, columns: Columns, motion: Array, tolerance: float) -> Array:
+    power = 1 / tableau.order
+    step = tableau.phase * model.radians_a_step * (tolerance / TOLERANCE) ** power / motion
     decay = model.fastest_decay(columns)
     if not decay.any():
         return np.asarray(step)
@@ -146,24 +160,9 @@ def _accurate_step(model: Model, columns: Columns, motion: Array, tolerance: flo
     spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
     e = 2 * rattle / inertia
     with np.errstate(divide="ignore", invalid="ignore"):
-        moved = _LAYER_ERROR * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.fmin(step, _UNRESOLVED / decay * (tolerance / moved) ** (1 / DOPRI5.order)))
+        moved = tableau.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
+        return np.asarray(np.fmin(step, LAYER_STEP / decay * (tolerance / moved) ** power))
 
 
-def _stable_step(model: Model, columns: Columns) -> Array:
-    return np.asarray(_STABILITY_SHARE * DOPRI5.real_stability / model.fastest_decay(columns))
-
-
-DOPRI5_METHOD = Method(
-    name=DOPRI5.name,
-    summary="the Runge-Kutta formula of order five by Dormand and Prince, with a fixed step, for every model",
-    kernel=lambda model, measurements, tolerance: RungeKuttaKernel(model, DOPRI5, measurements),  # noqa: ARG005
-    accurate_step=_accurate_step,
-    stable_step=_stable_step,
-    step_words=f"{_STABILITY_SHARE:g} of the stability limit",
-    # Of its first steps, in which the slip sets in, it integrates the work less exactly than the motion.
-    balance=14.0,
-    stops_anywhere=True,
-    follows_tangents=True,
-)
+def _stable_step(tableau: Tableau, model: Model, columns: Columns) -> Array:
+    return np.asarray(_STABILITY_SHARE * tableau.real_stability / model.fastest_decay(columns))

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import linecache
 import sys
+from collections.abc import Iterator
+from typing import Any
 
-from sweep.kernels.codegen import PREFIX
+from sweep.kernels.codegen import GENERATED
 from sweep.kernels.methods import make_kernel
 from sweep.models import find
 
 
 def main(method: str, model: str, *measure: str) -> None:
-    """Print each generated function under the file name by which tracebacks refer to it."""
+    """Print each generated function under the file name by which tracebacks refer to it, and what it is bound to."""
     make_kernel(method, find(model), measure)
-    for name in linecache.cache:
-        if name.startswith(PREFIX):
-            print(f"# {name}\n{''.join(linecache.getlines(name))}\n")
+    for name, names in GENERATED.items():
+        print(f"# {name}", *_bound(names), "".join(linecache.getlines(name)), "", sep="\n")
+
+
+def _bound(names: dict[str, Any]) -> Iterator[str]:
+    """Tell where each function or class that a source refers to is defined, a line each."""
+    for name, value in names.items():
+        if isinstance(value, type):
+            yield f"#   {name}: {value.__module__}.{value.__qualname__}"
+        elif code := getattr(getattr(value, "py_func", value), "__code__", None):
+            yield f"#   {name}: {code.co_filename}:{code.co_firstlineno}"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""At which spins upright spin is stable, compiled: `theory.stability` and `theory.linear` for slip.
+"""The spins at which upright spin is stable, as in `theory.stability`: a compiled search for models with slip.
 
 A rattle decays where the coefficients of its polynomial (`sweep.kernels.quartic`) fulfil the conditions of Routh and
 Hurwitz,
@@ -13,19 +13,16 @@ close together.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import Cached, called, compiled, on_all_threads, serial
-from sweep.kernels.quartic import compiled_modes, has_fast_slip, make_jacobian, quartic
+from sweep.kernels.quartic import has_fast_slip, make_jacobian, quartic
 from sweep.models.ladder import analytic
-from sweep.models.model import Array, Columns, Model, stack, take, zeros
-from sweep.models.theory import linear, stability
+from sweep.models.model import Array, Columns, Model, stack
+from sweep.models.theory import stability
 
 # Samples of the coefficients, at Chebyshev points; the last two terms of their Chebyshev series must be below this
 # share of the largest.
@@ -42,103 +39,37 @@ _USUAL, _BEYOND, _WIDENED, _WIDER = 0.12, 2.0, 3, 4.0
 # sample in the middle.
 _NEAR = 0.2
 
-# Cells that a thread takes at a time.
+# Bodies that a thread takes at a time.
 _PART = 128
 
 
-def stable_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
+def nearest_ranges(model: Model, columns: Columns) -> tuple[Array, Array]:
     """As `theory.stability.stable_ranges`, shape (6, bodies), and the |spin| up to which no range is missing.
 
     The range about zero is always found; of the ranges beyond it, those that begin within the |spin| in the second
     array, shape (bodies,), which is infinite where the eigenvalues were asked.
     """
     if not has_fast_slip(model):
-        return stability.stable_ranges(model, columns), zeros(columns) + np.inf
+        ranges = stability.stable_ranges(model, columns)
+        return ranges, np.full(ranges.shape[1], np.inf)
     usual = _USUAL / np.sqrt(columns["c"])
     limits = [np.fmax(usual, _BEYOND * np.abs(n_c1)) for n_c1 in analytic.critical_spins(columns)]
     limits = np.minimum(np.stack(limits, axis=-1), stability.SPIN_LIMIT)
-    ranges = np.empty((len(limits), 6))
-    search, series = compiled_search(model), _series()
-    _by_parts(
-        lambda rows, limits, ranges: search(rows, limits, *series, ranges),
-        _rows(model.constants.of(columns)),
-        limits,
-        ranges,
-    )
+    rows = np.ascontiguousarray(stack(tuple(model.constants.of(columns))).T)
+    ranges, search, series = np.empty((len(rows), 6)), compiled_search(model), _series()
+    parts = [slice(begin, begin + _PART) for begin in range(0, len(rows), _PART)]
+    on_all_threads(lambda part: search(rows[part], limits[part], *series, ranges[part]), parts)
     covered, doubtful = limits.min(axis=1), np.flatnonzero(np.isnan(ranges[:, 0]))
     if len(doubtful):
-        ranges[doubtful] = stability.stable_ranges(model, _take(columns, doubtful)).T
+        theirs = {name: values[doubtful] for name, values in columns.items()}
+        ranges[doubtful] = stability.stable_ranges(model, theirs).T
         covered[doubtful] = np.inf
     return ranges.T, covered
 
 
-def fastest_motion(model: Model, columns: Columns) -> Array:
-    """As `sweep.models.theory.linear.fastest_motion`."""
-    if not has_fast_slip(model) or _uncompiled.get():
-        return linear.fastest_motion(model, columns)
-    reach, rows = linear.fastest_spin(model, columns), _rows(model.constants.of(columns))
-    pairs = np.concatenate([_modes(model, rows, spin) for spin in (reach, -reach)], axis=1)
-    real, square = pairs[:, ::2], pairs[:, 1::2]
-    motion = np.sqrt(np.where(-real <= np.sqrt(square - real**2), square, 0)).max(axis=1)
-    doubtful = np.flatnonzero(np.isnan(pairs).any(axis=1))
-    if len(doubtful):
-        motion[doubtful] = linear.fastest_motion(model, _take(columns, doubtful))
-    return np.asarray(motion)
-
-
-def growth_rates(model: Model, constants: Any, spin: Array) -> Array:
-    """Re λ of the two rocking modes of a model with slip, the slower first, in sqrt(g/c), shape (2, cells)."""
-    pairs = _modes(model, _rows(constants), spin)
-    real, square = pairs[:, ::2], pairs[:, 1::2]
-    rates = np.take_along_axis(real, np.argsort(square - real**2, axis=1), axis=1).T
-    doubtful = np.flatnonzero(np.isnan(rates[0]))
-    if len(doubtful):
-        values = np.linalg.eigvals(linear.jacobian(model, take(constants, doubtful), spin[doubtful]))
-        order = np.argsort(-values.imag, axis=1)[:, 1::-1]
-        rates[:, doubtful] = np.take_along_axis(values.real, order, axis=1).T
-    return rates
-
-
-def _modes(model: Model, rows: Array, spin: Array) -> Array:
-    """Re λ and |λ|² of both modes, in any order, shape (cells, 4); NaN where they remain in doubt."""
-    pairs = np.empty((len(spin), 4))
-    _by_parts(compiled_modes(model), rows, np.ascontiguousarray(spin), pairs)
-    return pairs
-
-
-_uncompiled: ContextVar[bool] = ContextVar("uncompiled", default=False)
-
-
-@contextmanager
-def uncompiled() -> Iterator[None]:
-    """Inside, `fastest_motion` is that of the eigenvalues, to the same 1e-9, so that nothing has to be compiled."""
-    token = _uncompiled.set(True)
-    try:
-        yield
-    finally:
-        _uncompiled.reset(token)
-
-
-def compile_theory(model: Model) -> None:
-    """Compile the functions of this module for a model, or load them from disk."""
-    nothing = np.empty((0, len(model.constants._fields)))
-    compiled_search(model)(nothing, np.empty((0, 2)), *_series(), np.empty((0, 6)))
-    compiled_modes(model)(nothing, np.empty(0), np.empty((0, 4)))
-
-
-def _rows(constants: Any) -> Array:
-    """Constants of a model, shape (cells, constants)."""
-    return np.ascontiguousarray(stack(tuple(constants)).T)
-
-
-def _take(columns: Columns, cells: Array) -> Columns:
-    return {name: values[cells] for name, values in columns.items()}
-
-
-def _by_parts(function: Callable[..., None], *arrays: Array) -> None:
-    """Call a compiled function for some rows of the arrays at a time, on all threads."""
-    parts = [slice(begin, begin + _PART) for begin in range(0, len(arrays[0]), _PART)]
-    on_all_threads(lambda part: function(*(array[part] for array in arrays)), parts)
+def compile_search(model: Model) -> None:
+    """Compile the search for a model, or load it from disk."""
+    compiled_search(model)(np.empty((0, len(model.constants._fields))), np.empty((0, 2)), *_series(), np.empty((0, 6)))
 
 
 @cache

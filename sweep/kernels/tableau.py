@@ -1,14 +1,20 @@
-"""Explicit Runge-Kutta methods as data: Butcher tableaus, which check themselves when they are made."""
+"""Explicit Runge-Kutta methods as data: Butcher tableaus, which check themselves when they are made.
+
+A record says what the kernel and the choice of the step need.  To add a method, write its record and enter it in
+`TABLEAUS`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction as F
+from math import prod
 
 
 @dataclass(frozen=True)
 class Tableau:
-    """The Butcher tableau of an explicit Runge-Kutta method for autonomous systems.
+    """The Butcher tableau of an explicit Runge-Kutta method for autonomous systems, and how long its steps may be.
 
     `a[i]` holds the weights of the slopes 0 … i in the argument of slope i + 1, `b` those in the
     result, and `c` the abscissae.  They are exact fractions, so that a mistyped entry is found at once.
@@ -17,17 +23,30 @@ class Tableau:
     ------
     ValueError
         if the lengths do not match, a row sum differs from its abscissa, an order condition up to `order`
-        (at most 5; Butcher 2016, table 301(I)) is not met exactly, or `real_stability` is not the end of
-        the real stability interval.
+        (Butcher 2016, section 31: one for each rooted tree) is not met exactly, or `real_stability` is not the end
+        of the real stability interval.
     """
 
     name: str
+    """As in the configuration."""
+    code: int
+    """What stands for it in datasets."""
+    summary: str
+    """One line for the documentation."""
     order: int
     a: tuple[tuple[F, ...], ...]
     b: tuple[F, ...]
     c: tuple[F, ...]
     real_stability: float
     """Largest z with |R(-z)| <= 1: the limit of h |λ| for real negative λ."""
+    phase: float
+    """Error constant: the phase of the fastest motion in a step at the default tolerance, in units of
+    `Model.radians_a_step`.  The error falls with the power `order` of it."""
+    layer_error: float
+    """Error constant of the start: the share of the slip's change that steps of `LAYER_STEP` decay times get wrong
+    while the slip, at first zero, comes to the value that the slow motion asks for.  It falls with the same power."""
+    balance: float
+    """`Method.balance`."""
 
     def __post_init__(self) -> None:
         if not len(self.a) + 1 == len(self.b) == len(self.c):
@@ -35,9 +54,10 @@ class Tableau:
         for row, node in zip(self.a, self.c[1:], strict=True):
             if sum(row) != node:
                 raise ValueError(f"{self.name}: row {row} does not sum to its abscissa {node}")
-        for label, tree, density in self._conditions():
-            if sum((b * t for b, t in zip(self.b, tree, strict=True)), F(0)) != F(1, density):
-                raise ValueError(f"{self.name}: order condition {label} = 1/{density} fails")
+        for tree in (each for order in range(1, self.order + 1) for each in trees(order)):
+            weights = zip(self.b, self._weights(tree), strict=True)
+            if sum((b * weight for b, weight in weights), F(0)) != F(1, _density(tree)):
+                raise ValueError(f"{self.name}: the order condition of the tree {tree} = 1/{_density(tree)} fails")
         inside, outside = (abs(self.stability(-self.real_stability * s)) for s in (0.999, 1.001))
         if not inside < 1 < outside:
             raise ValueError(f"{self.name}: {self.real_stability} does not bound the real stability interval")
@@ -53,39 +73,50 @@ class Tableau:
             slopes.append(1 + z * sum(float(w) * k for w, k in zip(row, slopes, strict=True)))
         return 1 + z * sum(float(w) * k for w, k in zip(self.b, slopes, strict=True))
 
-    def _conditions(self) -> list[tuple[str, list[F], int]]:
-        """The order conditions, one for each rooted tree up to `order`: name, elementary weights, density."""
-        c = list(self.c)
-        one = [F(1)] * len(c)
+    def _weights(self, tree: Tree) -> list[F]:
+        """The elementary weights of a rooted tree, one for each stage."""
+        product = [F(1)] * self.stages
+        for branch in tree:
+            inner = self._weights(branch)
+            sums = [sum((w * x for w, x in zip(row, inner, strict=False)), F(0)) for row in ((), *self.a)]
+            product = [x * y for x, y in zip(product, sums, strict=True)]
+        return product
 
-        def A(v: list[F]) -> list[F]:
-            return [F(0)] + [sum((w * x for w, x in zip(row, v, strict=False)), F(0)) for row in self.a]
 
-        def mul(*vs: list[F]) -> list[F]:
-            out = one
-            for v in vs:
-                out = [x * y for x, y in zip(out, v, strict=True)]
-            return out
+Tree = tuple["Tree", ...]
+"""A rooted tree: the trees that its root carries, in order."""
 
-        trees = {
-            1: [("b", one, 1)],
-            2: [("bc", c, 2)],
-            3: [("bc2", mul(c, c), 3), ("bAc", A(c), 6)],
-            4: [("bc3", mul(c, c, c), 4), ("bcAc", mul(c, A(c)), 8),
-                ("bAc2", A(mul(c, c)), 12), ("bAAc", A(A(c)), 24)],
-            5: [("bc4", mul(c, c, c, c), 5), ("bc2Ac", mul(c, c, A(c)), 10),
-                ("b(Ac)2", mul(A(c), A(c)), 20), ("bcAc2", mul(c, A(mul(c, c))), 15),
-                ("bcAAc", mul(c, A(A(c))), 30), ("bAc3", A(mul(c, c, c)), 20),
-                ("bA(cAc)", A(mul(c, A(c))), 40), ("bAAc2", A(A(mul(c, c))), 60),
-                ("bAAAc", A(A(A(c))), 120)],
-        }  # fmt: skip
-        return [condition for order in range(1, self.order + 1) for condition in trees[order]]
 
+def trees(order: int) -> set[Tree]:
+    """All rooted trees of so many nodes."""
+    return {grown for tree in trees(order - 1) for grown in _grown(tree)} if order > 1 else {()}
+
+
+def _grown(tree: Tree) -> Iterator[Tree]:
+    """All trees that one more leaf makes of a tree."""
+    yield tuple(sorted((*tree, ())))
+    for i, branch in enumerate(tree):
+        for grown in _grown(branch):
+            yield tuple(sorted((*tree[:i], grown, *tree[i + 1 :])))
+
+
+def _nodes(tree: Tree) -> int:
+    return 1 + sum(map(_nodes, tree))
+
+
+def _density(tree: Tree) -> int:
+    return _nodes(tree) * prod(map(_density, tree))
+
+
+LAYER_STEP = 3.0
+"""Steps, in decay times of the slip, at which `Tableau.layer_error` is measured."""
 
 # Dormand & Prince (1980), J. Comput. Appl. Math. 6, 19, table 2: RK5(4)7M.  Its seventh stage
 # is left out: it serves only the embedded error estimate, which a fixed step does not use.
 DOPRI5 = Tableau(
     name="dopri5",
+    code=0,
+    summary="the Runge-Kutta formula of order five by Dormand and Prince, with a fixed step, for every model",
     order=5,
     a=(
         (F(1, 5),),
@@ -97,4 +128,11 @@ DOPRI5 = Tableau(
     b=(F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84)),
     c=(F(0), F(1, 5), F(3, 10), F(4, 5), F(8, 9), F(1)),
     real_stability=3.3066,
+    phase=1.0,
+    layer_error=0.02,
+    # Of its first steps, in which the slip sets in, it integrates the work less exactly than the motion.
+    balance=14.0,
 )
+
+TABLEAUS = (DOPRI5,)
+"""The methods of this kind; the first runs every model."""

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
-from sweep.kernels.codegen import compile_inline, make_load, make_store
+from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
 from sweep.kernels.layout import BLOCK, LANES, Layout
 from sweep.models.model import Array, Model
 
@@ -27,25 +27,25 @@ GROWTH = "tangent_growth"
 _DONE = "tangent_done"
 
 
-def rows(model: Model) -> tuple[str, ...]:
+def quantities(model: Model) -> tuple[str, ...]:
     """Names of the quantities that a tangent adds to an image."""
-    return (*_states(model), _DONE, GROWTH)
+    return (*_foot(model), *_direction(model), _DONE, GROWTH)
 
 
 def start(model: Model, states: Array) -> dict[str, Array | float]:
     """Values of the quantities that do not start at zero; `states` of shape (states, cells)."""
-    foot, direction = _halves(model)
+    foot, direction = _foot(model), _direction(model)
     return {**dict(zip(foot, states, strict=True)), **dict.fromkeys(direction, len(states) ** -0.5)}
 
 
-def _states(model: Model) -> tuple[str, ...]:
-    foot, direction = _halves(model)
-    return (*foot, *direction)
+def _foot(model: Model) -> tuple[str, ...]:
+    """Names of the point at which the tangent has arrived."""
+    return tuple(f"foot.{name}" for name in model.states)
 
 
-def _halves(model: Model) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the point at which the tangent has arrived, and of its components."""
-    return tuple(f"foot.{name}" for name in model.states), tuple(f"tangent.{name}" for name in model.states)
+def _direction(model: Model) -> tuple[str, ...]:
+    """Names of the tangent's components."""
+    return tuple(f"tangent.{name}" for name in model.states)
 
 
 def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Layout) -> Any:
@@ -56,10 +56,14 @@ def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Lay
     step : of the equations and their derivative, as made by `sweep.kernels.runge_kutta.make_step`
     constants : names of the constants in the image
     """
-    own, states = make_load(model.states, layout), _states(model)
-    load, store = make_load(states, layout), make_store(states, layout)
+    n, names = len(model.states), (*_foot(model), *_direction(model))
+    own, load, store = make_load(model.states, layout), make_load(names, layout), make_store(names, layout)
     load_constants = make_load(constants, layout, model.constants)
-    length, begin = _make_length(len(model.states)), _make_begin(len(model.states))
+    squares = " + ".join(f"z[{i}] * z[{i}]" for i in range(n, 2 * n))
+    length = compile_inline("length", f"def length(z):\n    return np.sqrt({squares})", {"np": np})
+    # The states, and the tangent times a share.
+    both = tuple_of([*(f"y[{i}]" for i in range(n)), *(f"share * z[{i}]" for i in range(n, 2 * n))])
+    begin = compile_inline("begin", f"def begin(y, z, share):\n    return {both}", {})
     STEP, DONE, CAUGHT_UP, GREW = map(layout.at, ("step", "done", _DONE, GROWTH))
     block, lanes, wide = BLOCK, LANES, full_width()
 
@@ -87,15 +91,3 @@ def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Lay
             store(group, lane, d > 0.0, begin(own(group, lane), z, 1.0 / d), z)
 
     return follow
-
-
-def _make_length(n: int) -> Any:
-    """Inline (foot and tangent) -> the length of the tangent."""
-    squares = " + ".join(f"z[{i}] * z[{i}]" for i in range(n, 2 * n))
-    return compile_inline("length", f"def length(z):\n    return np.sqrt({squares})", {"np": np})
-
-
-def _make_begin(n: int) -> Any:
-    """Inline (states, foot and tangent, share) -> the states, and the tangent times the share."""
-    both = " ".join([*(f"y[{i}]," for i in range(n)), *(f"share * z[{i}]," for i in range(n, 2 * n))])
-    return compile_inline("begin", f"def begin(y, z, share):\n    return ({both})", {})

@@ -61,7 +61,9 @@ VARIABLES: dict[str, Variable] = {
     "inferred": Variable("int8", "1", "how reversals and status were found", {0: "simulated", 1: "inferred"}),
     "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
     "t_stop": Variable("float64", "1", "time at which the simulation ended, in sqrt(c/g)"),
-    "method": Variable("int8", "1", "integration method of the trajectory", dict(enumerate(METHODS))),
+    "method": Variable(
+        "int8", "1", "integration method of the trajectory", {method.code: name for name, method in METHODS.items()}
+    ),
     "step": Variable("float64", "1", "integration step, in sqrt(c/g)"),
     "step_rule": Variable("int8", "1", "what set the integration step", STEP_RULES),
     "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),

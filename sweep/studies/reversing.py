@@ -140,8 +140,8 @@ class _Trajectories:
         chosen, *_ = methods.cheapest(model, self.columns, self.tolerance, integrator.t_end)
         if integrator.method != AUTO:
             named = self.exact | (integrator.step != "auto")
-            chosen = np.where(named, list(METHODS).index(integrator.method), chosen)
-        return {list(METHODS)[i]: np.flatnonzero(chosen == i) for i in np.unique(chosen)}
+            chosen = np.where(named, integrator.method, chosen)
+        return {method: np.flatnonzero(chosen == method) for method in METHODS if method in chosen}
 
     def start(self) -> Batch:
         """The trajectories at t = 0."""

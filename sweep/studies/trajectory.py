@@ -309,7 +309,7 @@ def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
         series["ripple_free_spin"] = kernel.steady_spin(images)
     if "energy_error" in kernel.measure:
         series["energy"] = rattle + 0.5 * inertia * spin**2
-        series["dissipated"] = images[:, kernel.row("work")]
+        series["dissipated"] = kernel.table(images)["work"]
     return series
 
 

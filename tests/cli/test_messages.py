@@ -95,20 +95,6 @@ def test_a_whole_number_may_be_written_as_any_number(number: str, write: Write) 
     assert "refine: 3\n" in config.to_yaml()
 
 
-def start(*arguments: str | Path, **environment: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "sweep", *map(str, arguments)]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, cwd=ROOT, env=os.environ | environment, stdout=pipe, stderr=pipe, text=True)
-
-
-@pytest.mark.parametrize("verb", ["run", "trajectory", "critical"])
-def test_uncompiled_kernels_are_refused_in_one_line(verb: str, write: Write) -> None:
-    with start(verb, write(TEXT), "--output", write().parent / "out", NUMBA_DISABLE_JIT="1") as process:
-        out, err = process.communicate()
-    assert (process.returncode, out) == (2, "")
-    assert err == "NUMBA_DISABLE_JIT is set, but kernels have to be compiled; allowed: unset, or 0\n"
-
-
 @pytest.mark.parametrize("command", ["info quick.nc", "run quick.yaml --output .", "run quick.yaml --dry-run"])
 def test_a_closed_pipe_ends_a_command_silently(command: str, tmp_path: Path) -> None:
     """As `… | head` does once it has what it wants."""

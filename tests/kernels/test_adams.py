@@ -10,18 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import ROOT, columns
-from support.kernels import finish, images, kernel, run, spin, threads
+from support.kernels import kernel, run, spin
 
 import sweep
 from sweep import ConfigError
-from sweep.kernels import measures
-from sweep.kernels.adams.kernel import AdamsKernel
 from sweep.kernels.adams.step import BDF, BDF_GAMMA, CORRECTOR_NODES, EXTRAPOLATE, PREDICTOR_NODES
 from sweep.kernels.adams.weights import fitted_weights, plain_weights
-from sweep.kernels.layout import LANES
-from sweep.kernels.methods import automatic_step, make_kernel
-from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
-from sweep.models import MODELS, find
+from sweep.kernels.methods import automatic_step
+from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import take
 from sweep.models.stiff import slip as stiff_slip
@@ -123,18 +119,6 @@ def test_spin_against_dopri5(parameters: dict[str, float], bound: float) -> None
     assert errors[1] < bound / 50
 
 
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-8])
-@pytest.mark.parametrize(
-    "parameters",
-    [{"mu": 20.0}, {"mu": 60.0}, {"mu": 1000.0}, {"n0": 0.1, "mu": 200.0}, {"x0": 2.0, "mu": 200.0}, {"b": 1.5},
-     {"b": 8.0, "mu": 200.0}],
-)  # fmt: skip
-def test_automatic_step_meets_the_tolerance(parameters: dict[str, float], tolerance: float) -> None:
-    step, _ = automatic_step("adams", MODELS["slip"], columns(**parameters), tolerance)
-    fine = spin(ADAMS, run(ADAMS, step / 3, 400.0, **parameters))[0]
-    assert abs(spin(ADAMS, run(ADAMS, step, 400.0, **parameters))[0] - fine) < tolerance
-
-
 def test_the_step_does_not_depend_on_friction() -> None:
     step, _ = automatic_step("adams", MODELS["slip"], columns(mu=[1e2, 1e3, 1e4, 1e5]), 1e-6)
     assert step == pytest.approx(step[0], rel=1e-3)
@@ -143,87 +127,6 @@ def test_the_step_does_not_depend_on_friction() -> None:
     exact = spin(rolling, run(rolling, 0.01, 100.0))
     distance = [abs(spin(ADAMS, run(ADAMS, 0.05, 100.0, mu=mu)) - exact)[0] for mu in (1e4, 1e5)]
     assert distance[0] / distance[1] == pytest.approx(10, rel=0.2)
-
-
-def test_time_limit_is_met_exactly() -> None:
-    table = run(ADAMS, 0.1, 100.0)
-    assert table[0, ADAMS.row("status")] == TIME_LIMIT
-    reached = table[0, ADAMS.row("begin")] + table[0, ADAMS.row("done")] * table[0, ADAMS.row("step")]
-    assert reached == pytest.approx(100.0, rel=1e-14)
-    assert ADAMS.times(table, 100.0)[0] == 100.0
-
-
-MIXED = {
-    "mu": np.linspace(20, 900, 37),
-    "b": np.resize([1.5, 3.0, 5.0], 37),
-    "n0": np.resize([0.05, -0.03, 0.002, 0.02, 3.0], 37),
-}
-
-
-def mixed() -> np.ndarray:
-    return images(ADAMS, np.linspace(0.05, 0.12, 37), 900.0, settle=True, **MIXED)
-
-
-@pytest.fixture(scope="module")
-def expected() -> np.ndarray:
-    table = finish(ADAMS, mixed())
-    ends = set(table[:, ADAMS.row("status")])
-    assert {SETTLED, TIME_LIMIT} <= ends
-    assert ends & {LIFT_OFF, DIVERGED, PARADOX}
-    return table
-
-
-@pytest.mark.parametrize("number", [1, 2])
-@pytest.mark.parametrize("chunk", [1, 7, 1000])
-def test_bit_identical_for_threads_and_chunks(number: int, chunk: int, expected: np.ndarray) -> None:
-    with threads(number):
-        np.testing.assert_array_equal(finish(ADAMS, mixed(), chunk_blocks=chunk), expected)
-
-
-def test_bit_identical_in_any_order(expected: np.ndarray) -> None:
-    order = np.random.default_rng(1).permutation(len(expected))
-    np.testing.assert_array_equal(finish(ADAMS, mixed()[order]), expected[order])
-
-
-def test_equilibrium_stays_exactly() -> None:
-    table = images(ADAMS, 0.1, 500.0, x0=0.0, y0=0.0, n0=[0.0, 0.05, -0.3])
-    before = table[:, :7].copy()
-    finish(ADAMS, table)
-    np.testing.assert_array_equal(table[:, :7], before)
-
-
-def test_a_rattle_of_1e_30_grows_as_one_of_1e_20() -> None:
-    small, large = (run(ADAMS, 0.1, 400.0, x0=x, y0=x)[0, [0, 1, 2, 3, 5, 6]] for x in (1e-30, 1e-20))
-    np.testing.assert_allclose(large, small * 1e10, rtol=1e-9)
-
-
-def test_reversals_of_the_papers_figure() -> None:
-    table = run(ADAMS, 0.08, 14_000.0, settle=True, mu=[60.0, 130.0, 200.0])
-    assert list(table[:, ADAMS.row("reversals")]) == [3, 6, 9]
-    twin = run(DOPRI, 0.026, 3000.0, settle=True)
-    last = table[0, ADAMS.row("last_reversal")]
-    assert last == pytest.approx(twin[0, DOPRI.row("last_reversal")], abs=0.01)
-
-
-def test_energy_balance() -> None:
-    """The work is summed to fourth order: the violation seen falls with the step and is small."""
-    seen = [run(ADAMS, h, 1000.0)[0, ADAMS.row("violation")] / 0.02726 for h in (0.1, 0.05)]
-    assert seen[0] < 1e-4
-    assert seen[1] < seen[0] / 10
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("model", ["slip", "slip+viscous+sigma"])
-def test_the_loop_over_lanes_is_vector_instructions(model: str) -> None:
-    """The step of start-up, made of the same lines, is looked at in `test_start_up`."""
-    adams = make_kernel("adams", find(model), measures.default(find(model)))
-    assert isinstance(adams, AdamsKernel)
-    block = adams._make_run_block()
-    block(np.zeros(len(adams.layout.names) * LANES))
-    assembly = next(iter(block.inspect_asm().values()))
-    # The scalar loop beside it is for a history that overlaps the group, which it never does.
-    assert assembly.count("divpd") >= 3
-    assert assembly.count("sqrtpd") >= 2
 
 
 def test_counts_of_the_reference(tmp_path: Path) -> None:

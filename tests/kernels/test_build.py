@@ -46,8 +46,8 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
     assert started == [
         ("kernel", "adams", "slip", "reversals"),
         ("images", "adams", "slip"),
-        ("approach", "slip"),
-        ("theory", "slip"),
+        ("approach", "dopri5", "slip"),
+        ("theory", "dopri5", "slip"),
         ("kernel", "dopri5", "slip", "reversals"),
     ]
 
@@ -96,7 +96,7 @@ def test_an_estimate_compiles_nothing(write: Write, monkeypatch: pytest.MonkeyPa
 
 def test_measurements_without_a_place_in_the_kernel_share_it() -> None:
     def name(*measure: str) -> str:
-        return str(kernel(measure=measure)._advance._cache._cache_file._index_name)
+        return str(kernel(measure=measure).advancing._cache._cache_file._index_name)
 
     alone = name("reversals")
     assert name("reversals", "resting_spin", "sensitivity=2") == alone

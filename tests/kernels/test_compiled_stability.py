@@ -1,4 +1,4 @@
-"""The compiled linear theory against the eigenvalues."""
+"""The compiled search for stable ranges against the eigenvalues."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from support import columns, wide_bodies
 from sweep.kernels import stability as compiled
 from sweep.models import MODELS
 from sweep.models.model import Columns
-from sweep.models.theory import linear, stability
+from sweep.models.theory import stability
 
 SLIP = MODELS["slip"]
 
@@ -19,7 +19,7 @@ WIDE = wide_bodies(600)
 
 @pytest.mark.parametrize(("bodies", "decided"), [(PAPER, 0.99), (WIDE, 0.3)])
 def test_the_same_ranges_as_by_the_eigenvalues(bodies: Columns, decided: float) -> None:
-    ranges, covered = compiled.stable_ranges(SLIP, bodies)
+    ranges, covered = compiled.nearest_ranges(SLIP, bodies)
     expected = stability.stable_ranges(SLIP, bodies)
     np.testing.assert_allclose(ranges[:2], expected[:2], rtol=1e-8)
     within = np.abs(expected) < covered
@@ -32,15 +32,9 @@ def test_the_same_ranges_as_by_the_eigenvalues(bodies: Columns, decided: float) 
     assert beyond[:, np.isfinite(covered)].any()
 
 
-@pytest.mark.parametrize("bodies", [PAPER, WIDE])
-def test_the_same_fastest_motion_as_by_the_eigenvalues(bodies: Columns) -> None:
-    found = compiled.fastest_motion(SLIP, bodies)
-    np.testing.assert_allclose(found, linear.fastest_motion(SLIP, bodies), rtol=1e-9)
-
-
 def test_each_body_by_itself() -> None:
     some = {name: values[::7] for name, values in PAPER.items()}
-    for whole, part in zip(compiled.stable_ranges(SLIP, PAPER), compiled.stable_ranges(SLIP, some), strict=True):
+    for whole, part in zip(compiled.nearest_ranges(SLIP, PAPER), compiled.nearest_ranges(SLIP, some), strict=True):
         np.testing.assert_array_equal(whole[..., ::7], part)
 
 
@@ -59,5 +53,5 @@ def test_two_changes_between_two_points_are_a_doubt(gap: float, answer: int) -> 
 
 def test_bodies_without_critical_spins_in_the_paper() -> None:
     bodies = columns(b=[3.0, 10.0, 3.0], delta=[0.03, 0.03, 0.0], mu=[0.0, 60.0, 60.0])
-    ranges, _ = compiled.stable_ranges(SLIP, bodies)
+    ranges, _ = compiled.nearest_ranges(SLIP, bodies)
     np.testing.assert_allclose(ranges[:2], stability.stable_ranges(SLIP, bodies)[:2], rtol=1e-8)

@@ -34,27 +34,27 @@ def test_late_reversals_come_at_the_reference_times(tolerance: float) -> None:
     step, _ = automatic_step("adams", MODELS["slip"], columns(mu=list(cases)), tolerance)
     table = run(kernel("adams", tolerance=tolerance), step, 45_000.0, settle=True, mu=list(cases))
     assert [(n, pytest.approx(t, rel=1e-3)) for n, t in cases.values()] == list(
-        zip(table[:, ADAMS.row("reversals")], table[:, ADAMS.row("last_reversal")], strict=True)
+        zip(ADAMS.table(table)["reversals"], ADAMS.table(table)["last_reversal"], strict=True)
     )
-    assert not table[:, ADAMS.row("noise_limited")].any()
+    assert not ADAMS.table(table)["noise_limited"].any()
 
 
 def test_the_ninth_reversal_does_not_depend_on_the_last_bits() -> None:
     x0 = 0.01 * np.array([1, 1, 1 + 1e-12])
     table = run(ADAMS, [0.05, 0.1, 0.05], 14_000.0, settle=True, mu=200.0, x0=x0)
-    assert (table[:, ADAMS.row("reversals")] == 9).all()
-    np.testing.assert_allclose(table[:, ADAMS.row("last_reversal")], 12914, atol=15)
+    assert (ADAMS.table(table)["reversals"] == 9).all()
+    np.testing.assert_allclose(ADAMS.table(table)["last_reversal"], 12914, atol=15)
 
 
 def test_dopri5_flags_reversals_that_round_off_moved() -> None:
     mu = [200.0, 188.0, 180.0, 176.0, 60.0, 130.0]
     step, _ = automatic_step("dopri5", MODELS["slip"], columns(mu=mu))
     table = run(DOPRI, step, 30_000.0, settle=True, mu=mu)
-    assert list(table[:, DOPRI.row("noise_limited")]) == [1, 1, 1, 1, 0, 0]
-    assert list(table[:, DOPRI.row("reversals")]) == [9, 9, 9, 9, 3, 6]
+    assert list(DOPRI.table(table)["noise_limited"]) == [1, 1, 1, 1, 0, 0]
+    assert list(DOPRI.table(table)["reversals"]) == [9, 9, 9, 9, 3, 6]
     # They are off: else there would be nothing to say.
     late = [LAST[m][1] for m in mu[:4]]
-    assert (table[:4, DOPRI.row("last_reversal")] < 0.97 * np.array(late)).all()
+    assert (table[:4, DOPRI.layout.index("last_reversal")] < 0.97 * np.array(late)).all()
 
 
 def test_a_mode_that_sank_is_flagged_only_once_it_has_grown_back() -> None:
@@ -62,19 +62,19 @@ def test_a_mode_that_sank_is_flagged_only_once_it_has_grown_back() -> None:
     step, _ = automatic_step("dopri5", MODELS["slip"], columns(mu=200.0))
     for t_end, flag in ((9_000.0, 0), (12_000.0, 1)):
         table = run(DOPRI, step, t_end, settle=True, mu=200.0)
-        assert table[0, DOPRI.row("reversals")] == 8
-        assert table[0, [DOPRI.row("depth0"), DOPRI.row("depth1")]].min() < np.log(noise.DEPTH)
-        assert table[0, DOPRI.row("noise_limited")] == flag
+        assert DOPRI.table(table)["reversals"][0] == 8
+        assert table[0, [DOPRI.layout.index("depth0"), DOPRI.layout.index("depth1")]].min() < np.log(noise.DEPTH)
+        assert DOPRI.table(table)["noise_limited"][0] == flag
 
 
 def test_a_mode_let_down_too_late_is_flagged() -> None:
     table = images(ADAMS, 0.05, 9000.0, n0=[0.05, 0.01])
-    table[:, [ADAMS.row(name) for name in stretches.LIFTS]] = 12.0
-    table[:, ADAMS.row("status")] = QUIET
+    table[:, [ADAMS.layout.index(name) for name in stretches.LIFTS]] = 12.0
+    ADAMS.table(table)["status"] = QUIET
     ADAMS.carry(table)
-    assert (table[:, ADAMS.row("status")] == RUNNING).all()
-    assert list(table[:, ADAMS.row("noise_limited")]) == [0, 1]
-    assert list(table[:, ADAMS.row("lift0")]) == [12, 0]
+    assert (ADAMS.table(table)["status"] == RUNNING).all()
+    assert list(ADAMS.table(table)["noise_limited"]) == [0, 1]
+    assert list(ADAMS.table(table)["lift0"]) == [12, 0]
 
 
 def test_growth_is_that_of_the_model() -> None:
@@ -91,7 +91,7 @@ def test_growth_is_that_of_the_model() -> None:
 
 def test_only_what_is_asked_for_is_measured(write: Write) -> None:
     for method in ("adams", "dopri5"):
-        assert not set(noise.NoiseLimited().rows) & set(kernel(method, measure=["reversals"]).layout.names)
+        assert not set(noise.NoiseLimited().quantities) & set(kernel(method, measure=["reversals"]).layout.names)
     assert "noise_limited" not in sweep.run(write(), measure=["reversals"])
     with pytest.raises(ConfigError, match="measured with the reversals; add reversals"):
         sweep.load_config(write(), {"measure": ["noise_limited"]})

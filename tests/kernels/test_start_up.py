@@ -8,8 +8,7 @@ from support import columns
 from support.kernels import finish, images_of, kernel, spin, threads
 
 from sweep.kernels.adams import start_up
-from sweep.kernels.adams.step import HISTORY, names
-from sweep.kernels.codegen import compile_lanes
+from sweep.kernels.adams.step import HISTORY
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES
 from sweep.kernels.methods import automatic_step
@@ -46,24 +45,24 @@ def test_states_history_and_work_against_dopri5(mu: float, step: float, bound: f
     body = columns(mu=mu)
     image = begun(body, np.array([step]))[0]
     p = take(ADAMS.unpack(image[None])[1], 0)
-    fine, h = min(0.004, 0.3 / max(mu, 1.0)), image[ADAMS.row("step")]
+    fine, h = min(0.004, 0.3 / max(mu, 1.0)), image[ADAMS.layout.index("step")]
     for j in range(HISTORY):
-        time = image[ADAMS.row("begin")] - j * h
+        time = image[ADAMS.layout.index("begin")] - j * h
         twin = resolved(body, time, fine)
         state = np.array(stiff_slip.momentum(twin[:7], p))
         slot = HISTORY - 1 - j
-        slopes = image[ADAMS.row(f"f{slot}_0") :][:5]
+        slopes = image[ADAMS.layout.index(f"f{slot}_0") :][:5]
         # By the exact slow slopes, at the exact slip.
         np.testing.assert_allclose(slopes, stiff_slip.slow(*state, p)[0], atol=100 * bound)
-        np.testing.assert_allclose(image[ADAMS.row(f"v{slot}_0") :][:2], state[5:], atol=10 * bound)
+        np.testing.assert_allclose(image[ADAMS.layout.index(f"v{slot}_0") :][:2], state[5:], atol=10 * bound)
         if j == 0:
             np.testing.assert_allclose(image[:7], state, atol=10 * bound)
-            assert image[ADAMS.row("spin")] == pytest.approx(spin(DOPRI, twin[None])[0], abs=bound)
-            work = twin[DOPRI.row("work")]
-            assert image[ADAMS.row("work")] == pytest.approx(work, rel=2e-3 * (step / 0.1) ** 3, abs=1e-13)
+            assert image[ADAMS.layout.index("spin")] == pytest.approx(spin(DOPRI, twin[None])[0], abs=bound)
+            work = twin[DOPRI.layout.index("work")]
+            assert image[ADAMS.layout.index("work")] == pytest.approx(work, rel=2e-3 * (step / 0.1) ** 3, abs=1e-13)
         if j < 3:
             power = slip.rhs(twin[:7], p)[1][1]
-            assert image[ADAMS.row(f"power{j}")] == pytest.approx(power, rel=1e-3, abs=1e-12)
+            assert image[ADAMS.layout.index(f"power{j}")] == pytest.approx(power, rel=1e-3, abs=1e-12)
 
 
 def test_start_up_leaves_no_trace_in_the_spin() -> None:
@@ -94,7 +93,7 @@ def test_bit_identical_for_each_grouping_and_thread() -> None:
         for i in range(0, len(STEPS), 9):
             np.testing.assert_array_equal(begun(cell(MIXED, i), STEPS[i : i + 1])[0], expected[i])
     # Not compiled once for a cell and again for many.
-    assert len(start_up.compiled_start_up(PAPER_FORM).signatures) == 1
+    assert len(start_up.compiled_start_up(PAPER_FORM)._dispatcher.signatures) == 1
 
 
 def test_a_level_may_have_more_cells_than_lanes() -> None:
@@ -114,29 +113,17 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
     )
     step, _ = automatic_step("adams", MODELS["slip"], body, 1e-8)
     begin = begun(body, step, t_end=3.0)
-    status, times = begin[:, ADAMS.row("status")], ADAMS.times(begin, 3.0)
+    status, times = ADAMS.table(begin)["status"], ADAMS.times(begin, 3.0)
     ended = status != RUNNING
     assert 10 <= ended.sum() < n
     # No longer than start-up, in steps that dopri5 is stable at: else it would call any end diverged.
     stable = 0.9 * DOPRI5.real_stability / slip.fastest_decay(body)
     twins = finish(DOPRI, begun(body, np.minimum(stable, step / 4), DOPRI, 20 * step.max()), settle=False)
     reached = DOPRI.times(twins, 20 * step.max())
-    np.testing.assert_array_equal(twins[ended, DOPRI.row("status")], status[ended])
+    np.testing.assert_array_equal(DOPRI.table(twins)["status"][ended], status[ended])
     np.testing.assert_array_equal(reached[ended], times[ended])
-    assert (reached[~ended] > begin[~ended, ADAMS.row("begin")]).all()
+    assert (reached[~ended] > begin[~ended, ADAMS.layout.index("begin")]).all()
     assert set(status) == {RUNNING, LIFT_OFF}
     # They keep sound states, those of the start.
     states = np.stack(stiff_slip.STIFF_MODEL.start(body), axis=-1)
     np.testing.assert_allclose(begin[ended, :7], states[ended], rtol=1e-14, atol=1e-14)
-
-
-def test_the_loop_over_lanes_is_vector_instructions() -> None:
-    lines = start_up._advance(PAPER_FORM, start_up._places(PAPER_FORM))
-    advance = compile_lanes("advance", "group, points, ticks", lines, names(PAPER_FORM))
-    kept = start_up.layout(PAPER_FORM).names
-    group, points = np.zeros(len(kept) * LANES), np.zeros((HISTORY + 1) * start_up._POINT_SIZE)
-    advance(group, points, 1.0)
-    assembly = next(iter(advance.inspect_asm().values()))
-    # The scalar loop beside it is for arrays that overlap.
-    assert assembly.count("divpd") >= 3
-    assert assembly.count("sqrtpd") >= 2

@@ -20,7 +20,7 @@ from sweep.models.stiff.modes import RATTLE, Rattle, bending
 from sweep.models.theory import linear, stability
 
 ADAMS = kernel("adams")
-row = ADAMS.row
+row = ADAMS.layout.index
 
 
 def stepped(table: np.ndarray, **how: Any) -> np.ndarray:

@@ -23,6 +23,7 @@ def python(code: str, cache: Path, **environment: str) -> str:
     ).stdout
 
 
+@pytest.mark.x86
 @pytest.mark.parametrize(("called", "wide"), [("full_width()", True), ("pass", False)])
 def test_the_widest_vectors_against_the_preference_of_the_compiler(called: str, wide: bool, tmp_path: Path) -> None:
     """The code is looked at, not run, so that any CPU will do."""

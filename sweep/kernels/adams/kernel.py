@@ -24,7 +24,7 @@ import numpy as np
 
 from sweep.jit import Cached, compiled, full_width, inline
 from sweep.kernels.adams import start_up, stretches, weights
-from sweep.kernels.adams.start_up import Started, count_levels, duration
+from sweep.kernels.adams.start_up import count_levels, duration
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
     CORRECTOR_NODES,
@@ -32,11 +32,9 @@ from sweep.kernels.adams.step import (
     MATRIX,
     POINT,
     PREDICTOR_NODES,
-    accept_lines,
+    advance_lines,
     load_lines,
     names,
-    step_lines,
-    store_lines,
 )
 from sweep.kernels.codegen import compile_inline
 from sweep.kernels.kernel import Kernel, steps_to
@@ -86,12 +84,12 @@ class AdamsKernel(Kernel):
         self._set_method(table, self.unpack(images)[1])
         constants = table.columns(self.constants)
         starts = stack(self.form.full.start(columns)).T
-        self._set_started(table, start_up.start_up(self.form, step, constants, starts, levels))
+        self._set_started(table, *start_up.start_up(self.form, step, constants, starts, levels))
         if self.form.resolves_modes:
             self._set_looks(table, columns)
         return images
 
-    def _image_functions(self) -> tuple[Cached, ...]:
+    def filling(self) -> tuple[Cached, ...]:
         return (start_up.compiled_start_up(self.form),)
 
     def model_states(self, images: Array) -> Array:
@@ -112,21 +110,21 @@ class AdamsKernel(Kernel):
         table["per_weight"] = 1 / correct[:, 0]
         table["gamma"] = BDF_GAMMA * step
 
-    def _set_started(self, table: Table, started: Started) -> None:
+    def _set_started(self, table: Table, ended: Table, history: Array) -> None:
         """Set the state after start-up, and do what looks and measurements would have done during it."""
         before = self.steady_spin(table.images)
-        table.set_columns(self.model.states, started.states)
-        table.set_columns(_HISTORY, started.history)
-        table["begin"], table["status"] = started.begin, started.status
+        table.set_columns(self.model.states, ended.columns(self.model.states))
+        table.set_columns(_HISTORY, history[:, :, :-1].reshape(len(history), -1))
+        table["begin"], table["status"] = ended["ticks"] * ended["spacing"], ended["status"]
         if self.follows_work:
-            table.set_columns(stretches.POWERS, started.powers)
+            table.set_columns(stretches.POWERS, history[:, :-4:-1, -1])
         spin, rattle, inertia = self.model.energy(*self.unpack(table.images))
         energy = rattle + 0.5 * inertia * spin**2
         grown = energy > table["energy_start"] * (1 + self.energy_gain)
         table["status"] = np.where(grown, DIVERGED, table["status"])
         table["energy"], table["spin"] = energy, spin
         mean = (before + self.steady_spin(table.images)) / 2
-        stretch = Stretch(started.begin, mean, spin, started.work, mode_energies=None)
+        stretch = Stretch(table["begin"], mean, spin, ended["work"], mode_energies=None)
         for each in self.measurements:
             each.skip(table, stretch)
 
@@ -186,9 +184,7 @@ class AdamsKernel(Kernel):
             *load_lines(self.form, at),
             f"status, done, h, old = {at('status')}, {at('done')}, {at('step')}, {at('spin')}",
             f"active = (status == {RUNNING}) & (done < {at('goal')})",
-            *step_lines(at, range(HISTORY)[::-1]),
-            *accept_lines(self.form, at),
-            *store_lines(at, HISTORY),
+            *advance_lines(self.form, at),
             f"{at('done')} = done + (1.0 if accepted else 0.0)",
             f"{at('spin')} = spin if accepted else old",
             "work = work_of(group, lane, h, power)",

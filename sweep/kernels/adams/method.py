@@ -52,6 +52,7 @@ def _kernel(model: Model, measurements: Sequence[Measurement], tolerance: float)
 
 METHOD = Method(
     name=AdamsKernel.method,
+    code=1,
     summary="Adams formulas of orders eight and nine for the slow variables and BDF5 for the slip, for the slip model: "
     "friction does not limit its step",
     kernel=_kernel,

@@ -9,7 +9,7 @@ computed by itself, so it does not matter which ones.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,16 +24,14 @@ from sweep.kernels.adams.step import (
     SLIPS,
     SLOPES,
     At,
-    accept_lines,
+    advance_lines,
     constants,
     load_lines,
     names,
-    step_lines,
-    store_lines,
 )
 from sweep.kernels.adams.weights import plain_weights
 from sweep.kernels.codegen import compile_lanes
-from sweep.kernels.layout import LANES, Layout
+from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5
@@ -62,26 +60,6 @@ def layout(form: StiffForm) -> Layout:
     return Layout((*form.model.states, *constants(form), *more))
 
 
-class Started(NamedTuple):
-    """What start-up leads to; arrays over the cells.
-
-    A trajectory that fails keeps its last sound states and their time; its history is then meaningless.
-    """
-
-    states: Array
-    """States of the form model, shape (cells, 7)."""
-    history: Array
-    """The eight points, newest last, each with the quantities of `POINT`, shape (cells, 56)."""
-    powers: Array
-    """Power of friction at the last three points, newest first, shape (cells, 3)."""
-    begin: Array
-    """Time reached, in sqrt(c/g), shape (cells,)."""
-    status: Array
-    """Shape (cells,)."""
-    work: Array
-    """Work of friction: the energy that it has dissipated, shape (cells,)."""
-
-
 def count_levels(slip_decay: Array, step: Array) -> Array:
     """Number of levels, one or more: doublings of the spacing of the history, from two steps of dopri5 to `step`.
 
@@ -108,7 +86,7 @@ def duration(levels: Array) -> Array:
     return np.asarray(np.array([_duration(count) for count in range(1, levels.max() + 1)])[levels - 1])
 
 
-def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, levels: Array) -> Started:
+def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, levels: Array) -> tuple[Table, Array]:
     """Take trajectories through start-up, from t = 0 to `duration(levels)` steps.
 
     Parameters
@@ -117,42 +95,37 @@ def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, leve
     constants : constants of the form model, shape (cells, constants)
     starts : states of the full model at t = 0, shape (cells, 7)
     levels : number of levels, from `count_levels`, shape (cells,)
+
+    Returns
+    -------
+    The quantities of `layout` at the end, the states being those of the form model; and the history: its points, oldest
+    first, each with the quantities of `POINT` and the power of friction, shape (cells, 8, 8).  A trajectory that fails
+    keeps its last sound states and their time; its history is then meaningless.
     """
-    groups = [
-        rows[begin : begin + LANES]
+    batches = [
+        cells[begin : begin + LANES]
         for count in np.unique(levels)
-        for rows in [np.flatnonzero(levels == count)]
-        for begin in range(0, len(rows), LANES)
+        for cells in [np.flatnonzero(levels == count)]
+        for begin in range(0, len(cells), LANES)
     ]
     kept, begins = layout(form), np.concatenate([starts, constants], axis=1)
-    started = Started(
-        *(np.empty((len(step), n)) for n in (len(form.model.states), HISTORY * len(POINT), 3)),
-        *(np.empty(len(step)) for _ in range(3)),
-    )
+    ended, history = np.empty((len(step), len(kept.names))), np.empty((len(step), HISTORY, len(_POINT.names)))
 
     def take(cells: Array) -> None:
         """Take the cells of one group through start-up; lanes that would stay empty repeat the last of them."""
         lanes, steps = np.pad(cells, (0, LANES - len(cells)), mode="edge"), _steps(levels[cells[0]])
         group = np.zeros((len(kept.names), LANES))
         group[: begins.shape[1]] = begins[lanes].T
-        group[kept.row("spacing")] = step[lanes] / 2.0 ** len(steps)
-        group[kept.row("h")] = 0.5 * group[kept.row("spacing")]
+        group[kept.index("spacing")] = step[lanes] / 2.0 ** len(steps)
+        group[kept.index("h")] = 0.5 * group[kept.index("spacing")]
         points = np.zeros((HISTORY + steps.max(), len(_POINT.names), LANES))
         run(group.ravel(), points.ravel(), steps)
-        _store(started, cells, kept, group[:, : len(cells)], points[:HISTORY, :, : len(cells)])
+        ended[cells] = group[:, : len(cells)].T
+        history[cells] = np.moveaxis(points[:HISTORY, :, : len(cells)], -1, 0)
 
     run = compiled_start_up(form)
-    on_all_threads(take, groups)
-    return started
-
-
-def _store(started: Started, cells: Array, kept: Layout, group: Array, points: Array) -> None:
-    """Write what a group has come to, its quantities `kept` of shape (rows, cells), to the rows of these cells."""
-    started.states[cells] = group[: started.states.shape[1]].T
-    started.history[cells] = points[:, : len(POINT)].reshape(-1, len(cells)).T
-    started.powers[cells] = points[:-4:-1, _POINT.row("power{}")].T
-    started.begin[cells] = group[kept.row("ticks")] * group[kept.row("spacing")]
-    started.status[cells], started.work[cells] = group[kept.row("status")], group[kept.row("work")]
+    on_all_threads(take, batches)
+    return Table(ended, kept), history
 
 
 def _places(form: StiffForm) -> At:
@@ -212,14 +185,11 @@ def _dopri5(form: StiffForm, at: At) -> list[str]:
     ]
 
 
-def _to_split(form: StiffForm, at: At) -> list[str]:
-    return [*load_lines(form, at), "s = momentum(y, p)"]
-
-
 def _record(form: StiffForm, at: At) -> list[str]:
     """Make point 0 of the history from a state of the full model."""
     return [
-        *_to_split(form, at),
+        *load_lines(form, at),
+        "s = momentum(y, p)",
         "f, geometry = slow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)",
         "_, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, p, 0.0, 0.0, 0.0)",
         *(f"{at(name.format(0))} = f[{i}]" for i, name in enumerate(SLOPES)),
@@ -229,7 +199,9 @@ def _record(form: StiffForm, at: At) -> list[str]:
 
 
 def _replace(form: StiffForm, at: At) -> list[str]:
-    return [*_to_split(form, at), *(f"{at(name)} = s[{i}]" for i, name in enumerate(form.model.states))]
+    """Replace a state of the full model by that of the stiff form."""
+    replaced = (f"{at(name)} = s[{i}]" for i, name in enumerate(form.model.states))
+    return [*load_lines(form, at), "s = momentum(y, p)", *replaced]
 
 
 def _set_step(form: StiffForm, at: At) -> list[str]:
@@ -247,11 +219,9 @@ def _advance(form: StiffForm, at: At) -> list[str]:
     """Steps from points 0 … 7 to point 8; the work follows from the Adams-Moulton formula of order four."""
     return [
         *_begin_step(form, at),
-        *step_lines(at, range(HISTORY)[::-1]),
-        *store_lines(at, HISTORY),
+        *advance_lines(form, at),
         f"{at('power8')} = power",
         f"done = h / 24.0 * (9.0 * power + 19.0 * {at('power7')} - 5.0 * {at('power6')} + {at('power5')})",
-        *accept_lines(form, at),
         *_end_step(at, "ticks"),
     ]
 

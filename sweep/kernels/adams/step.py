@@ -6,10 +6,11 @@ generated as text, because the places of the points have to be known when the co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from sweep.jit import inline
+from sweep.kernels.codegen import tuple_of
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
 from sweep.models.stiff.form import StiffForm
 
@@ -101,19 +102,18 @@ def names(form: StiffForm) -> dict[str, Any]:
 
 def load_lines(form: StiffForm, at: At) -> list[str]:
     """Lines that load the constants p and the states y."""
-    values, states = (" ".join(f"{at(name)}," for name in names) for names in (constants(form), form.model.states))
-    return [f"p = Constants({values})", f"y = ({states})"]
+    return [f"p = Constants{tuple_of(map(at, constants(form)))}", f"y = {tuple_of(map(at, form.model.states))}"]
 
 
-def step_lines(at: At, slots: Sequence[int]) -> list[str]:
-    """Lines that compute new, slopes, spin, (num, den) and power, as `solve` returns them, from p and y.
+def advance_lines(form: StiffForm, at: At) -> list[str]:
+    """Lines that take a lane, if it is `active`, from the eight points of the history, slots 0 … 7, to the ninth.
 
-    They also set `sound` and `accepted`.  `slots` are those of the history, newest first, with the slopes in
-    f{slot}_0 … 4 and the slip in v{slot}_0, 1.
+    They need what `load_lines` sets, and `status`.  They set `new`, slopes, `spin`, (num, den) and `power`, as `solve`
+    returns them, and `sound` and `accepted`.
     """
     lines = [f"q{i} = g{i} = y[{i}]" for i in range(5)]
     lines += ["e0 = e1 = b0 = b1 = 0.0"]
-    for j, slot in enumerate(slots):
+    for j, slot in enumerate(range(HISTORY)[::-1]):  # the newest first
         lines += [f"wp, wc = {at(f'predict{j}')}, {at(f'correct{j + 1}')}"]
         for i in range(5):
             lines += [f"f = {at(SLOPES[i].format(slot))}", f"q{i} += wp * f", f"g{i} += wc * f"]
@@ -121,28 +121,16 @@ def step_lines(at: At, slots: Sequence[int]) -> list[str]:
             for i in range(2):
                 value = at(SLIPS[i].format(slot))
                 lines += [f"e{i} += {EXTRAPOLATE[j]!r} * {value}", f"b{i} += {BDF[j]!r} * {value}"]
-    weights = f"{at('correct0')}, {at('per_weight')}, {at('gamma')}, ({' '.join(f'{at(name)},' for name in MATRIX)})"
+    weights = f"{at('correct0')}, {at('per_weight')}, {at('gamma')}, {tuple_of(map(at, MATRIX))}"
     return [
         *lines,
         "q, g, e, b = (q0, q1, q2, q3, q4), (g0, g1, g2, g3, g4), (e0, e1), (b0, b1)",
         f"new, slopes, spin, (num, den), power = solve(q, g, e, b, p, {weights})",
         "sound = (num > 0.0) & (den > 0.0)",
         "accepted = active & sound",
-    ]
-
-
-def store_lines(at: At, slot: int) -> list[str]:
-    """Lines that write the new point to `slot` of the history."""
-    return [
-        *(f"{at(name.format(slot))} = slopes[{i}]" for i, name in enumerate(SLOPES)),
-        *(f"{at(name.format(slot))} = new[{5 + i}]" for i, name in enumerate(SLIPS)),
-    ]
-
-
-def accept_lines(form: StiffForm, at: At) -> list[str]:
-    """Lines that write the new states if `accepted`, and the status of a failure if `active` but not `sound`."""
-    return [
         *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(form.model.states)),
         f"failure = {PARADOX} if den <= 0.0 else ({LIFT_OFF} if num <= 0.0 else {DIVERGED})",
         f"{at('status')} = failure if active & (not sound) else status",
+        *(f"{at(name.format(HISTORY))} = slopes[{i}]" for i, name in enumerate(SLOPES)),
+        *(f"{at(name.format(HISTORY))} = new[{5 + i}]" for i, name in enumerate(SLIPS)),
     ]

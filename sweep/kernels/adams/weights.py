@@ -84,27 +84,21 @@ def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
 
 
 def _inverse(nodes: tuple[int, ...]) -> list[list[F]]:
-    """Inverse of the matrix of the powers t_j^q, with a row per node."""
-    return _invert([[F(t) ** q for t in nodes] for q in range(len(nodes))])
+    """Inverse of the matrix of the powers t_j^q: a row per node, of the coefficients of its Lagrange polynomial."""
+    rows = []
+    for node in nodes:
+        row = [F(1)]
+        for other in nodes:
+            if other != node:  # times (t - other)/(node - other)
+                products = zip([F(0), *row], [*row, F(0)], strict=True)
+                row = [(raised - other * same) / (node - other) for raised, same in products]
+        rows.append(row)
+    return rows
 
 
 def _plain(inverse: list[list[F]]) -> list[F]:
     """The plain weights."""
     return [sum((x / (q + 1) for q, x in enumerate(row)), F(0)) for row in inverse]
-
-
-def _invert(matrix: list[list[F]]) -> list[list[F]]:
-    """Inverse by Gauss-Jordan elimination, with a choice of pivots, as these may vanish even for distinct nodes."""
-    n = len(matrix)
-    rows = [[*row, *(F(int(i == j)) for j in range(n))] for i, row in enumerate(matrix)]
-    for r in range(n):
-        pivot = next(i for i in range(r, n) if rows[i][r])
-        rows[r], rows[pivot] = rows[pivot], rows[r]
-        rows[r] = [x / rows[r][r] for x in rows[r]]
-        for i in range(n):
-            if i != r:
-                rows[i] = [x - rows[i][r] * y for x, y in zip(rows[i], rows[r], strict=True)]
-    return [row[n:] for row in rows]
 
 
 def _solve(A: Array) -> Array:

@@ -8,38 +8,32 @@ that is perfectly periodic.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import SPIN, Array
-from sweep.variables import Variable
 
 
-@dataclass(frozen=True)
 class Cycles(Measurement):
     name = "cycles"
     summary = "mean time between a reversal and the second after it, and how much these times vary"
     asks = SPIN
     needs = ("reversals",)
-    rows = ("cycle_newest", "cycle_before", "cycle_first", "cycle_sum", "cycle_squares")
+    quantities = ("cycle_newest", "cycle_before", "cycle_first", "cycle_sum", "cycle_squares")
 
     variables = {
-        "cycle_mean": Variable(
-            "float64", "1", "mean time from a spin reversal to the second after it, in sqrt(c/g)", of_sound_runs=True
-        ),
-        "cycle_variation": Variable(
-            "float64", "1", "standard deviation of the times from a reversal to the second after it, by their mean",
-            of_sound_runs=True,
+        "cycle_mean": measured("float64", "mean time from a spin reversal to the second after it, in sqrt(c/g)"),
+        "cycle_variation": measured(
+            "float64", "standard deviation of the times from a reversal to the second after it, by their mean"
         ),
     }  # fmt: skip
 
     def make_at_reversal(self, layout: Layout) -> Any:
-        NEWEST, BEFORE, FIRST, SUM, SQUARES = map(layout.at, self.rows)
+        NEWEST, BEFORE, FIRST, SUM, SQUARES = map(layout.at, self.quantities)
 
         @inline
         def at_reversal(group: Any, lane: int, reverses: Any, count: Any, crossing: Any) -> None:

@@ -6,34 +6,29 @@ dE/dt = -μ R |v_p|² holds exactly, so a violation is an error that a run measu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch
+from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.models.model import ENERGY, Array
-from sweep.variables import Variable
 
 
-@dataclass(frozen=True)
 class EnergyError(Measurement):
     name = "energy_error"
     summary = "largest violation of the energy balance: an error that a run measures by itself"
     asks = ENERGY
     by_default = True
     follows_work = True
-    rows = ("work", "violation")
+    quantities = ("work", "violation")
 
     variables = {
-        "energy_error": Variable(
+        "energy_error": measured(
             "float64",
-            "1",
             f"largest violation of the energy balance, looked at every {BLOCK} steps, "
             "relative to the start energy above rest",
-            of_sound_runs=True,
         )
     }
 
@@ -47,12 +42,10 @@ class EnergyError(Measurement):
         return step
 
     def make_look(self, layout: Layout) -> Any:
-        WORK, VIOLATION, START = map(layout.at, (*self.rows, "energy_start"))
+        WORK, VIOLATION, START = map(layout.at, (*self.quantities, "energy_start"))
 
         @inline
-        def look(
-            group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, inertia: Any, total: Any
-        ) -> None:
+        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
             violation = abs(total + group[WORK + lane] - group[START + lane])
             worst = group[VIOLATION + lane]
             group[VIOLATION + lane] = violation if violation > worst else worst

@@ -3,31 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import SPIN, Array, Columns, Model
-from sweep.variables import Variable
 
 
-@dataclass(frozen=True)
 class FirstReversal(Measurement):
     name = "first_reversal"
     summary = "time of the first reversal"
     asks = SPIN
     needs = ("reversals",)
-    rows = ("first_reversal",)
+    quantities = ("first_reversal",)
 
-    variables = {
-        "t_first_reversal": Variable(
-            "float64", "1", "time of the first spin reversal, in sqrt(c/g)", of_sound_runs=True
-        )
-    }
+    variables = {"t_first_reversal": measured("float64", "time of the first spin reversal, in sqrt(c/g)")}
 
     def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         return {"first_reversal": np.nan}

@@ -15,17 +15,15 @@ less, beside what the distance oscillates by.  See `docs/explanation/regimes.md`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, LANES, Layout, Table
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.tangent import GROWTH
 from sweep.models.model import SPIN, Array, Columns, Model
-from sweep.variables import Variable
 
 BINS = 32
 """Even; the exponent is the mean over 8 to 16 of them."""
@@ -34,7 +32,6 @@ _FEWEST = 8
 """Full bins below which there is no exponent: the trajectory has ended after fewer looks."""
 
 
-@dataclass(frozen=True)
 class Lyapunov(Measurement):
     name = "lyapunov"
     summary = "largest Lyapunov exponent, with its statistical error, at three times the cost; with dopri5 alone"
@@ -42,17 +39,14 @@ class Lyapunov(Measurement):
     follows_tangent = True
 
     variables = {
-        "lyapunov": Variable(
-            "float64", "1", "largest Lyapunov exponent over the later half of the trajectory, in 1/sqrt(c/g)",
-            of_sound_runs=True,
+        "lyapunov": measured(
+            "float64", "largest Lyapunov exponent over the later half of the trajectory, in 1/sqrt(c/g)"
         ),
-        "lyapunov_error": Variable(
-            "float64", "1", "standard error of the largest Lyapunov exponent, in 1/sqrt(c/g)", of_sound_runs=True
-        ),
+        "lyapunov_error": measured("float64", "standard error of the largest Lyapunov exponent, in 1/sqrt(c/g)"),
     }  # fmt: skip
 
     @property
-    def rows(self) -> tuple[str, ...]:
+    def quantities(self) -> tuple[str, ...]:
         return ("bin_width", "bin_looks", "bin_growth", "full_bins", *self._bins)
 
     @property
@@ -69,9 +63,7 @@ class Lyapunov(Measurement):
         lanes, bins, block = LANES, BINS, BLOCK
 
         @inline
-        def look(
-            group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, inertia: Any, total: Any
-        ) -> None:
+        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
             # A block that the end has cut short does not count.
             if running & (group[DONE + lane] % block == 0.0):
                 group[SUM + lane] += group[GREW + lane]

@@ -4,8 +4,8 @@ Subclass `Measurement` in a file of its own and enter the class in `MEASURES` of
 configuration, the kernels of all methods, the dataset and the plots then know it.  `first_reversal` is the shortest
 example.
 
-A measurement keeps its numbers in quantities of its own in each image, named by `rows`.  It fills and reads them in
-hooks, all of which are optional:
+A measurement keeps its numbers in quantities of its own in each image, named by `quantities`.  It fills and reads
+them in hooks, all of which are optional:
 
     start              once, when the images are made
     make_step          for one lane after every step
@@ -37,6 +37,14 @@ from typing import Any, ClassVar
 from sweep.kernels.layout import Layout, Table
 from sweep.models.model import Array, Columns, Model
 from sweep.variables import Variable
+
+
+def measured(dtype: str, long_name: str, flag: str = "", along: str | None = None) -> Variable:
+    """Describe a variable that a measurement adds to the dataset: it is undefined for a trajectory that failed.
+
+    `flag` names the value 1 of a variable that marks some cells; the value 0 is called "firm".
+    """
+    return Variable(dtype, "1", long_name, {0: "firm", 1: flag} if flag else None, along=along, of_sound_runs=True)
 
 
 @dataclass(frozen=True)
@@ -78,27 +86,27 @@ class Measurement:
     """Whether it uses how fast a tangent grows (`sweep.kernels.tangent`), which needs a method that
     `Method.follows_tangents`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
-    """The variables that it adds to the dataset, by name; `read` returns their values."""
+    """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
-    """Smallest and largest value of its setting, an integer, which is then the only field of the dataclass; None if
-    it has no setting."""
+    """Smallest and largest value of its setting, an integer, which is then the only field of the class, a dataclass;
+    None if it has no setting."""
 
     @property
-    def rows(self) -> tuple[str, ...]:
+    def quantities(self) -> tuple[str, ...]:
         """Names of the quantities that it adds to an image.  They start at zero, except those that `start` sets."""
         return ()
 
     @property
     def spec(self) -> str:
         """How it is asked for: its name, or "name=setting" if it has a setting."""
-        return self.name
+        return "=".join([self.name, *map(str, vars(self).values())])
 
     @property
     def in_kernel(self) -> bool:
         """Whether a kernel with it differs from one without: whether it has a quantity, or a hook in the loop."""
         hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_look")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
-        return bool(self.rows) or own or self.follows_work or self.follows_ripple or self.follows_tangent
+        return bool(self.quantities) or own or self.follows_work or self.follows_ripple or self.follows_tangent
 
     def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.
@@ -145,13 +153,13 @@ class Measurement:
         return None
 
     def make_look(self, layout: Layout) -> Any:
-        """Inline (group, lane, running, ended, spin, rattle, inertia, total) -> None, called at every look.
+        """Inline (group, lane, running, ended, spin, rattle, J, total) -> None, called at every look.
 
         running : whether the trajectory was running before the look
         ended : whether it has ended now
         spin : at the time of the look
         rattle : energy of the rattle
-        inertia : moment of inertia J of the spin
+        J : moment of inertia of the spin
         total : energy above rest, rattle + J spin²/2
         """
         return None

@@ -13,20 +13,17 @@ dopri5: of 35 that were flagged, 33 had a reversal whose time was off by more th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch
-from sweep.kernels.stability import growth_rates
+from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.models.ladder import friction, slip
 from sweep.models.model import MODES, Array, Columns, Model, stack
 from sweep.models.theory import linear
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
-from sweep.variables import Variable
 
 # Ratio of amplitudes below which a mode counts as round-off of the other.
 DEPTH = 1e-14
@@ -46,24 +43,21 @@ _BODY = ("a", "b", "c", "delta", *friction.PARAMETERS)
 _ZERO = 1e-300
 
 
-@dataclass(frozen=True)
 class NoiseLimited(Measurement):
     name = "noise_limited"
     summary = "whether round-off decides the times of late reversals"
     asks = MODES
     needs = ("reversals",)
     by_default = True
-    rows = (
+    quantities = (
         *_LOGS, *_DEPTHS, *_RATES, "tracked", "tracked_spin", "tracked_reversals", "noise_limited",
     )  # fmt: skip
 
     variables = {
-        "noise_limited": Variable(
+        "noise_limited": measured(
             "int8",
-            "1",
             "whether a mode of the rattle fell under the round-off of the other before it grew",
-            {0: "firm", 1: "noise_limited"},
-            of_sound_runs=True,
+            flag="noise_limited",
         )
     }
 
@@ -76,17 +70,15 @@ class NoiseLimited(Measurement):
     def make_look(self, layout: Layout) -> Any:
         """Follows the modes from one look to the next, as `Measurement.make_look`."""
         LOG0, LOG1, DEPTH0, DEPTH1 = map(layout.at, (*_LOGS, *_DEPTHS))
-        TRACKED, SPIN, COUNTED, FLAG = map(layout.at, self.rows[-4:])
+        TRACKED, SPIN, COUNTED, FLAG = map(layout.at, self.quantities[-4:])
         RATE0, RATE1, terms = layout.at("rate0_0"), layout.at("rate1_0"), len(_NODES)
         DONE, STEP, PERIOD, CLOSED, COUNT = map(layout.at, ("done", "step", "period", "closed_window", "reversals"))
         deep = float(np.log(DEPTH))
 
         @inline
-        def look(
-            group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, inertia: Any, total: Any
-        ) -> None:
+        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
             # The trajectory ends at this look, with a rattle that is large enough to count.
-            last = ended & (2.0 * rattle / inertia > SEEN * spin * spin)
+            last = ended & (2.0 * rattle / J > SEEN * spin * spin)
             closed, done, count = group[CLOSED + lane], group[DONE + lane], group[COUNT + lane]
             mean = closed / group[PERIOD + lane] if closed != 0.0 else spin
             n = 0.5 * (mean + group[SPIN + lane])
@@ -142,7 +134,7 @@ def growth_coefficients(columns: Columns) -> Array:
     reach = np.exp2(np.ceil(8 * np.log2(np.maximum(linear.fastest_spin(slip.MODEL, columns), 1e-6))) / 8)
     bodies, which = np.unique(stack((*(columns[name] for name in _BODY), reach)), axis=1, return_inverse=True)
     constants = slip.Constants.of(dict(zip(_BODY, bodies, strict=False)))
-    rates = np.stack([growth_rates(slip.MODEL, constants, node * bodies[-1]) for node in _NODES], axis=1)
+    rates = np.stack([linear.rocking_rates(slip.MODEL, constants, node * bodies[-1]) for node in _NODES], axis=1)
     # Not a matrix product: how BLAS rounds a column depends on how many other columns there are.
     fit = [sum(w * rates[:, j] for j, w in enumerate(row)) / bodies[-1] ** i for i, row in enumerate(_FIT)]
     return np.stack(fit, axis=1)[:, :, which.reshape(-1)]

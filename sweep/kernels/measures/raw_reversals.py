@@ -3,33 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch
+from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.models.model import COUNT, Array, Columns, Model
-from sweep.variables import Variable
 
 
-@dataclass(frozen=True)
 class RawReversals(Measurement):
     name = "raw_reversals"
     summary = "number of sign changes of the spin itself, which ripples with the rattle"
     asks = COUNT
-    rows = ("raw_reversals", "earlier_spin")
+    quantities = ("raw_reversals", "earlier_spin")
 
-    variables = {
-        "raw_reversals": Variable("int16", "1", "sign changes of the spin, ripple included", of_sound_runs=True)
-    }
+    variables = {"raw_reversals": measured("int16", "sign changes of the spin, ripple included")}
 
     def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         spin, _, _ = model.energy(model.start(columns), model.constants.of(columns))
         return {"earlier_spin": spin}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
-        COUNT, EARLIER = map(layout.at, self.rows)
+        COUNT, EARLIER = map(layout.at, self.quantities)
 
         @inline
         def step(group: Any, lane: int, accepted: Any, spin: Any, steady: Any, work: Any, h: Any, now: Any) -> None:

@@ -10,21 +10,18 @@ the spin back: of 55 such cells of `configs/mu.yaml` and `configs/b.yaml`, follo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from sweep.kernels.layout import Table
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.status import SETTLED
 from sweep.models.ladder import slip
 from sweep.models.model import MODES, Array, stack
 from sweep.models.stiff.final_spin import resting_spin
 from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum
-from sweep.variables import Variable
 
 
-@dataclass(frozen=True)
 class RestingSpin(Measurement):
     name = "resting_spin"
     summary = "spin at which a settled trajectory will stay"
@@ -32,13 +29,11 @@ class RestingSpin(Measurement):
     by_default = True
 
     variables = {
-        "spin_rest": Variable(
+        "spin_rest": measured(
             "float64",
-            "1",
             "spin when the rattle of a settled trajectory has decayed, in sqrt(g/c); missing without two rocking modes",
-            of_sound_runs=True,
         )
-    }  # fmt: skip
+    }
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
         result, settled = np.full(len(table.images), np.nan), table["status"] == SETTLED

@@ -14,9 +14,8 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import SPIN, Array, Columns, Model
-from sweep.variables import Variable
 
 LATEST = ("newest_reversal", "second_newest_reversal", "third_newest_reversal")
 """Of more than three reversals between two looks, which are windows apart, the earlier ones have no time."""
@@ -28,11 +27,7 @@ class ReversalTimes(Measurement):
     summary = "times of the first K reversals: {reversal_times: K}, by default K = 10"
     asks = SPIN
     needs = ("reversals",)
-    variables = {
-        "reversal_times": Variable(
-            "float64", "1", "time of each spin reversal, in sqrt(c/g)", along="reversal", of_sound_runs=True
-        )
-    }
+    variables = {"reversal_times": measured("float64", "time of each spin reversal, in sqrt(c/g)", along="reversal")}
     bounds = (1, 1000)
     count: int = 10
     """K, the number of reversals whose times are kept."""
@@ -43,12 +38,8 @@ class ReversalTimes(Measurement):
         return tuple(f"reversal_time{k}" for k in range(self.count))
 
     @property
-    def rows(self) -> tuple[str, ...]:
+    def quantities(self) -> tuple[str, ...]:
         return (*LATEST, "recorded", *self.times)
-
-    @property
-    def spec(self) -> str:
-        return f"{self.name}={self.count}"
 
     def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         return dict.fromkeys((*LATEST, *self.times), np.nan)
@@ -70,9 +61,7 @@ class ReversalTimes(Measurement):
         most, kept = self.count, len(LATEST)
 
         @inline
-        def look(
-            group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, inertia: Any, total: Any
-        ) -> None:
+        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
             count = int(group[COUNT + lane])
             for k in range(int(group[RECORDED + lane]), min(count, most)):
                 age = count - 1 - k

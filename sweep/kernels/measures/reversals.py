@@ -11,40 +11,36 @@ marked: it depends on where the windows begin.  Both kinds of window consist of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch
+from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.models.model import COUNT, Array, Columns, Model
-from sweep.variables import Variable
 
 
-@dataclass(frozen=True)
 class Reversals(Measurement):
     name = "reversals"
     summary = "number of spin reversals, the time of the last, and the spin averaged over the rattle"
     asks = COUNT
     by_default = True
     follows_ripple = True
-    rows = (
+    quantities = (
         "period", "phase", "half", "earlier_half", "shifted", "closed_window", "closed_shifted",
         "reversals", "reversals_shifted", "last_reversal",
     )  # fmt: skip
 
     variables = {
-        "reversals": Variable("int16", "1", "spin reversals of the simulated trajectory", of_sound_runs=True),
-        "t_last_reversal": Variable("float64", "1", "time of the last spin reversal, in sqrt(c/g)", of_sound_runs=True),
-        "spin_mean": Variable(
-            "float64", "1", "ripple-free spin averaged over the last full window before t_stop, in sqrt(g/c)",
-            of_sound_runs=True,
+        "reversals": measured("int16", "spin reversals of the simulated trajectory"),
+        "t_last_reversal": measured("float64", "time of the last spin reversal, in sqrt(c/g)"),
+        "spin_mean": measured(
+            "float64", "ripple-free spin averaged over the last full window before t_stop, in sqrt(g/c)"
         ),
-        "window_dependent": Variable(
-            "int8", "1", "whether windows that begin half a period later give another number of reversals",
-            {0: "firm", 1: "window_dependent"}, of_sound_runs=True,
+        "window_dependent": measured(
+            "int8", "whether windows that begin half a period later give another number of reversals",
+            flag="window_dependent",
         ),
     }  # fmt: skip
 
@@ -53,7 +49,7 @@ class Reversals(Measurement):
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
         PERIOD, PHASE, HALF, EARLIER, SHIFTED, CLOSED, CLOSED_SHIFTED, COUNT, COUNT_SHIFTED, LAST = map(
-            layout.at, self.rows
+            layout.at, self.quantities
         )
 
         @inline

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import COUNT
-from sweep.variables import Variable
 
 
 @dataclass(frozen=True)
@@ -23,17 +22,12 @@ class Sensitivity(Measurement):
     asks = COUNT
     needs = ("reversals",)
     variables = {
-        "reversals_low": Variable("int16", "1", "fewest spin reversals from starts 1e-10 apart", of_sound_runs=True),
-        "reversals_high": Variable("int16", "1", "most spin reversals from starts 1e-10 apart", of_sound_runs=True),
-        "sensitive": Variable(
-            "int8", "1", "whether starts 1e-10 apart differ in their number of reversals",
-            {0: "firm", 1: "sensitive"}, of_sound_runs=True,
+        "reversals_low": measured("int16", "fewest spin reversals from starts 1e-10 apart"),
+        "reversals_high": measured("int16", "most spin reversals from starts 1e-10 apart"),
+        "sensitive": measured(
+            "int8", "whether starts 1e-10 apart differ in their number of reversals", flag="sensitive"
         ),
     }  # fmt: skip
     bounds = (1, 100)
     count: int = 1
     """K, the number of runs beside the first."""
-
-    @property
-    def spec(self) -> str:
-        return f"{self.name}={self.count}"

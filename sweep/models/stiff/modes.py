@@ -41,7 +41,7 @@ class Rattle:
     """Rattles resolved into modes, the one of lower frequency first; arrays over the cells."""
 
     sound: Array
-    """Whether there are two rocking modes into which the rattle can be resolved, shape (cells,)."""
+    """True where there are two rocking modes into which the rattle can be resolved, shape (cells,)."""
     rates: Array
     """Eigenvalues λ with positive imaginary part, in sqrt(g/c), shape (cells, 2)."""
     modes: Array
@@ -156,18 +156,8 @@ def _rocking(constants: Constants, spin: Array) -> tuple[Array, Array, Array]:
     order = falling[:, 1::-1]
     rates = np.take_along_axis(rates, order, axis=1)
     modes = np.take_along_axis(modes, order[:, None, :], axis=2).astype(complex)
-    return rates, _to_momentum(constants, spin) @ modes, np.asarray(gone & (rates.imag > 0).all(axis=1))
-
-
-def _to_momentum(constants: Constants, spin: Array) -> Array:
-    """Jacobian of `momentum` with respect to the rattle, at upright spin, shape (cells, 6, 6)."""
-    upright = stack(slip.upright(spin)).astype(complex)
-    columns = []
-    for i in RATTLE:
-        shifted = upright.copy()
-        shifted[i] += 1e-30j
-        columns.append(stack(momentum(shifted, constants))[list(RATTLE)].imag / 1e-30)
-    return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
+    to_momentum = linear.derivative(lambda y: momentum(y, constants), stack(slip.upright(spin)), RATTLE)
+    return rates, to_momentum @ modes, np.asarray(gone & (rates.imag > 0).all(axis=1))
 
 
 def _turning(modes: Array, upright: Array, constants: Constants) -> Array:

@@ -5,6 +5,7 @@ At constant n it obeys a linear system.  At which spins it grows is in `sweep.mo
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,25 +14,38 @@ from sweep.models.model import Array, Columns, Model, stack
 
 
 def jacobian(model: Model, constants: Any, spin: Array) -> Array:
-    """Jacobian of the rattle at upright spin, shape (cells, m, m), where m is the number of states without the spin.
+    """Jacobian of the rattle at upright spin, shape (cells, m, m), where m is the number of states without the spin."""
+    rattle = [i for i in range(len(model.states)) if i != model.spin_state]
+    return derivative(lambda y: model.rhs(y, constants)[0], stack(model.upright(spin)), rattle)
 
-    Computed by complex steps of 1e-30: accurate to the last digit, because no difference is taken, and without
+
+def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, which: Sequence[int]) -> Array:
+    """Derivatives of the components `which` of a function by the same states, shape (cells, m, m).
+
+    They are computed by complex steps of 1e-30: accurate to the last digit, because no difference is taken, and without
     deriving the equations a second time.
     """
-    states = stack(model.upright(spin)).astype(complex)
-    rattle = [i for i in range(len(model.states)) if i != model.spin_state]
     columns = []
-    for i in rattle:
-        shifted = states.copy()
+    for i in which:
+        shifted = states.astype(complex)
         shifted[i] += 1e-30j
-        slopes, _ = model.rhs(shifted, constants)
-        columns.append(np.stack(np.broadcast_arrays(*slopes))[rattle].imag / 1e-30)
+        columns.append(stack(function(shifted))[list(which)].imag / 1e-30)
     return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
 
 
 def growth_rate(model: Model, constants: Any, spin: Array) -> Array:
     """Largest real part of the rattle's eigenvalues, in sqrt(g/c), shape (cells,): positive where the rattle grows."""
     return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)).real.max(axis=-1))
+
+
+def rocking_rates(model: Model, constants: Any, spin: Array) -> Array:
+    """Re λ of the two modes of highest frequency, the slower first, in sqrt(g/c), shape (2, cells).
+
+    In a model with slip these are the two rocking modes.
+    """
+    values = np.linalg.eigvals(jacobian(model, constants, spin))
+    order = np.argsort(-values.imag, axis=1)[:, 1::-1]
+    return np.take_along_axis(values.real, order, axis=1).T
 
 
 def fastest_motion(model: Model, columns: Columns) -> Array:

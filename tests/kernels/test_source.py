@@ -1,0 +1,73 @@
+"""A debugger stops in the equations, and the source of a kernel says what it is bound to."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from inspect import getsourcelines
+from typing import Any
+
+import numpy as np
+import pytest
+from support import ROOT
+
+import sweep
+from sweep.kernels import source
+from sweep.models.ladder import slip
+from sweep.models.stiff import slip as stiff_slip
+
+SCENE = {"body": {"b": 3.0}, "friction": {"mu": 60.0}, "start": {"n0": [0.05, -0.02]}, "verify": 0}
+
+DEBUGGED = """
+import bdb, json, sys
+import sweep
+
+class Debugger(bdb.Bdb):
+    def user_line(self, frame):
+        if self.break_here(frame):
+            way.clear()
+            caller = frame
+            while caller := caller.f_back:
+                way.append(caller.f_code.co_name)
+            if wanted in way:
+                self.clear_all_breaks()
+        self.set_continue()
+
+way, (scene, method, file, line, wanted) = [], json.loads(sys.argv[1])
+debugger = Debugger()
+debugger.set_break(file, line)
+found = debugger.runeval("sweep.run(scene, method=method, t_end=3)")
+print(json.dumps([way, *(found[name].values.tolist() for name in ("spin_final", "energy_error", "step"))]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("method", "function", "wanted"), [("dopri5", slip.rhs, "step"), ("adams", stiff_slip.slow, "run_block")]
+)
+def test_a_debugger_stops_in_the_equations(method: str, function: Callable[..., Any], wanted: str) -> None:
+    """Without compilation a run takes the same steps in plain Python, to numbers that are the same to rounding."""
+    file, head = function.__code__.co_filename, getsourcelines(function)[1] + 1
+    line = min(line for *_, line in function.__code__.co_lines() if line and line > head)
+    request = json.dumps([SCENE, method, file, line, wanted])
+    done = subprocess.run(
+        [sys.executable, "-c", DEBUGGED, request], cwd=ROOT, env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    way, spin, violation, step = json.loads(done.stdout)
+    assert wanted in way
+    compiled = sweep.run(SCENE, method=method, t_end=3)
+    np.testing.assert_array_equal(step, compiled.step)
+    np.testing.assert_allclose(spin, compiled.spin_final, rtol=1e-12)
+    np.testing.assert_allclose(violation, compiled.energy_error, rtol=1e-3)
+
+
+def test_the_printed_source_names_where_its_functions_are(capsys: pytest.CaptureFixture[str]) -> None:
+    source.main("dopri5", "slip", "reversals")
+    text = capsys.readouterr().out
+    step = text[text.index("# <sweep step") :]
+    assert step.splitlines()[1] == f"#   rhs: {slip.__file__}:{getsourcelines(slip.rhs)[1]}"
+    assert step.splitlines()[2:4] == ["def step(y, p, h):", "    k0, m0 = rhs(y, p)"]
+    assert "#   record: sweep.models.ladder.slip.Constants\ndef load(group, lane):\n" in text
