@@ -39,7 +39,7 @@ _waiting: list[tuple[Callable[..., Any], bool]] = []
 
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-"""Whether Numba is told not to compile: everything then runs in plain Python, on one thread, where a debugger stops."""
+"""True if Numba is told not to compile: everything then runs in plain Python, on one thread, where a debugger stops."""
 
 
 @cache
@@ -242,17 +242,17 @@ class Cached:
                     self._dispatcher.compile(tuple(map(load_numba().typeof, arguments)))
 
     def is_ready(self) -> bool:
-        """Whether there is machine code in memory, or none is needed."""
+        """Tell whether there is machine code in memory, or none is needed."""
         return INTERPRETED or bool(self._dispatcher.signatures)
 
     def is_compiled(self) -> bool:
-        """Whether the first call will find machine code, in memory or on disk."""
+        """Tell whether the first call will find machine code, in memory or on disk."""
         # To look it up on disk takes a millisecond.
         self._found |= self.is_ready() or (self._cache is not None and self._cache.holds())
         return self._found
 
     def is_missing(self) -> bool:
-        """Whether another process could compile it into the cache on disk, which lacks it."""
+        """Tell whether another process could compile it into the cache on disk, which lacks it."""
         return self._cache is not None and not self.is_compiled()
 
 

@@ -1,4 +1,4 @@
-"""What the kernels of all methods share: many trajectories advance side by side, each to its own end.
+"""Defines what the kernels of all methods share: many trajectories advance side by side, each to its own end.
 
 The whole state of a trajectory is its *image*, one row of a table: states, constants, step, progress and
 measurements.  `advance` takes a table and a list of unfinished cells, and advances each cell by a number of
@@ -22,8 +22,8 @@ from sweep.kernels.measures.measurement import Measurement
 from sweep.models.model import Array, Columns, Model, stack
 
 _DECIDED = ("halvings", "missed", "failed_at")
-"""What the engine finds out (`sweep.engine.repeats`): how often the step was halved because a longer one did not hold;
-whether even this one missed the tolerance; and the time of a failure, 0 if there is none."""
+"""Quantities that the engine finds out (`sweep.engine.repeats`): how often the step was halved because a longer one did
+not hold; whether even this one missed the tolerance; and the time of a failure, 0 if there is none."""
 
 _BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", *_DECIDED, *STABLE)
 
@@ -75,12 +75,12 @@ class Kernel:
 
     @property
     def follows_work(self) -> bool:
-        """Whether a measurement needs the work of friction in each step."""
+        """True if a measurement needs the work of friction in each step."""
         return any(each.follows_work for each in self.measurements)
 
     @property
     def follows_ripple(self) -> bool:
-        """Whether a measurement needs the ripple-free spin."""
+        """True if a measurement needs the ripple-free spin."""
         return any(each.follows_ripple for each in self.measurements)
 
     def _make_watch(self) -> Any:
@@ -205,7 +205,7 @@ class Kernel:
         return np.asarray(table["done"] * t_end / table["goal"])
 
     def is_compiled(self) -> bool:
-        """Whether the first call of `advance` will find machine code, in memory or on disk."""
+        """Tell whether the first call of `advance` will find machine code, in memory or on disk."""
         return self.advancing.is_compiled()
 
     def compile(self) -> None:

@@ -1,4 +1,4 @@
-"""Where the quantities of a trajectory are kept: in the table of images, and in the group of lanes of a thread.
+"""Says where the quantities of a trajectory are kept: in the table of images, and in the group of lanes of a thread.
 
 In the table an image is a row, so that a quantity is a column.  A group is transposed: there a quantity is a row, with
 one value per lane.

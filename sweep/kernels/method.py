@@ -1,4 +1,4 @@
-"""What an integration method is, and how to add one.
+"""Defines what an integration method is, and tells how to add one.
 
 An explicit Runge-Kutta method is a record in `sweep.kernels.tableau`.  Any other is a `Method` record and a subclass of
 `sweep.kernels.kernel.Kernel`, in a file of its own, like `runge_kutta`; enter the record in `METHODS` of
@@ -37,8 +37,8 @@ TOLERANCE = 1e-8
 
 FIXED, ACCURACY, STABILITY, REPEAT, MISSED = range(5)
 STEP_RULES = {FIXED: "fixed", ACCURACY: "accuracy", STABILITY: "stability", REPEAT: "repeat", MISSED: "missed"}
-"""What determined a step: the configuration, the tolerance, the stability limit of the method, that a longer one failed
-or missed the tolerance, or that no shorter one was tried although this one missed the tolerance too."""
+"""Names of what determined a step: the configuration, the tolerance, the stability limit of the method, that a longer
+one failed or missed the tolerance, or that no shorter one was tried although this one missed the tolerance too."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Method:
     name: str
     """As in the configuration."""
     code: int
-    """What stands for it in datasets; never to be changed."""
+    """The number that stands for it in datasets; it must never change."""
     summary: str
     """One line for the documentation."""
     kernel: Callable[[Model, Sequence[Measurement], float], Kernel]
@@ -59,20 +59,20 @@ class Method:
     stable_step: Callable[[Model, Columns], Array] | None = None
     """(model, columns) -> the longest stable step, shape (cells,), in sqrt(c/g); None if no limit is near."""
     step_words: str = ""
-    """What limits an automatic step in addition to the tolerance, in words, for the provenance; "" if nothing does."""
+    """The words for what limits an automatic step beside the tolerance, for the provenance; "" if nothing does."""
     runs: Callable[[Model], bool] = lambda model: True  # noqa: ARG005
-    """Whether it can integrate a model; by default it can integrate all."""
+    """(model) -> whether it can integrate this; by default it can integrate all."""
     step_cost: float = 1.0
     """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""
     start_up_cost: float = 0.0
     """Time of the start-up of one trajectory, in steps of this method."""
     balance: float = 1.0
-    """How many times as large as the error in spin the error of its energy balance tends to be, both as
+    """The factor by which the error of its energy balance tends to exceed that in spin, both as
     `sweep.engine.repeats` compares them."""
     foresight: float = 0.0
     """Number of steps ahead of the time limit from which on it may decide by what is left.  A trajectory that has
     ended before does not depend on the limit."""
     stops_anywhere: bool = False
-    """Whether a run may stop after any step and go on from there towards another goal."""
+    """A run may stop after any step and go on from there towards another goal."""
     follows_tangents: bool = False
-    """Whether it can carry a tangent along each trajectory (`sweep.kernels.tangent`)."""
+    """It can carry a tangent along each trajectory (`sweep.kernels.tangent`)."""

@@ -26,7 +26,7 @@ _ROUNDS = 60
 
 
 def has_fast_slip(model: Model) -> bool:
-    """Whether the compiled theory applies to a model."""
+    """Tell whether the compiled search applies to a model."""
     return MODES in model.offers
 
 

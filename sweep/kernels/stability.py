@@ -1,4 +1,4 @@
-"""The spins at which upright spin is stable, as in `theory.stability`: a compiled search for models with slip.
+"""Finds the spins at which upright spin is stable, as `theory.stability` does, by a compiled search, for slip.
 
 A rattle decays where the coefficients of its polynomial (`sweep.kernels.quartic`) fulfil the conditions of Routh and
 Hurwitz,
@@ -111,7 +111,7 @@ def _narrow(powers: Any, near: float, far: float, at_near: float, at_far: float,
 
 @called
 def _may_touch(x: Any, y: Any, which: int) -> Any:
-    """Whether a parabola through three values of a function, of the same sign, comes near zero between them."""
+    """Tell whether a parabola through three values of a function, all of one sign, comes near zero between them."""
     first = (y[1, which] - y[0, which]) / (x[1] - x[0])
     second = (y[2, which] - y[1, which]) / (x[2] - x[1])
     bend = (second - first) / (x[2] - x[0])

@@ -30,7 +30,7 @@ class Tableau:
     name: str
     """As in the configuration."""
     code: int
-    """What stands for it in datasets."""
+    """The number that stands for it in datasets; it must never change."""
     summary: str
     """One line for the documentation."""
     order: int

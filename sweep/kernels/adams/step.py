@@ -96,7 +96,7 @@ def constants(form: StiffForm) -> tuple[str, ...]:
 
 
 def names(form: StiffForm) -> dict[str, Any]:
-    """What the generated lines refer to."""
+    """Name what the generated lines refer to."""
     return {"solve": make_solve(form), "Constants": form.model.constants}
 
 

@@ -73,10 +73,10 @@ _RATTLE = tuple(STIFF_MODEL.states[i] for i in RATTLE)
 
 @dataclass(frozen=True)
 class Leap:
-    """What to do with each cell; arrays of shape (cells,) unless stated otherwise."""
+    """Says what to do with each cell; arrays of shape (cells,) unless stated otherwise."""
 
     now: Array
-    """Whether it leaps now."""
+    """True where it leaps now."""
     steps: Array
     """Length of the leap, in steps."""
     lifts: Array
@@ -105,7 +105,7 @@ def first_look(columns: Columns, reach: Array, time: Array, steps: Array, tolera
 
 
 def _brief(rate: Array, share: Array, lowest: Array | float, time: Array, steps: Array) -> Array:
-    """Whether the run left is too short for looks: for a leap to be worthwhile, and for a mode to sink and come back.
+    """Tell whether the run left is too short for looks: for a leap to pay, and for a mode to sink and come back.
 
     To sink is meant as in `_sinks`.  `rate` is the fastest rate of the modes, `lowest` the logarithm of the size of the
     smaller one; `share` is a logarithm too.
@@ -210,7 +210,7 @@ class _Modes(NamedTuple):
 
 
 def _sinks(true: _Modes, low: Array, largest: Array, share: Array, stirred: Array) -> Array:
-    """Whether the decaying mode, of size `low` after a leap, sinks to where round-off would make up a `share` of it.
+    """Tell whether the decaying mode, of size `low` after a leap, sinks to where round-off makes up a `share` of it.
 
     It does not count as sinking if what the other mode excites in it (`stirred`) comes near its lowest size: that would
     be lowered with it.  All arguments except `true` are logarithms.

@@ -1,4 +1,4 @@
-"""What can be measured on a trajectory, one file per measurement."""
+"""Lists what can be measured on a trajectory; each measurement has a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a measurement is, and how to add one.
+"""Defines what a measurement is, and tells how to add one.
 
 Subclass `Measurement` in a file of its own and enter the class in `MEASURES` of `sweep.kernels.measures`.  The
 configuration, the kernels of all methods, the dataset and the plots then know it.  `first_reversal` is the shortest
@@ -70,20 +70,20 @@ class Measurement:
     name: ClassVar[str]
     """As in the configuration."""
     summary: ClassVar[str]
-    """What it is, in one line for the documentation."""
+    """One line for the documentation."""
     asks: ClassVar[str]
     """What a model has to offer for it: `COUNT`, `SPIN`, `ENERGY`, `MODES` or `FORMULAS` of `sweep.models.model`."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Names of the measurements that it builds upon; a configuration has to ask for them too.  A measurement that
     implements `make_at_reversal` needs "reversals"."""
     by_default: ClassVar[bool] = False
-    """Whether it is made if the configuration names no measurement, provided that the model supports it."""
+    """It is made if the configuration names no measurement, provided that the model supports it."""
     follows_work: ClassVar[bool] = False
-    """Whether it uses the work of friction in each step, which some methods compute only on request."""
+    """It uses the work of friction in each step, which some methods compute only on request."""
     follows_ripple: ClassVar[bool] = False
-    """Whether it uses the ripple-free spin in each step."""
+    """It uses the ripple-free spin in each step."""
     follows_tangent: ClassVar[bool] = False
-    """Whether it uses how fast a tangent grows (`sweep.kernels.tangent`), which needs a method that
+    """It uses how fast a tangent grows (`sweep.kernels.tangent`), which needs a method that
     `Method.follows_tangents`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
@@ -98,12 +98,12 @@ class Measurement:
 
     @property
     def spec(self) -> str:
-        """How it is asked for: its name, or "name=setting" if it has a setting."""
+        """The words by which it is asked for: its name, or "name=setting" if it has a setting."""
         return "=".join([self.name, *map(str, vars(self).values())])
 
     @property
     def in_kernel(self) -> bool:
-        """Whether a kernel with it differs from one without: whether it has a quantity, or a hook in the loop."""
+        """True if a kernel with it differs from one without: it has a quantity, or a hook in the loop."""
         hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_look")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
         return bool(self.quantities) or own or self.follows_work or self.follows_ripple or self.follows_tangent

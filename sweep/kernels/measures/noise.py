@@ -1,4 +1,4 @@
-"""Whether a mode of the rattle fell below the round-off of the other mode before it grew again.
+"""Marks cells in which a mode of the rattle fell below the round-off of the other before it grew again.
 
 A mode that has decayed to 1e-16 of the other is filled in by round-off.  When it grows again it grows from noise, and
 the reversal that it causes comes too early.  From one look to the next, the logarithm of each mode's amplitude is

@@ -1,4 +1,4 @@
-"""How far a count can be trusted: each cell is run again from a start that differs by 1e-10, in steps of other length.
+"""Tells how far a count can be trusted: a cell is run again from a start 1e-10 apart, in steps of other length.
 
 Where the motion is chaotic, or a spin comes close to a critical one, differences of this size decide how often the spin
 reverses, and no integration knows the count.  The second run costs as much as the first.  Following the linearised flow

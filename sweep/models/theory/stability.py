@@ -1,4 +1,4 @@
-"""At which spins upright spin is stable, in a model itself: all of them at once, by eigenvalues.
+"""Finds at which spins upright spin is stable, in a model itself: all of them at once, by eigenvalues.
 
 At constant spin n a small rattle z obeys z' = J(n) z, and J is a quadratic polynomial in n, as rigid bodies have
 gyroscopic terms linear in their spin and centrifugal ones quadratic in it.  Where the rattle begins or ceases to grow,
@@ -78,7 +78,7 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
 
 
 def _is_steady(model: Model, constants: Any, spin: Array) -> Array:
-    """Whether no rattle arises from upright `spin` by itself, shape (cells,)."""
+    """Tell whether no rattle arises from upright `spin` by itself, shape (cells,)."""
     slopes, _ = model.rhs(tuple(stack(model.upright(spin))), constants)
     arising = np.abs(np.delete(stack(slopes), model.spin_state, axis=0)).max(axis=0)
     return np.asarray(arising <= 1e-12 * spin**2)
