@@ -63,14 +63,6 @@ def test_measuring_does_not_alter_the_motion() -> None:
     assert not {"work", "half", "ripple.K11"} & set(bare.layout.names)
 
 
-@pytest.mark.parametrize(("mu", "count", "last"), [(60, 3, 2379.9), (75, 3, 1590.4), (100, 5, 7348.7)])
-def test_reversals_and_their_last_time(mu: float, count: int, last: float) -> None:
-    # Takano (2011), Fig. mu601000 (a); times from design/model.md.
-    table = run(DOPRI, 1 / mu, 9000.0, settle=True, mu=mu)
-    assert of(table, "reversals")[0] == count
-    assert of(table, "last_reversal")[0] == pytest.approx(last, abs=2)
-
-
 def test_windows_are_averages_of_the_ripple_free_spin() -> None:
     """Count, time and mean against the same definition applied to a finely sampled trajectory."""
     t_end, body = 800.0, columns(mu=75.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from support import newton
 import sweep
 from sweep.config import load_config
 from sweep.grid import Grid
-from sweep.models.model import stack
+from sweep.models.model import Model, stack
 
 BODY = "{a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}"
 UNIT = np.sqrt(9.81 / 0.02)
@@ -45,17 +46,28 @@ def run(folder: Path, text: str, **settings: object) -> xr.Dataset:
     return sweep.run(load_config(file, settings))
 
 
-def test_slipping_and_its_energy_against_an_independent_integrator(tmp_path: Path) -> None:
-    result = run(tmp_path, SLIPPING).stack(cell=("mu", "omega3"))
-    config = load_config(tmp_path / "scene.yaml")
-    columns, model = Grid.of(config).columns(), config.equations
-    assert model.name == "slip+coulomb-tanh+sigma"
-    start = stack(model.start(columns))
-    for i in range(4):
-        parameters = {name: float(values[i]) for name, values in columns.items()}
-        end = newton.follow(start[:, i], parameters, "coulomb-tanh", np.array([0, float(result["t_stop"][i])]))[:, -1]
+def against_newton(
+    folder: Path, result: xr.Dataset, cells: Iterable[int], law: str = "viscous", atol: float = 1e-9, **more: str
+) -> tuple[Model, dict[str, np.ndarray], np.ndarray]:
+    """Compare the spins of some cells with those of an independent derivation and integrator.
+
+    Returns the model, the parameters and the start of the scene.
+    """
+    config = load_config(folder / "scene.yaml")
+    columns, model = dict(Grid.of(config).columns()), config.equations
+    start, result = stack(model.start(columns)), result.stack(cell=result["spin_final"].dims)
+    for i in cells:
+        parameters = {name: float(values[i]) for name, values in columns.items()} | more
+        end = newton.follow(start[:, i], parameters, law, np.array([0, float(result["t_stop"][i])]))[:, -1]
         spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
-        assert float(result["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)
+        assert float(result["spin_final"][i]) == pytest.approx(spin, abs=atol * UNIT)
+    return model, columns, start
+
+
+def test_slipping_and_its_energy_against_an_independent_integrator(tmp_path: Path) -> None:
+    result = run(tmp_path, SLIPPING)
+    model, *_ = against_newton(tmp_path, result, range(4), "coulomb-tanh")
+    assert model.name == "slip+coulomb-tanh+sigma"
     assert float(result["energy_error"].max()) < 1e-7
 
 
@@ -159,13 +171,7 @@ def test_the_stiff_method_takes_any_body_with_viscous_friction(tmp_path: Path) -
     text = text.replace("step: auto", "stop_when_settled: false").replace("slip1: 0.05, slip2: -0.1", "slip1: 0.01")
     text += "measure: [reversals, energy_error]\n"
     stiff = run(tmp_path, text, method="adams")
-    config = load_config(tmp_path / "scene.yaml")
-    columns, model = Grid.of(config).columns(), config.equations
-    start = stack(model.start(columns))[:, 0]
-    parameters = {name: float(values[0]) for name, values in columns.items()}
-    end = newton.follow(start, parameters, "viscous", np.array([0, float(stiff["t_stop"][0, 0])]))[:, -1]
-    spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
-    assert float(stiff["spin_final"][0, 0]) == pytest.approx(spin, abs=1e-8 * UNIT)
+    against_newton(tmp_path, stiff, [0], atol=1e-8)
     plain = run(tmp_path, text, method="dopri5")
     np.testing.assert_allclose(stiff["spin_final"], plain["spin_final"], rtol=0, atol=1e-8 * UNIT)
     np.testing.assert_array_equal(stiff["reversals"], plain["reversals"])
@@ -188,19 +194,11 @@ integrator: {{t_end: 1}}
 def test_spinning_friction_stops_the_spin(tmp_path: Path) -> None:
     """Upright, dry friction takes the same spin in every second; a body that rattles does what Newton and Euler say."""
     short, long = run(tmp_path, SPINNING), run(tmp_path, SPINNING, t_end=60.0)
-    config = load_config(tmp_path / "scene.yaml")
-    columns, model = Grid.of(config).columns(), config.equations
+    model, *_ = against_newton(tmp_path, short, (6, 7))
     assert model.name == "slip+viscous+spinning"
     fall = 0.2 * 2e-3 * 9.81 / 1.7e-3
     upright = {"roll": 0.0, "pitch": 0.0}
     assert float(short["spin_final"].sel(omega3=-5, **upright)) == pytest.approx(5 - fall, abs=1e-10)
-    rattling = short.stack(cell=("roll", "pitch", "omega3"))
-    start = stack(model.start(columns))
-    for i in (6, 7):
-        parameters = {name: float(values[i]) for name, values in columns.items()}
-        end = newton.follow(start[:, i], parameters, "viscous", np.array([0, 1.0]))[:, -1]
-        spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
-        assert float(rattling["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)
     assert float(long["energy_error"].max()) < 1e-7
     # It comes to rest, and the run ends then: it could only creep on.
     assert (long["status"] == 1).all()
@@ -219,18 +217,13 @@ friction: {{mu: 20, sigma: 1.0e-4}}
 start: {{n0: [-5, 5], x0: 0.04, y0: [0.004, 0.02]}}
 integrator: {{t_end: 1, method: dopri5}}
 """
-    result = run(tmp_path, text).stack(cell=("n0", "y0"))
-    config = load_config(tmp_path / "scene.yaml")
-    columns, model = Grid.of(config).columns(), config.equations
+    result = run(tmp_path, text)
+    model, columns, start = against_newton(tmp_path, result, range(4), surface="paraboloid")
     assert model.name == "slip+viscous+sigma+paraboloid"
     assert result.attrs["surface"] == "paraboloid"
     assert "paraboloid" in result["a"].attrs["long_name"]
-    start = stack(model.start(columns))
     for i in range(4):
         parameters = {name: float(values[i]) for name, values in columns.items()} | {"surface": "paraboloid"}
         u = np.array([*start[:2, i], -np.sqrt(1 - start[0, i] ** 2 - start[1, i] ** 2)])
         assert newton.contact(u, parameters)[:2] == pytest.approx([parameters["x0"], parameters["y0"]], rel=1e-12)
-        end = newton.follow(start[:, i], parameters, "viscous", np.array([0, 1.0]))[:, -1]
-        spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
-        assert float(result["spin_final"][i]) == pytest.approx(spin, abs=1e-9 * UNIT)
     assert float(result["energy_error"].max()) < 1e-7
