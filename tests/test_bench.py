@@ -208,7 +208,7 @@ Bug = Callable[[Ends], None]
 
 def put(name: str, value: float, add: bool = False) -> Bug:
     def bug(ends: Ends) -> None:
-        row = ends.kernel.row(name)
+        row = ends.kernel.layout.index(name)
         ends.images[:, row] = add * ends.images[:, row] + value
 
     return bug

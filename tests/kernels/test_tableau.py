@@ -61,7 +61,7 @@ tableau.TABLEAUS += (tableau.Tableau(
     real_stability=2.7853, phase=0.3, layer_error=0.1, balance=14.0),)
 
 import sweep
-from sweep.bench.timing import COLOURS, MARKERS
+from sweep.bench.section import colour, marker
 from sweep.kernels.methods import METHODS
 from sweep.results.dataset import VARIABLES
 
@@ -73,7 +73,8 @@ print(json.dumps({
     "errors": [abs(spin(method="rk4", step=step) - exact) for step in (0.8, 0.4, 0.2)],
     "automatic": abs(spin(method="rk4", tolerance=1e-8) - exact),
     "codes": VARIABLES["method"].flags,
-    "known": [[*names] for names in (MARKERS, COLOURS, METHODS)],
+    "drawn": [colour("rk4"), marker("rk4")],
+    "known": [*METHODS],
 }))
 """
 
@@ -85,7 +86,8 @@ def test_another_method_is_one_record() -> None:
     assert np.diff(np.log2(found["errors"])) == pytest.approx(-4, abs=0.1)
     assert found["automatic"] < 1e-8
     assert found["codes"] == {"0": "dopri5", "1": "adams", "2": "rk4"}
-    assert all("rk4" in names for names in found["known"])
+    assert "rk4" in found["known"]
+    assert all(found["drawn"])
 
 
 def test_the_codes_of_methods_are_those_of_old_datasets() -> None:
