@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sweep.jit import inline
 from sweep.models.model import Array, Columns, Model, Ripple
 
 STATES = ("u1", "u2", "M1", "M2", "M3", "v1", "v2")
@@ -85,6 +86,40 @@ class StiffForm:
     def velocities(self, y: Array, p: Any) -> Array:
         """The states of `full` from these, shape (7, cells): the inverse of `momentum`."""
         return _velocities(self.slow, y, p)
+
+
+@inline
+def newton_step(
+    u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, alpha: Any, T: Any, k: Any, g: Any, gamma: Any, b1: Any, b2: Any
+) -> Any:  # fmt: skip
+    """`StiffForm.newton` for ω' = α without contact force, T = 1 - [x_p] J⁻¹ [x_p], a resistance k, and gravity g.
+
+    The Jacobian is that of R G, with dR/dv included.  The gyroscopic terms of v_p' are left out of it, because they
+    are not stiff.  Everything is multiplied by den², so that R itself is never computed.
+    """
+    u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3 = geometry
+    (al1, al2, al3), (T11, T12, T13, T22, T23, T33) = alpha, T
+    f1, f2, f3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
+    G1, G2, G3 = T11 * f1 + T12 * f2 + T13 * f3, T12 * f1 + T22 * f2 + T23 * f3, T13 * f1 + T23 * f2 + T33 * f3
+    den = u1 * G1 + u2 * G2 + u3 * G3
+    num = g + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)
+    e1, e2, e3 = s1 + v1, s2 + v2, s3 + v3
+    rest1 = g * u1 + (y * al3 - z * al2) + (w2 * e3 - w3 * e2)
+    rest2 = g * u2 + (z * al1 - x * al3) + (w3 * e1 - w1 * e3)
+
+    # With v3 = -(t1 v1 + t2 v2): dG_i/dv_j = -k S_ij and d den/dv_j = -k e_j.
+    S11, S12 = T11 - T13 * t1, T12 - T13 * t2
+    S21, S22 = T12 - T23 * t1, T22 - T23 * t2
+    S31, S32 = T13 - T33 * t1, T23 - T33 * t2
+    e1, e2 = u1 * S11 + u2 * S21 + u3 * S31, u1 * S12 + u2 * S22 + u3 * S32
+    gn = gamma * num
+    k, dd = gn * k, den * den
+    m11, m12 = dd + k * (den * S11 - G1 * e1), k * (den * S12 - G1 * e2)
+    m21, m22 = k * (den * S21 - G2 * e1), dd + k * (den * S22 - G2 * e2)
+    r1 = den * (den * ((b1 - v1) - gamma * rest1) + gn * G1)
+    r2 = den * (den * ((b2 - v2) - gamma * rest2) + gn * G2)
+    d = 1.0 / (m11 * m22 - m12 * m21)
+    return v1 + d * (m22 * r1 - m12 * r2), v2 + d * (m11 * r2 - m21 * r1), num, den
 
 
 def subset(constants: type[Any], p: Any) -> Any:

@@ -28,7 +28,7 @@ from sweep.models.general.resistance import resistances
 from sweep.models.general.rigid_body import gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.model import Array, Columns, Model, Ripple, named
-from sweep.models.stiff.form import Geometry, StiffForm, in_momentum
+from sweep.models.stiff.form import Geometry, StiffForm, in_momentum, newton_step
 
 ROCKING = ("B11", "B12", "B21", "B22", "C12", "C21")
 """Elements of B and C in u' = B M, M' = C u: rocking about upright rest without slip.  C has no others."""
@@ -95,7 +95,7 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
 
     @inline
     def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
-        u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3 = geometry
+        w1, w2, w3, v3 = geometry.w1, geometry.w2, geometry.w3, geometry.v3
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         k0 = couple(w1 * w1 + w2 * w2 + w3 * w3, p)
         if damps:
@@ -103,30 +103,9 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
         al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
         al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
-        (T11, T12, T13), (T21, T22, T23), (T31, T32, T33) = _compliance(x, y, z, p)
+        T = _compliance(geometry.x, geometry.y, geometry.z, p)
         k = resistance(v1 * v1 + v2 * v2 + v3 * v3, p)
-        f1, f2, f3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
-        G1, G2 = T11 * f1 + T12 * f2 + T13 * f3, T21 * f1 + T22 * f2 + T23 * f3
-        G3 = T31 * f1 + T32 * f2 + T33 * f3
-        den = u1 * G1 + u2 * G2 + u3 * G3
-        num = p.g + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)
-        e1, e2, e3 = s1 + v1, s2 + v2, s3 + v3
-        rest1 = p.g * u1 + (y * al3 - z * al2) + (w2 * e3 - w3 * e2)
-        rest2 = p.g * u2 + (z * al1 - x * al3) + (w3 * e1 - w1 * e3)
-
-        # With v3 = -(t1 v1 + t2 v2): dG_i/dv_j = -k S_ij and d den/dv_j = -k e_j.
-        S11, S12 = T11 - T13 * t1, T12 - T13 * t2
-        S21, S22 = T21 - T23 * t1, T22 - T23 * t2
-        S31, S32 = T31 - T33 * t1, T32 - T33 * t2
-        e1, e2 = u1 * S11 + u2 * S21 + u3 * S31, u1 * S12 + u2 * S22 + u3 * S32
-        gn = gamma * num
-        k, dd = gn * k, den * den
-        m11, m12 = dd + k * (den * S11 - G1 * e1), k * (den * S12 - G1 * e2)
-        m21, m22 = k * (den * S21 - G2 * e1), dd + k * (den * S22 - G2 * e2)
-        r1 = den * (den * ((b1 - v1) - gamma * rest1) + gn * G1)
-        r2 = den * (den * ((b2 - v2) - gamma * rest2) + gn * G2)
-        d = 1.0 / (m11 * m22 - m12 * m21)
-        return v1 + d * (m22 * r1 - m12 * r2), v2 + d * (m11 * r2 - m21 * r1), num, den
+        return newton_step(u1, u2, v1, v2, geometry, (al1, al2, al3), T, k, p.g, gamma, b1, b2)
 
     @inline
     def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
@@ -178,7 +157,7 @@ def _turn(K1: Any, K2: Any, K3: Any, x: Any, y: Any, z: Any, p: Any) -> Any:
 
 @inline
 def _compliance(x: Any, y: Any, z: Any, p: Any) -> Any:
-    """T = 1 - [x_p] J⁻¹ [x_p], row by row: the acceleration of the contact point by a force on it."""
+    """T11, T12, T13, T22, T23, T33 of T = 1 - [x_p] J⁻¹ [x_p]: how a force accelerates the contact point."""
     i11, i22, i33, i12, i13, i23 = p.inv_J11, p.inv_J22, p.inv_J33, p.inv_J12, p.inv_J13, p.inv_J23
     # N = J⁻¹ [x_p], with [x_p] = ((0, -z, y), (z, 0, -x), (-y, x, 0))
     N12, N13 = i13 * x - i11 * z, i11 * y - i12 * x
@@ -187,7 +166,7 @@ def _compliance(x: Any, y: Any, z: Any, p: Any) -> Any:
     T11, T12, T13 = 1.0 + z * N21 - y * N31, z * N22 - y * N32, z * N23 - y * N33
     T22, T23 = 1.0 + x * N32 - z * N12, x * N33 - z * N13
     T33 = 1.0 + y * N13 - x * N23
-    return (T11, T12, T13), (T12, T22, T23), (T13, T23, T33)
+    return T11, T12, T13, T22, T23, T33
 
 
 def _rocking(columns: Columns, surface: Surface) -> tuple[Array, ...]:

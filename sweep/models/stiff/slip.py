@@ -27,7 +27,7 @@ from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.ladder import friction, slip
 from sweep.models.model import Array, Columns, Ripple, named, zeros
-from sweep.models.stiff.form import Geometry, StiffForm, in_momentum
+from sweep.models.stiff.form import Geometry, StiffForm, in_momentum, newton_step
 from sweep.models.theory.ripple import FORM, form, ripple
 from sweep.models.theory.rocking import frequencies, rocking
 
@@ -99,41 +99,13 @@ def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) 
 
 @inline
 def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
-    """One Newton step, starting from v, for the equation v = b + γ v_p'(v).
-
-    The Jacobian is that of R G, with dR/dv included.  The gyroscopic terms of v_p' are left out of it, because they
-    are not stiff.  Everything is multiplied by den², so that R itself is never computed.  Returns the new v1 and v2,
-    and num and den of R at the old v.
-    """
-    u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3 = geometry
+    x, y, z, w1, w2, w3 = geometry.x, geometry.y, geometry.z, geometry.w1, geometry.w2, geometry.w3
     i1, i2, i3 = p.inv_I1, p.inv_I2, p.inv_I3
-    al1, al2, al3 = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
-    # `friction.contact_force` and its derivative, written out: called as functions they change the last bits.
-    mu = p.mu
-    g1, g2, g3 = u1 - mu * v1, u2 - mu * v2, u3 - mu * v3
+    alpha = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
     xx, yy, zz = x * x, y * y, z * z
     T11, T22, T33 = 1.0 + zz * i2 + yy * i3, 1.0 + zz * i1 + xx * i3, 1.0 + yy * i1 + xx * i2
     T12, T13, T23 = -(x * i3) * y, -(z * i2) * x, -(y * z) * i1
-    G1, G2, G3 = T11 * g1 + T12 * g2 + T13 * g3, T12 * g1 + T22 * g2 + T23 * g3, T13 * g1 + T23 * g2 + T33 * g3
-    den = u1 * G1 + u2 * G2 + u3 * G3
-    num = 1.0 + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)
-    e1, e2, e3 = s1 + v1, s2 + v2, s3 + v3
-    rest1 = u1 + (y * al3 - z * al2) + (w2 * e3 - w3 * e2)
-    rest2 = u2 + (z * al1 - x * al3) + (w3 * e1 - w1 * e3)
-
-    # With v3 = -(u1 v1 + u2 v2)/u3: dG_i/dv_j = -μ S_ij and d den/dv_j = -μ e_j.
-    S11, S12 = T11 - T13 * t1, T12 - T13 * t2
-    S21, S22 = T12 - T23 * t1, T22 - T23 * t2
-    S31, S32 = T13 - T33 * t1, T23 - T33 * t2
-    e1, e2 = u1 * S11 + u2 * S21 + u3 * S31, u1 * S12 + u2 * S22 + u3 * S32
-    gn = gamma * num
-    k, dd = gn * mu, den * den
-    m11, m12 = dd + k * (den * S11 - G1 * e1), k * (den * S12 - G1 * e2)
-    m21, m22 = k * (den * S21 - G2 * e1), dd + k * (den * S22 - G2 * e2)
-    r1 = den * (den * ((b1 - v1) - gamma * rest1) + gn * G1)
-    r2 = den * (den * ((b2 - v2) - gamma * rest2) + gn * G2)
-    d = 1.0 / (m11 * m22 - m12 * m21)
-    return v1 + d * (m22 * r1 - m12 * r2), v2 + d * (m11 * r2 - m21 * r1), num, den
+    return newton_step(u1, u2, v1, v2, geometry, alpha, (T11, T12, T13, T22, T23, T33), p.mu, 1.0, gamma, b1, b2)
 
 
 @inline
