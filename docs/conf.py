@@ -21,6 +21,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx_click",
+    "console",
     "docstrings",
     "rooms",
     "tables",
@@ -52,6 +53,6 @@ html_title = "sweep"
 html_static_path = ["_static"]
 html_show_copyright = False
 html_copy_source = False
-mathjax_path = "mathjax/tex-svg.js"
+mathjax_path = "mathjax/tex-svg-full.js"
 # Accessibility and menus would load further files, which are not here.
 mathjax3_config = {"options": {"enableMenu": False}}

@@ -1,0 +1,62 @@
+"""Commands and what they print: ```{console} runs its lines that begin with `$ ` while the pages are built.
+
+The commands of a page run one after the other, in a folder of its own that holds the repository's `configs`.  Bars of
+progress are left out.
+"""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+_CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+class Console(SphinxDirective):
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        lines = list[str]()
+        for line in self.content:
+            command = line.removeprefix("$ ")
+            lines += [line, *self._output(command)]
+        text = "\n".join(lines)
+        block = nodes.literal_block(text, text, language="console")
+        self.set_source_info(block)
+        return [block]
+
+    def _output(self, command: str) -> list[str]:
+        words = shlex.split(command, comments=True)
+        if words[:3] != ["python", "-m", "sweep"]:
+            raise self.error(f"{command}: only commands of sweep are run; write ```console without braces")
+        done = subprocess.run(
+            [sys.executable, *words[1:]],
+            cwd=self._folder(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        if done.returncode:
+            raise self.error(f"{command}:\n{done.stdout}")
+        return [line for line in done.stdout.splitlines() if "━" not in line]
+
+    def _folder(self) -> Path:
+        """The page's own folder, which the next build begins anew."""
+        folder = Path(self.env.doctreedir) / "console" / self.env.docname
+        if self.env.current_document.get("console") is None:
+            shutil.rmtree(folder, ignore_errors=True)
+            shutil.copytree(_CONFIGS, folder / "configs")
+            self.env.current_document["console"] = folder
+        return folder
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.add_directive("console", Console)
+    return {"parallel_read_safe": True}

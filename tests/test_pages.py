@@ -1,0 +1,73 @@
+"""The documentation as a reader meets it: built, and every page opened in chromium.
+
+python -m pytest -m browser -n0 tests/test_pages.py
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from support import ROOT
+
+if TYPE_CHECKING:
+    from playwright.sync_api import BrowserContext
+
+pytestmark = pytest.mark.browser
+
+BUILD = ROOT / "build" / "docs"
+
+# Typesetting is over, or its fault.
+TYPESET = "window.MathJax?.startup?.promise.then(() => null, String)"
+
+
+@pytest.fixture(scope="module")
+def pages() -> list[Path]:
+    """Every page, built by the command of the README; what has not changed since the last build is not made again."""
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", "docs", "build/docs"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return sorted(BUILD.rglob("*.html"))
+
+
+@pytest.fixture(scope="module")
+def offline() -> Iterator[BrowserContext]:
+    """A browser without a network."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+        context = browser.new_context(offline=True)
+        yield context
+        browser.close()
+
+
+def faults(offline: BrowserContext, path: Path) -> list[str]:
+    """What goes wrong when a page is opened, and formulas that are not typeset."""
+    said = list[str]()
+    page = offline.new_page()
+    page.on("console", lambda message: message.type in ("error", "warning") and said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("requestfailed", lambda request: said.append(f"not found: {request.url}"))
+    page.on("request", lambda request: request.url.startswith("http") and said.append(f"not here: {request.url}"))
+    page.goto(path.as_uri())
+    if fault := page.evaluate(TYPESET):
+        said.append(fault)
+    written = path.read_text(encoding="utf-8").count('class="math ')
+    typeset = page.locator("mjx-container:visible").count()
+    if typeset != written:
+        said.append(f"{typeset} of {written} formulas are typeset")
+    if wrong := page.locator("mjx-container:has([data-mjx-error], [data-mml-node=merror])").count():
+        said.append(f"{wrong} formulas are wrong")
+    page.close()
+    return said
+
+
+def test_every_page_opens_with_all_its_formulas_and_without_a_network(
+    pages: list[Path], offline: BrowserContext
+) -> None:
+    assert not {path.relative_to(BUILD): found for path in pages if (found := faults(offline, path))}
