@@ -177,6 +177,7 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
 
     Parameters
     ----------
+    path : of the netCDF file
     load : read it into memory and close the file.  If False, values are read when they are asked for, and the file
         stays open until the dataset is closed
 
