@@ -13,15 +13,10 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from hypothesis import given
-from hypothesis import strategies as st
-from pydantic import ValidationError
 from support.runs import same_numbers
 
 import sweep
-from sweep.config import ConfigError, load_config, schema, values
-from sweep.config.document import plain_data
-from sweep.parameters import PARAMETERS, SECTIONS
+from sweep.config import ConfigError, load_config
 
 Write = Callable[..., Path]
 
@@ -120,14 +115,6 @@ def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name(mu: Any, said: str) 
 def test_a_cell_has_no_parameter_that_its_model_lacks() -> None:
     with pytest.raises(ConfigError, match=r"^mu: no parameter of the noslip model; allowed: a, b"):
         sweep.trajectory({"model": "noslip"}, mu=60)
-
-
-def test_faults_come_in_the_order_of_lines(write: Write) -> None:
-    text = "colour: red\nintegrator: {t_end: -1}\nstart: {n0: x}\nmeasure: [spin]\nfriction: {nu: 3}\nbody: {a: 0}\n"
-    with pytest.raises(ConfigError) as refusal:
-        load_config(write(text))
-    assert [fault.line for fault in refusal.value.faults] == [1, 2, 3, 4, 5, 6]
-    assert [int(line.split(":")[1]) for line in str(refusal.value).splitlines()] == [1, 2, 3, 4, 5, 6]
 
 
 def test_overrides_of_a_config_act_as_on_its_file(write: Write) -> None:
@@ -263,48 +250,3 @@ def test_variables_of_the_same_cells_are_merged_without_loss() -> None:
     merged = xr.merge([counts, energy, sweep.predict(SAID)])
     same_numbers(merged[list(energy.variables)], energy)
     assert merged.reversals.dtype == np.int16
-
-
-NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([10**400, 1, 2.0, 1e3, 60, -1, 1e13, 1e-15]))
-WORDS = st.one_of(st.text(max_size=5), st.sampled_from(["auto", "slip", "adams", "reversals", "a/b", "\ud800"]))
-LEAF = st.one_of(NUMBERS, WORDS, st.none(), st.booleans(), st.binary(max_size=2))
-FIELDS = {model: tuple(model.model_fields) for model in (schema.Schema, schema.Integrator, values.Range)}
-KEY = st.sampled_from((*PARAMETERS, "nu", *(key for keys in FIELDS.values() for key in keys)))
-VALUE = st.recursive(
-    LEAF,
-    lambda inner: st.one_of(
-        st.lists(inner, max_size=3),
-        st.dictionaries(KEY, inner, max_size=3),
-        st.fixed_dictionaries({"start": inner, "stop": inner, "num": inner}),
-    ),
-    max_leaves=6,
-)
-SECTIONS = {
-    "integrator": FIELDS[schema.Integrator],
-    **{section: [p.name for p in PARAMETERS.values() if p.section == section] for section in SECTIONS},
-}
-DOCUMENT = st.one_of(
-    st.dictionaries(KEY, VALUE, max_size=3),
-    st.fixed_dictionaries(
-        {},
-        optional={key: VALUE for key in FIELDS[schema.Schema] if key not in ("cases", *SECTIONS)}
-        | {name: st.fixed_dictionaries({}, optional=dict.fromkeys(keys, VALUE)) for name, keys in SECTIONS.items()},
-    ),
-)
-
-
-@given(DOCUMENT)
-def test_no_library_speaks_in_a_refusal(said: dict[str, Any]) -> None:
-    """Whatever the values, a message never has pydantic's text, and no other error comes."""
-    said.pop("cases", None)
-    try:
-        load_config(said)
-    except ConfigError as refusal:
-        spoken = str(refusal)
-    else:
-        return
-    try:
-        schema.Schema.model_validate(plain_data(said))
-    except ValidationError as error:
-        theirs = [e["msg"] for e in error.errors() if e["type"] != "value"]
-        assert [text for text in theirs if text.lower() in spoken.lower()] == []

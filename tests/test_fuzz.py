@@ -21,18 +21,17 @@ from hypothesis import strategies as st
 from sweep import ConfigError, load_config
 from sweep.cli import main
 from sweep.config import document
-from sweep.results.checkpoint import Checkpoint
 
 Write = Callable[..., Path]
 
 # Inputs of each kind: what a few seconds allow.
 EXAMPLES = {
-    "yaml_tree": 600, "yaml_bytes": 600, "setting": 1000, "value": 200, "at": 2000, "table": 600,
-    "identity": 400, "archive": 200, "dry_run": 30, "foreign": 15, "damaged": 80,
+    "yaml_tree": 600, "yaml_bytes": 600, "setting": 1000, "value": 200, "mapping": 400, "at": 2000, "table": 600,
+    "identity": 400, "archive": 200, "dry_run": 30, "foreign": 15,
 }  # fmt: skip
 
 
-SLOW = {"dry_run", "foreign", "damaged"}
+SLOW = {"dry_run", "foreign"}
 """Kinds whose failing inputs are reported unshrunk: shrinking them takes minutes."""
 
 
@@ -88,12 +87,6 @@ def test_any_file_name_gives_a_valid_name(stem: str, write: Write) -> None:
     assert load_config(write("friction: {mu: 60}\n", f"{stem}.yaml")).name
 
 
-@pytest.mark.parametrize("tag", ["!!str", "!!int", "!!float", "!", "!!timestamp", "!<tag:yaml.org,2002:str>"])
-def test_standard_yaml_tags_are_refused(tag: str, write: Write) -> None:
-    with pytest.raises(ConfigError, match="a YAML tag or anchor"):
-        load_config(write(f"friction: {{mu: {tag} 60}}\n"))
-
-
 def test_no_code_in_a_file_is_executed(write: Write, tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     for call in (f"!!python/object/apply:os.mkdir [{mark}]", f"!!python/object/new:os.mkdir [{mark}]"):
@@ -102,12 +95,6 @@ def test_no_code_in_a_file_is_executed(write: Write, tmp_path: Path) -> None:
         with pytest.raises(ConfigError, match="a YAML tag or anchor"):
             document.parse_value(call, "--set x")
     assert not mark.exists()
-
-
-def test_nested_yaml_aliases_are_refused(write: Write) -> None:
-    text = "l0: &l0 [ha]\n" + "".join(f"l{i}: &l{i} [{', '.join([f'*l{i - 1}'] * 9)}]\n" for i in range(1, 30))
-    with pytest.raises(ConfigError, match="a YAML tag or anchor"):
-        load_config(write(text))
 
 
 def test_messages_contain_no_control_characters(write: Write, tmp_path: Path) -> None:
@@ -122,26 +109,6 @@ def test_axes_keep_their_order_in_a_round_trip(write: Write) -> None:
     config = load_config(write("start: {x0: [0, 0.01]}\nbody: {delta: [0.01, 0.02]}\nfriction: {mu: 60}\n"))
     again = load_config(write(config.to_yaml(), "again.yaml"))
     assert (list(again.axes), again.fingerprint()) == (["x0", "delta"], config.fingerprint())
-
-
-@pytest.mark.parametrize("measure", ["[[reversals]]", "[{a: 1}]", "[1, 1]", "{a: 1}"])
-def test_measure_must_be_a_list_of_names(measure: str, write: Write) -> None:
-    with pytest.raises(ConfigError, match="measure"):
-        load_config(write(f"measure: {measure}\nfriction: {{mu: 60}}\n"))
-
-
-@pytest.mark.parametrize(
-    "odd",
-    [{"tiles": np.array([], np.int64)}, {"tiles": np.array(1)}, {"tiles": np.array([0, 0])}, {"tiles": np.array(["x"])},
-     {"seconds": np.ones(2)}, {"seconds": np.array("x")}, {"dopri5": np.array([["x"]])}],
-)  # fmt: skip
-def test_invalid_images_are_not_resumed(odd: dict[str, np.ndarray], tmp_path: Path) -> None:
-    arrays = {"tiles": np.arange(2), "seconds": np.array(1.5), "dopri5": np.zeros((3, 4))}
-    checkpoint = Checkpoint(tmp_path / "x.checkpoint", fuzzing.IDENTITY, lambda _: None)
-    checkpoint._write(checkpoint.folder / "running.npz", arrays)
-    assert checkpoint.load_running() is not None
-    checkpoint._write(checkpoint.folder / "running.npz", arrays | odd)
-    assert checkpoint.load_running() is None
 
 
 def test_the_number_of_trajectories_is_limited(write: Write) -> None:

@@ -51,7 +51,7 @@ def _faults_of_header(file: str, header: list[str], known: Mapping[str, Paramete
         if name not in known:
             words = f"unknown parameter{suggestion(name, known)}; the parameters are {names}"
             yield Fault(file, 1, column, (name,), words)
-        elif name in header[: column - 1]:
+        elif header.index(name) < column - 1:
             yield Fault(file, 1, column, (name,), "a second column of this name; remove one of the two")
 
 

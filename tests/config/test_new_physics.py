@@ -1,4 +1,4 @@
-"""A new surface or law of friction is its record alone: configuration, dataset, labels and equations know it by that."""
+"""A new surface or law of friction is its record alone: what the configuration and labels know stands there."""
 
 from __future__ import annotations
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import warnings
 from collections.abc import Callable
 from dataclasses import asdict
@@ -24,12 +23,12 @@ import numpy as np
 import xarray as xr
 from click.testing import CliRunner
 
-import sweep
 from sweep.cli import main
 from sweep.cli.faults import of_option
 from sweep.cli.options import cells_of, loaded
 from sweep.config import ConfigError, load_config
 from sweep.config.document import parse_value
+from sweep.config.schema import PATHS
 from sweep.parameters import PARAMETERS
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.identity import Identity
@@ -138,6 +137,22 @@ def value(random: Random, folder: Path) -> bool:  # noqa: ARG001
     if found:
         json.dumps(found)  # plain data, whatever was written
     return bool(found)
+
+
+LEAVES = (
+    None, True, 60, -1, 10**400, 1e13, 1e-400, float("nan"), 1j, b"x", "", "slip", "a/b", "\ud800", [], {}, (), [[1]],
+    np.ones((2, 2)), np.float32(3), Path("x"), range(3), {"start": 1, "stop": 2, "num": 3}, {"start": "x", "num": None},
+    {"reversals": 3}, object, {1: {2: 3}}, [1, "x", None], ["reversals", {"reversal_times": 0}],
+)  # fmt: skip
+
+
+def mapping(random: Random, folder: Path) -> bool:  # noqa: ARG001
+    """Values from Python, as a mapping and as overrides."""
+    said: dict[str, Any] = {"friction": {"mu": 60}}
+    if random.random() < 0.5:
+        said |= {random.choice(("body", "start", "model", "verify", "mu", "a b")): random.choice(LEAVES)}
+    given = {random.choice(sorted(PATHS.keys() - {"cases"})): random.choice(LEAVES) for _ in range(random.randrange(3))}
+    return _refused(lambda: load_config(said, given), "") is not None
 
 
 @cache
@@ -273,76 +288,6 @@ def archive(random: Random, folder: Path) -> bool:
     return accepted
 
 
-@cache
-def _datasets(folder: Path) -> tuple[bytes, ...]:
-    """Datasets of ours as bytes: curves and maps of the analytic model, which takes no time."""
-    file = folder / "base.yaml"
-    parts = ({"n0": [0.02, 0.05]}, {"mu": list(range(1, 8)), "b": [2, 3, 4, 5, 6]})
-    found = []
-    for number, overrides in enumerate(parts):
-        dataset = sweep.run(file, folder / f"run{number}", model="analytic", **overrides)
-        dataset.close()
-        found.append((folder / f"run{number}" / "base.nc").read_bytes())
-    return tuple(found)
-
-
-def _in_child(work: Callable[[], bool], seconds: int = 60) -> bool:
-    """Run `work` in a child process: the HDF5 library may crash on damaged files, which we cannot mend."""
-    reading, writing = os.pipe()
-    child = os.fork()
-    if not child:
-        code = 2
-        try:
-            signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends even a wait inside a C library
-            signal.alarm(seconds)
-            code = 0 if work() else 1
-        except BaseException as error:
-            os.write(writing, repr(error).encode()[:4000])
-        finally:
-            os._exit(code)
-    os.close(writing)
-    with os.fdopen(reading, "rb") as stream:
-        said = stream.read().decode()
-    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if code < 0 and -code in (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE):
-        CRASHES.append(-code)
-        return False
-    if code not in (0, 1):
-        raise Violation(said or f"ended by signal {-code}")
-    return code == 0
-
-
-CRASHES: list[int] = []
-"""Signals that ended a child: crashes inside the HDF5 library."""
-
-
-def _read(random: Random, file: Path, folder: Path) -> bool:
-    """`info` on a file, and now and then `plot`."""
-    target = folder / "picture.png"
-    variable = random.choice((None, None, "status", "mu", "spin_final", "form_factor", "nothing", "../x", ""))
-    plot = ["plot", str(file), "--output", str(target), *(("--var", variable) if variable is not None else ())]
-    verbs = [["info", str(file)], *([plot] if random.random() < 0.15 else [])]
-
-    def work() -> bool:
-        results = [_invoke(folder, *arguments) for arguments in verbs]
-        return all(results)
-
-    return _in_child(work)
-
-
-def damaged(random: Random, folder: Path) -> bool:
-    """A dataset of ours with some bytes changed."""
-    file = folder / "damaged.nc"
-    data = bytearray(random.choice(_datasets(folder)))
-    for _ in range(random.choice((1, 2, 8, 32))):
-        place = random.randrange(random.choice((512, len(data))))
-        data[place : place + 1] = random.choice((bytes([random.randrange(256)]), b"\xff", b"\0"))
-    if random.random() < 0.1:
-        del data[random.randrange(len(data)) :]
-    file.write_bytes(data)
-    return _read(random, file, folder)
-
-
 def foreign(random: Random, folder: Path) -> bool:
     """A dataset of another program, whose variables may have the same names as ours."""
     names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step", "verified_cell",
@@ -369,17 +314,22 @@ def foreign(random: Random, folder: Path) -> bool:
         if kind.startswith("float") and random.random() < 0.3:
             filled = np.full(shape, random.choice((np.nan, np.inf)), kind)
         variables[name] = (over, filled, {} if kind.startswith("M") else attributes())
-    file = folder / "foreign.nc"
+    file = folder / f"foreign{random.randrange(1 << 30)}.nc"  # the one before may be open still
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             xr.Dataset(variables, attrs=attributes()).to_netcdf(file, engine="netcdf4")
         except (ValueError, TypeError):  # xarray itself does not write this one
             return False
-    return _read(random, file, folder)
+    shown = _invoke(folder, "info", str(file))
+    if random.random() < 0.15:
+        variable = random.choice((None, "status", "mu", "spin_final", "form_factor", "nothing", "../x", ""))
+        named = () if variable is None else ("--var", variable)
+        shown &= _invoke(folder, "plot", str(file), "--output", str(folder / "picture.png"), *named)
+    return shown
 
 
 KINDS: dict[str, Callable[[Random, Path], bool]] = {
     kind.__name__: kind
-    for kind in (yaml_tree, yaml_bytes, setting, value, at, table, dry_run, identity, archive, foreign, damaged)
+    for kind in (yaml_tree, yaml_bytes, setting, value, mapping, at, table, dry_run, identity, archive, foreign)
 }
