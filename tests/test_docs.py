@@ -1,14 +1,17 @@
-"""What README and docs show works: commands, Python, configurations, links and paths.
+"""What README and docs show works: commands, Python, configurations, links, paths and names; and what they say is so.
 
 Fenced blocks are run as they stand, page by page from top to bottom, in a folder with the configurations of
 `configs/` on coarser grids: ```console (lines that begin with `$ `), ```python and ```{code-cell}; every ```yaml
 must be a configuration; a ```{code-block} with a caption is a file.  A block that must not be run has a comment above
 it that says why: <!-- not run: takes minutes -->.  With <!-- campaign: takes a minute --> it is run among the
 campaigns alone.
+
+What a page shows as output is made when the pages are built, by ```{code-cell} and ```{console}.
 """
 
 from __future__ import annotations
 
+import pkgutil
 import re
 import shlex
 import shutil
@@ -24,6 +27,7 @@ import pytest
 from click.testing import CliRunner
 from ruamel.yaml import YAML
 from support import ROOT
+from support.pictures import difference
 
 import sweep
 from sweep.cli import main
@@ -41,7 +45,9 @@ _FENCE = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 _LINK = re.compile(r"!?\[[^\]]*\]\((?P<target>[^)\s]+)\)")
-_PATH = re.compile(r"`(?P<path>(?:\.ci|configs|docs|scripts|sweep|tests)/[\w./*-]*)`")
+_PATH = re.compile(r"`(?P<path>(?:\.ci|configs|data|docs|scripts|sweep|tests)/[\w./*-]*)`")
+_ROLE = re.compile(r"\{py:\w+\}`~?(?P<name>[\w.]+)`")
+_NAME = re.compile(r"`(?P<name>sweep(?:\.[A-Za-z_]\w*)+)(?:\(\))?`")
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,7 @@ def commands(block: Block) -> list[str]:
 
 
 def _runs(page: Path, *when: str) -> list[Block]:
-    kinds = ("console", "python", "{code-cell}", "yaml", "{code-block}")
+    kinds = ("console", "{console}", "python", "{code-cell}", "yaml", "{code-block}")
     return [block for block in blocks(page) if block.kind in kinds and block.when in when]
 
 
@@ -120,7 +126,7 @@ def _check_configuration(block: Block, folder: Path) -> None:
 def _run_page(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch, *when: str) -> None:
     names: dict[str, Any] = {}
     for block in _runs(page, *when):
-        if block.kind == "console":
+        if block.kind in ("console", "{console}"):
             for command in commands(block):
                 _run_command(block, command)
         elif block.kind == "yaml":
@@ -131,7 +137,8 @@ def _run_page(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch, *when
         else:
             # Sphinx runs a notebook in its own folder.
             monkeypatch.chdir(checkout / "docs" / "tutorial" if block.kind == "{code-cell}" else checkout)
-            exec(compile(block.text, str(block), "exec"), names)
+            code = re.sub(r"\A(:\w.*\n)+", "", block.text)
+            exec(compile(code, str(block), "exec"), names)
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if _runs(page, "")], ids=_name)
@@ -145,18 +152,41 @@ def test_what_a_page_shows_runs_though_slow(page: Path, checkout: Path, monkeypa
     _run_page(page, checkout, monkeypatch, "", "campaign")
 
 
-def test_console_blocks_hold_commands() -> None:
-    empty = [str(b) for page in PAGES for b in blocks(page) if b.kind == "console" and not commands(b)]
-    assert not empty
+def test_console_blocks_hold_commands_and_no_output() -> None:
+    """Output is shown by ```{console}, whose commands are run when the pages are built."""
+    wrong = [
+        str(block)
+        for page in PAGES
+        for block in blocks(page)
+        if block.kind in ("console", "{console}") and not all(line[:2] == "$ " for line in block.text.splitlines())
+    ]
+    assert not wrong
 
 
-@pytest.mark.parametrize("page", PAGES, ids=_name)
-def test_links_and_paths_lead_somewhere(page: Path) -> None:
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "data" / "README.md"], ids=_name)
+def test_links_paths_and_names_lead_somewhere(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     targets = [m["target"].split("#")[0] for m in _LINK.finditer(text) if "://" not in m["target"]]
     lost = [target for target in targets if target and not (page.parent / target).exists()]
     lost += [m["path"] for m in _PATH.finditer(text) if not list(ROOT.glob(m["path"].rstrip("/")))]
+    lost += [m["name"] for pattern in (_ROLE, _NAME) for m in pattern.finditer(text) if not _exists(m["name"])]
     assert not lost
+
+
+def _exists(name: str) -> bool:
+    """Whether a module, or a public name of one, can be imported."""
+    try:
+        pkgutil.resolve_name(name)
+    except (ImportError, AttributeError):
+        return False
+    return True
+
+
+def test_pages_that_the_code_cites_exist() -> None:
+    cited = re.compile(r"\b(?:docs|data|scripts)/[\w/-]+\.(?:md|csv|py|png)\b|\w*design/\w+\.md")
+    sources = [path for folder in ("sweep", "tests", "scripts") for path in (ROOT / folder).rglob("*.py")]
+    found = {match for path in sources for match in cited.findall(path.read_text(encoding="utf-8"))}
+    assert not {path for path in found if not (ROOT / path).exists() and not (ROOT / "sweep/bench" / path).exists()}
 
 
 def test_the_readme_has_the_two_commands() -> None:
@@ -167,8 +197,39 @@ def test_the_readme_has_the_two_commands() -> None:
     assert f"{start}'.[test]' && .venv/bin/python -m pytest\n" in text
 
 
-def test_the_figures_in_the_notebook_are_those_of_its_text() -> None:
-    """`docs/tutorial/finding.md` says 8 to 23 %."""
+@pytest.mark.parametrize(("name", "words"), [("mu_b", "the {} trajectories"), ("quick", "# {} trajectories")])
+def test_the_readme_says_how_large_a_sweep_is(name: str, words: str) -> None:
+    cells = sweep.predict(ROOT / "configs" / f"{name}.yaml").reversals_predicted.size
+    assert words.format(cells) in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", ["data/README.md", "docs/explanation/accuracy.md"])
+def test_tables_of_reference_have_as_many_cells_as_is_said(page: str) -> None:
+    rows = re.compile(r"^\|[^\n]*?(reference\w+\.csv)`[^\n]*?(\d+) (?:random )?cells", re.MULTILINE)
+    said = rows.findall((ROOT / page).read_text(encoding="utf-8"))
+    assert said
+    for name, cells in said:
+        table = next(path for path in (ROOT / "data" / name, ROOT / "sweep" / "bench" / "data" / name) if path.exists())
+        columns = np.genfromtxt(table, delimiter=",", names=True, dtype=None, encoding="utf-8")
+        given = [n for n in ("model", "a", "b", "c", "delta", "mu", "n0", "x0", "y0") if n in columns.dtype.names]
+        assert len({str(row) for row in columns[given]}) == int(cells), name
+
+
+def test_every_configuration_stands_in_the_reference() -> None:
+    page = (ROOT / "docs" / "reference" / "configuration.md").read_text(encoding="utf-8")
+    assert not [path.name for path in (ROOT / "configs").glob("*.yaml") if f"`configs/{path.name}`" not in page]
+
+
+def test_the_finding_says_how_far_the_formula_is_off() -> None:
+    said = re.search(r"(\d+) to (\d+) %", (ROOT / "docs/tutorial/finding.md").read_text(encoding="utf-8"))
+    assert said
     line = sweep.predict(ROOT / "configs" / "mu.yaml")
     ratios = np.concatenate([line[f"{n}_linear"] / line[n] for n in ("n_c1_plus", "n_c1_minus")])
-    assert (round(100 * (ratios.min() - 1)), round(100 * (ratios.max() - 1))) == (8, 23)
+    assert [int(number) for number in said.groups()] == [round(100 * (r - 1)) for r in (ratios.min(), ratios.max())]
+
+
+@pytest.mark.campaign
+def test_the_picture_of_the_readme_is_what_the_program_draws(tmp_path: Path) -> None:
+    """To renew it: `sweep.plot(sweep.run("configs/mu_b.yaml", n0=0.05), output="docs/_static/map.png")`."""
+    sweep.plot(sweep.run(ROOT / "configs" / "mu_b.yaml", n0=0.05), output=tmp_path / "map.png")
+    assert difference(tmp_path / "map.png", ROOT / "docs" / "_static" / "map.png") < 0.01
