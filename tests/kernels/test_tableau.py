@@ -66,12 +66,14 @@ from sweep.kernels.methods import METHODS
 from sweep.results.dataset import VARIABLES
 
 scene = {"model": "averaged", "friction": {"mu": 20}, "start": {"n0": 0.1}, "measure": []}
-def spin(**settings):
-    return float(sweep.run(scene, t_end=400, stop_when_settled=False, **settings).spin_final)
-exact = spin(method="dopri5", step=0.02)
+def run(**settings):
+    found = sweep.run(scene, t_end=400, stop_when_settled=False, **settings)
+    return float(found.spin_final), float(found.step)
+exact, _ = run(method="dopri5", step=0.02)
 print(json.dumps({
-    "errors": [abs(spin(method="rk4", step=step) - exact) for step in (0.8, 0.4, 0.2)],
-    "automatic": abs(spin(method="rk4", tolerance=1e-8) - exact),
+    "errors": [abs(run(method="rk4", step=step)[0] - exact) for step in (0.8, 0.4, 0.2)],
+    "automatic": [run(method="rk4", tolerance=tolerance) for tolerance in (1e-6, 1e-10)],
+    "exact": exact,
     "codes": VARIABLES["method"].flags,
     "drawn": [colour("rk4"), marker("rk4")],
     "known": [*METHODS],
@@ -84,7 +86,10 @@ def test_another_method_is_one_record() -> None:
     done = subprocess.run([sys.executable, "-c", ANOTHER], cwd=ROOT, capture_output=True, text=True, check=True)
     found = json.loads(done.stdout)
     assert np.diff(np.log2(found["errors"])) == pytest.approx(-4, abs=0.1)
-    assert found["automatic"] < 1e-8
+    (loose, long), (tight, short) = found["automatic"]
+    assert abs(loose - found["exact"]) < 1e-6
+    assert abs(tight - found["exact"]) < 1e-10
+    assert long / short == pytest.approx(10, rel=0.02)  # the fourth root of the ratio of the tolerances
     assert found["codes"] == {"0": "dopri5", "1": "adams", "2": "rk4"}
     assert "rk4" in found["known"]
     assert all(found["drawn"])
