@@ -48,48 +48,37 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
     @inline
     def rhs(y: Any, p: Any) -> Any:
         u1, u2, w1, w2, w3, v1, v2 = y
-        (u3, inv_u3), (x, y_, z), (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
-
+        (u3, inv_u3), (x, y_, z), du, dx = contact(u1, u2, w1, w2, w3, p)
         v3 = -(v1 * u1 + v2 * u2) * inv_u3
         slip_square = v1 * v1 + v2 * v2 + v3 * v3
         k = resistance(slip_square, w1, w2, w3, u1, u2, u3, p)
         # f = u - k v, the contact force per unit of R
         f1, f2, f3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
-        # s = v_0 - x_p'
-        s1, s2, s3 = y_ * w3 - z * w2 - dx, z * w1 - x * w3 - dy, x * w2 - y_ * w1 - dz
-        q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
         turn_square = w1 * w1 + w2 * w2 + w3 * w3
         k0, k1 = plain(turn_square, p), loaded(turn_square, p)
         k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, slip_square, p)
         m1, m2, m3 = gyroscopic(w1, w2, w3, p)
         if damps:
             m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
-        al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
-        al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
-        al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
         t1, t2, t3 = y_ * f3 - z * f2, z * f1 - x * f3, x * f2 - y_ * f1
         if drags:
             t1, t2, t3 = t1 - k1 * d1, t2 - k1 * d2, t3 - k1 * d3
+        al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
+        al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
+        al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
         be1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
         be2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
         be3 = p.inv_J13 * t1 + p.inv_J23 * t2 + p.inv_J33 * t3
+        alpha, beta = (al1, al2, al3), (be1, be2, be3)
+        slopes, spin, R, denominator = slip.motion(y, u3, v3, (x, y_, z), du, dx, (f1, f2), alpha, beta, p.g)
 
-        denominator = 1.0 - (q1 * be1 + q2 * be2 + q3 * be3)
-        R = (p.g + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)) / denominator
-
-        dw1, dw2, dw3 = al1 + R * be1, al2 + R * be2, al3 + R * be3
-        s1, s2, s3 = s1 + v1, s2 + v2, s3 + v3
-        dv1 = R * f1 - p.g * u1 - (y_ * dw3 - z * dw2) - (w2 * s3 - w3 * s2)
-        dv2 = R * f2 - p.g * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
-
-        spin = u1 * w1 + u2 * w2 + u3 * w3
         per_load = k * slip_square
         if drags:
             per_load = per_load + k1 * (d1 * w1 + d2 * w2 + d3 * w3)
         power = R * per_load
         if damps:
             power = power + k0 * turn_square
-        return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, power, R, denominator)
+        return slopes, (spin, power, R, denominator)
 
     @inline
     def energy(y: Any, p: Any) -> Any:

@@ -59,30 +59,40 @@ def upright(n: Any) -> Any:
 @inline
 def rhs(y: Any, p: Any) -> Any:
     u1, u2, w1, w2, w3, v1, v2 = y
-    (u3, inv_u3), (x, y_, z), (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
-
+    (u3, inv_u3), (x, y_, z), du, dx = contact(u1, u2, w1, w2, w3, p)
     v3 = -(v1 * u1 + v2 * u2) * inv_u3
-    # g = u + f, the contact force per unit of R
     g1, g2, g3 = friction.contact_force(u1, u2, u3, v1, v2, v3, p)
-    # s = v_0 - x_p'
-    s1, s2, s3 = y_ * w3 - z * w2 - dx, z * w1 - x * w3 - dy, x * w2 - y_ * w1 - dz
-    q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
-    # ω' = α + R β: Euler's gyroscopic terms, and the torque of the contact force
-    al1, al2, al3 = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
-    be1, be2 = p.inv_I1 * (y_ * g3 - z * g2), p.inv_I2 * (z * g1 - x * g3)
-    be3 = p.inv_I3 * (x * g2 - y_ * g1)
+    # Euler's gyroscopic terms, and the torque of the contact force
+    alpha = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
+    beta = p.inv_I1 * (y_ * g3 - z * g2), p.inv_I2 * (z * g1 - x * g3), p.inv_I3 * (x * g2 - y_ * g1)
+    slopes, spin, R, denominator = motion(y, u3, v3, (x, y_, z), du, dx, (g1, g2), alpha, beta, 1.0)
+    return slopes, (spin, friction.dissipation(R, v1, v2, v3, p), R, denominator)
 
+
+@inline
+def motion(y: Any, u3: Any, v3: Any, x_p: Any, du: Any, dx: Any, g: Any, alpha: Any, beta: Any, gravity: Any) -> Any:
+    """The derivatives of the states, n, R, and the Painlevé denominator, of a body with any inertia on any surface.
+
+    Parameters
+    ----------
+    x_p, du, dx : as of `contact`
+    g : the contact force u + f per unit of R, its first two components
+    alpha, beta : ω' = α + R β
+    """
+    u1, u2, w1, w2, w3, v1, v2 = y
+    (x, y_, z), (du1, du2, du3), (dx1, dx2, dx3), (g1, g2) = x_p, du, dx, g
+    (al1, al2, al3), (be1, be2, be3) = alpha, beta
+    # s = v_0 - x_p'
+    s1, s2, s3 = y_ * w3 - z * w2 - dx1, z * w1 - x * w3 - dx2, x * w2 - y_ * w1 - dx3
+    q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
     denominator = 1.0 - (q1 * be1 + q2 * be2 + q3 * be3)
-    R = (1.0 + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)) / denominator
+    R = (gravity + (s1 * du1 + s2 * du2 + s3 * du3) + (q1 * al1 + q2 * al2 + q3 * al3)) / denominator
 
     dw1, dw2, dw3 = al1 + R * be1, al2 + R * be2, al3 + R * be3
     s1, s2, s3 = s1 + v1, s2 + v2, s3 + v3
-    dv1 = R * g1 - u1 - (y_ * dw3 - z * dw2) - (w2 * s3 - w3 * s2)
-    dv2 = R * g2 - u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
-
-    spin = u1 * w1 + u2 * w2 + u3 * w3
-    power = friction.dissipation(R, v1, v2, v3, p)
-    return (du1, du2, dw1, dw2, dw3, dv1, dv2), (spin, power, R, denominator)
+    dv1 = R * g1 - gravity * u1 - (y_ * dw3 - z * dw2) - (w2 * s3 - w3 * s2)
+    dv2 = R * g2 - gravity * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
+    return (du1, du2, dw1, dw2, dw3, dv1, dv2), u1 * w1 + u2 * w2 + u3 * w3, R, denominator
 
 
 @inline
