@@ -8,19 +8,22 @@ from __future__ import annotations
 
 import click
 
+from sweep.cli.faults import Commands
 from sweep.cli.reports import bench, reproduce
 from sweep.cli.results import explore, info, plot
 from sweep.cli.runs import critical, run, trajectory
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="rattleback-sweep", prog_name="sweep")
 def main() -> None:
     """Parameter sweeps for the reversals of a rattleback.
 
-    Exit codes: 0 done; 2 a configuration or file is wrong; 3 more cells failed than the
-    configuration allows; 130 interrupted, the same command resumes the run; 141 what read its
-    output has closed the pipe.
+    CONFIG is a YAML file, FILE a dataset that a command wrote.
+
+    Exit codes: 0 done; 1 a row of a report does not hold; 2 a configuration or file is wrong;
+    3 more cells failed than the configuration allows; 130 interrupted, and the same command resumes
+    the run; 141 the program that read the output has closed the pipe.
     """
 
 

@@ -16,10 +16,11 @@ from sweep.parameters import Parameter
 
 if TYPE_CHECKING:
     from sweep.config import Fault
+    from sweep.progress import Terminal
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
 CLOSED_PIPE = 141
-"""As the shell reports of any command that SIGPIPE ends: what read its output, such as `head`, has enough."""
+"""As the shell reports any command that SIGPIPE ends: what read its output, such as `head`, has enough."""
 
 
 def say(text: str, *, err: bool = False) -> None:
@@ -31,9 +32,9 @@ def say(text: str, *, err: bool = False) -> None:
 
 def refuse(option: str, message: str) -> NoReturn:
     """Raise the fault of an option."""
-    from sweep.config.faults import ConfigError, Fault
+    from sweep.config.faults import fault_of
 
-    raise ConfigError([Fault(option, None, None, (), message)])
+    raise fault_of(message, file=option)
 
 
 @contextmanager
@@ -75,34 +76,45 @@ def about(file: Path) -> Iterator[None]:
     except (StoreError, OSError):
         raise
     except Exception as error:
-        known = isinstance(error, ValueError) and "allowed" in str(error)
-        reason = str(error) if known else f"not a dataset of sweep: {type(error).__name__}: {error}"
+        spoken = isinstance(error, ValueError)  # by our plots, of what was asked of the dataset
+        reason = str(error) if spoken else f"not a dataset of sweep: {type(error).__name__}: {error}"
         raise StoreError(f"{file}: {reason}".splitlines()[0]) from None
 
 
-class Explained:
-    """Turns errors that the user can mend into lines on stderr and exit code 2."""
+class Commands(click.Group):
+    """Commands whose errors, where the user can mend them, become lines on stderr and an exit code."""
 
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if error is None:
-            return
-        if isinstance(error, KeyboardInterrupt):
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (click.ClickException, click.exceptions.Exit):
+            raise
+        except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
-        if isinstance(error, BrokenPipeError):
+        except BrokenPipeError:
             # What is left in the buffers when Python ends goes nowhere.
             for stream in (sys.stdout, sys.stderr):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
             sys.exit(CLOSED_PIPE)
-        from sweep.config.faults import ConfigError
-        from sweep.results.store import StoreError
-
-        if isinstance(error, ConfigError | StoreError):
-            say(str(error), err=True)
-            sys.exit(WRONG_INPUT)
-        if isinstance(error, OSError):
+        except OSError as error:
             say(f"{error.filename or 'a file'}: {error.strerror or error}", err=True)
-            sys.exit(WRONG_INPUT)
+        except Exception as error:
+            from sweep.config.faults import ConfigError
+            from sweep.results.store import StoreError
+
+            if not isinstance(error, ConfigError | StoreError):
+                raise
+            say(str(error), err=True)
+        sys.exit(WRONG_INPUT)
+
+
+@contextmanager
+def resumable(terminal: Terminal, work: str, unit: str) -> Iterator[None]:
+    """End an interrupted command with what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        done = f"{terminal.last.done:.0f} of {terminal.last.cells} {unit}" if terminal.last else f"no {unit}"
+        terminal.note(f"interrupted: {done} finished and kept; the same command resumes the {work}")
+        sys.exit(INTERRUPTED)

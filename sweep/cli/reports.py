@@ -10,36 +10,34 @@ from typing import NoReturn
 import click
 
 from sweep import interrupt
-from sweep.cli.faults import DONE, ROWS_FAILED, Explained
+from sweep.cli.faults import DONE, ROWS_FAILED
 from sweep.cli.options import report_folder
 
 
 @click.command()
 @report_folder("runs/reproduce")
 def reproduce(output: Path) -> None:
-    """Compare every number and figure of Takano (2011) with ours, in one HTML report.
+    """Compare the numbers and figures of Takano (2011) with ours, in one HTML report.
 
-    Exit code 0 only if every row holds, 1 otherwise.
+    Exit code 0 if every row holds, else 1.
     """
-    with Explained():
-        from sweep.reproduce import reproduce as compare
+    from sweep.reproduce import reproduce as compare
 
-        _write(compare, output, "reproduce.html", "rows")
+    _write(compare, output, "reproduce.html", "rows")
 
 
 @click.command()
 @report_folder("runs/bench")
 def bench(output: Path) -> None:
-    """Measure the speed and error of each method and model, and run cases that are hard to get right.
+    """Measure the speed and error of methods and models, and run hard cases.
 
     Takes about four minutes on two cores; writes bench.html, bench.png and bench.csv.
 
     Exit code 1 if a hard case does not hold, else 0: speed and error are reported, not judged.
     """
-    with Explained():
-        from sweep.bench import bench as measure
+    from sweep.bench import bench as measure
 
-        _write(measure, output, "bench.html, .png and .csv", "hard cases")
+    _write(measure, output, "bench.html, .png and .csv", "hard cases")
 
 
 def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path, files: str, rows: str) -> NoReturn:

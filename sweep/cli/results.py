@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sweep import interrupt
-from sweep.cli.faults import DONE, Explained, about, needs_bokeh, refuse, say
+from sweep.cli.faults import DONE, about, needs_bokeh, refuse, say
 from sweep.cli.options import FILE, PATH, announce, parse_pair, parse_span
 
 if TYPE_CHECKING:
@@ -19,89 +19,83 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
-@click.option(
-    "--var", "variable", help="Variable to draw [default: what `measure` named first, or else the reversals]."
-)
-@click.option("--x", help="Axis drawn across.")
-@click.option("--y", help="Axis drawn upwards.")
+@click.option("--var", "variable", help="Variable to draw [default: the first that was measured].")
+@click.option("--x", help="Parameter along the horizontal axis.")
+@click.option("--y", help="Parameter along the vertical axis.")
 @click.option("--sel", "cells", multiple=True, metavar="NAME=VALUE",
-              help="Draw only the value of an axis nearest to this one, e.g. n0=0.05 (repeatable).")  # fmt: skip
+              help="Draw only the cells nearest to this value of a parameter, e.g. n0=0.05 (repeatable).")  # fmt: skip
 @click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
-@click.option("--cmap", metavar="NAME", help="A colour map of matplotlib.")
+@click.option("--cmap", metavar="NAME", help="A colour map of matplotlib, such as viridis.")
 @click.option(
     "--output",
     type=PATH,
-    help="Picture to write; its suffix names the format: png, pdf or svg [default: a PNG beside FILE].",
+    help="Picture to write; its suffix names the format: png, pdf, svg or html [default: a PNG beside FILE].",
 )
 def plot(
     files: tuple[Path, ...], variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...],
     limits: str | None, cmap: str | None, output: Path | None,
 ) -> None:  # fmt: skip
-    """Draw a dataset: maps or curves of a run, single trajectories, or critical spins.
+    """Draw a dataset: maps or curves of a run, trajectories, or critical spins.
 
     Of several runs, the maps of one variable are drawn side by side, with one scale.
     """
-    with Explained():
-        sel = dict(parse_pair(cell, "--sel") for cell in cells)
-        span = parse_span(limits, "--limits") if limits is not None else None
-        from sweep.plots import panels, picture
+    sel = dict(parse_pair(cell, "--sel") for cell in cells)
+    span = parse_span(limits, "--limits") if limits is not None else None
+    from sweep.plots import panels, picture
 
-        interrupt.raise_again()
-        stem = "-".join(file.stem for file in files)
-        target = output or files[0].with_name(f"{stem}{f'_{variable}' if variable else ''}.png")
-        if picture.suffix(target) == "html":
-            if len(files) > 1:
-                refuse(f"--output {target}", f"a page shows one dataset; write {picture.ALLOWED} of several")
-            _plot_page(files[0], target, variable, x, y, sel, limits, cmap)
-            return
-        if picture.suffix(target) not in picture.FORMATS:
-            refuse(f"--output {target}", f"unknown format; write {picture.ALLOWED}, .html")
-        datasets = [opened(file) for file in files]
-        for file, dataset in zip(files, datasets, strict=True):
-            with about(file):
-                for name, taken in panels.nearest(dataset, sel).items():
-                    say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
-        with about(files[0]):
-            picture.plot(datasets, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, output=target)
-        say(f"wrote {target}")
+    interrupt.raise_again()
+    stem = "-".join(file.stem for file in files)
+    target = output or files[0].with_name(f"{stem}{f'_{variable}' if variable else ''}.png")
+    if picture.suffix(target) == "html":
+        if len(files) > 1:
+            refuse(f"--output {target}", f"a page shows one dataset; write {picture.ALLOWED} of several")
+        _plot_page(files[0], target, variable, x, y, sel, limits, cmap)
+        return
+    if picture.suffix(target) not in picture.FORMATS:
+        refuse(f"--output {target}", f"unknown format; write {picture.ALLOWED}, .html")
+    datasets = [opened(file) for file in files]
+    for file, dataset in zip(files, datasets, strict=True):
+        with about(file):
+            for name, taken in panels.nearest(dataset, sel).items():
+                say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
+    with about(files[0]):
+        picture.plot(datasets, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, output=target)
+    say(f"wrote {target}")
 
 
 @click.command()
 @FILE
 def info(file: Path) -> None:
-    """Show what is in a dataset: axes, counts by status, agreement with the prediction, provenance."""
-    with Explained():
-        from sweep.results.summary import contents, describe
+    """Show what is in a dataset: axes, counts, agreement with the prediction, provenance."""
+    from sweep.results.summary import contents, describe
 
-        dataset = opened(file)
-        with about(file):
-            text = "\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)])
-        say(text)
+    dataset = opened(file)
+    with about(file):
+        say("\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)]))
 
 
 @click.command()
 @FILE
 @click.option("--port", type=click.IntRange(1, 65535), help="Port of the page [default: the first free from 5006].")
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
-@click.option("--model", help="File or entry point of the model that a user brought; its code runs.")
+@click.option("--model", help="The Python file or entry point of the dataset's own model, whose code is run.")
 def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -> None:
     """Explore the maps of a dataset in the browser.
 
-    A click on a cell runs its trajectory.  The page is served to this machine alone, until Ctrl-C.
+    A click on a cell runs its trajectory.  Only this machine can open the page; Ctrl-C ends it.
     """
-    with Explained():
-        with needs_bokeh("explore"):
-            from sweep.explore.server import serve
-        from sweep.explore.setup import Setup, usable
-        from sweep.explore.slices import open_source
+    with needs_bokeh("explore"):
+        from sweep.explore.server import serve
+    from sweep.explore.setup import Setup, usable
+    from sweep.explore.slices import open_source
 
-        with about(file):
-            source = open_source(file)
-        setup = Setup(source, model, announce) if model else usable(source)
-        serve(source, setup, port, browser=not no_browser, say=say)
-        say("stopped")
-        sys.stdout.flush()
-        os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it
+    with about(file):
+        source = open_source(file)
+    setup = Setup(source, model, announce) if model else usable(source)
+    serve(source, setup, port, browser=not no_browser, say=say)
+    say("stopped")
+    sys.stdout.flush()
+    os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it
 
 
 def _plot_page(

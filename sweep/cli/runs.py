@@ -8,9 +8,8 @@ from pathlib import Path
 import click
 
 from sweep import interrupt
-from sweep.cli.faults import TOO_MANY_FAILED, Explained, of_option, refuse, say
+from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, resumable, say
 from sweep.cli.options import CONFIG, OUTPUT, QUIET, SETTINGS, begun_parameters, cells_of, loaded
-from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 
 _TIMES = {"paper": "sqrt(c/g)", "SI": "s", "own": "of time"}
@@ -21,8 +20,8 @@ def _parameter_help() -> str:
     """The table of parameters as help text."""
     lines = ["\b", "Parameters (a number, a list, or {start, stop, num, spacing: linear|log}):"]
     for p in PARAMETERS.values():
-        default = "required" if p.default is None else f"default {p.default:g}"
-        lines.append(f"  {p.path:13} {p.long_name}; {default}; {p.allowed}")
+        default = "no default" if p.default is None else f"default {p.default:g}"
+        lines.append(f"  {p.path:24} {p.long_name}; {default}; {p.allowed}")
     return "\n".join(lines)
 
 
@@ -33,8 +32,8 @@ def _parameter_help() -> str:
 @click.option("--dry-run", is_flag=True, help="Print cells, steps, memory and estimated time; compute nothing.")
 @click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")
 @click.option("--rerun", type=click.Choice(["failed", "limit"]),
-              help="Simulate again just the cells that failed, or that reached the time limit.")  # fmt: skip
-@click.option("--workers", type=click.IntRange(1, 4096), help="Run in this many processes, each with one thread.")
+              help="Simulate again only those cells of the dataset that failed, or that reached t_end.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(1, 4096), help="Run in this many processes of one thread each.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 @QUIET
 def run(
@@ -43,49 +42,46 @@ def run(
 ) -> None:  # fmt: skip
     """Run the sweep that CONFIG describes.
 
-    Writes NAME.nc (the dataset) and NAME.png (its maps).  If it is interrupted, finished work is
-    kept, and the same command resumes the run.  If CONFIG has grown since its dataset was written,
-    by values of axes or to a later t_end, only what is missing is simulated.
+    Writes NAME.nc (the dataset) and NAME.png (its maps), where NAME is the name of the run.  If it is
+    interrupted, finished work is kept, and the same command resumes the run.  If CONFIG has since
+    got more values along an axis, or a later t_end, only what the dataset lacks is simulated.
     """
-    with Explained():
-        checked = loaded(config, settings)
-        folder = output or Path("runs") / checked.name
-        if dry_run:
-            from sweep.engine.estimate import estimate
+    checked = loaded(config, settings)
+    folder = output or Path("runs") / checked.name
+    if dry_run:
+        from sweep.engine.estimate import estimate
 
-            click.echo(estimate(checked))
-            return
-        if workers and scheduler:
-            refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
-        from sweep.engine.cluster import connected
-        from sweep.engine.run import run as run_sweep
-        from sweep.progress import Terminal
-        from sweep.results.summary import failed_fraction, summarize
+        click.echo(estimate(checked))
+        return
+    if workers and scheduler:
+        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
+    from sweep.engine.cluster import connected
+    from sweep.engine.run import run as run_sweep
+    from sweep.progress import Terminal
+    from sweep.results.summary import failed_fraction, summarize
 
-        interrupt.raise_again()
-        before = _stamps(folder, checked.name)
-        with Terminal(quiet) as terminal:
-            try:
-                with connected(workers, scheduler) as cluster:
-                    result = run_sweep(checked, folder, fresh=fresh, rerun=rerun, reporter=terminal, cluster=cluster)
-            except KeyboardInterrupt:
-                done = f"{terminal.last.done} of {terminal.last.cells} cells" if terminal.last else "no cell"
-                terminal.note(f"interrupted: {done} finished and kept; the same command resumes the run")
-                sys.exit(INTERRUPTED)
-        if not quiet:
-            click.echo(summarize(result))
-            say(_written(folder, checked.name, before))
-        failed = failed_fraction(result)
-        if failed > checked.max_failed_fraction:
-            most = f"max_failed_fraction allows {checked.max_failed_fraction:.2%}"
-            click.echo(f"{failed:.2%} of the cells failed; {most}", err=True)
-            sys.exit(TOO_MANY_FAILED)
+    interrupt.raise_again()
+    before = _stamps(folder, checked.name)
+    with (
+        Terminal(quiet) as terminal,
+        resumable(terminal, "run", "cells"),
+        connected(workers, scheduler) as cluster,
+    ):
+        result = run_sweep(checked, folder, fresh=fresh, rerun=rerun, reporter=terminal, cluster=cluster)
+    if not quiet:
+        click.echo(summarize(result))
+        say(_written(folder, checked.name, before))
+    failed = failed_fraction(result)
+    if failed > checked.max_failed_fraction:
+        most = f"max_failed_fraction allows {checked.max_failed_fraction:.2%}"
+        click.echo(f"{failed:.2%} of the cells failed; {most}", err=True)
+        sys.exit(TOO_MANY_FAILED)
 
 
 @click.command()
 @CONFIG
 @click.option("--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun_parameters,
-              help="Which cell, e.g. --at mu=60 --at b=3; a parameter given again adds a trajectory.")  # fmt: skip
+              help="A parameter of the cell, e.g. --at mu=60 --at b=3; given twice, it makes two runs.")  # fmt: skip
 @click.option("--stop-when-settled", is_flag=True,
               help="End when neither spin nor count can change any more, as a sweep does, not at t_end.")  # fmt: skip
 @OUTPUT
@@ -106,27 +102,26 @@ def trajectory(
     Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip,
     normal force, energy and the work of friction.  Several trajectories are drawn over each other.
     """
-    with Explained():
-        checked = loaded(config, settings)
-        at = cells_of(cells, checked.table)
-        if dry_run:
-            from sweep.studies.trajectory import estimate
+    checked = loaded(config, settings)
+    at = cells_of(cells, checked.table)
+    if dry_run:
+        from sweep.studies.trajectory import estimate
 
-            with of_option("--at", checked.table):
-                click.echo(estimate(checked, at))
-            return
-        from sweep.plots import trajectories as plots
-        from sweep.progress import Terminal
-        from sweep.results.folder import RunFiles
-        from sweep.studies.trajectory import trajectory as follow
+        with of_option("--at", checked.table):
+            click.echo(estimate(checked, at))
+        return
+    from sweep.plots import trajectories as plots
+    from sweep.progress import Terminal
+    from sweep.results.folder import RunFiles
+    from sweep.studies.trajectory import trajectory as follow
 
-        interrupt.raise_again()
-        with Terminal(quiet, _TIMES[checked.units]) as terminal, of_option("--at", checked.table):
-            result = follow(checked, stop_when_settled=stop_when_settled, reporter=terminal, **at)
-        files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
-        files.save_result(result, plots.draw(result))
-        if not quiet:
-            say(f"wrote {files.dataset} and .png")
+    interrupt.raise_again()
+    with Terminal(quiet, _TIMES[checked.units]) as terminal, of_option("--at", checked.table):
+        result = follow(checked, stop_when_settled=stop_when_settled, reporter=terminal, **at)
+    files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
+    files.save_result(result, plots.draw(result))
+    if not quiet:
+        say(f"wrote {files.dataset} and .png")
 
 
 @click.command()
@@ -141,38 +136,32 @@ def trajectory(
 def critical(
     config: Path, width: float, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool, quiet: bool
 ) -> None:
-    """Find the critical spins over all axes of CONFIG except n0.
+    """Find the critical spins over all axes of CONFIG but n0.
 
     They come from the paper's formulas, from the model's linear stability, and from simulation.
     Writes NAME_critical.nc and .png.  If it is interrupted, finished simulations are kept, and the
     same command resumes the search.
     """
-    with Explained():
-        checked = loaded(config, settings)
-        if dry_run:
-            from sweep.studies.critical import estimate
+    checked = loaded(config, settings)
+    if dry_run:
+        from sweep.studies.critical import estimate
 
-            click.echo(estimate(checked))
-            return
-        from sweep.progress import Terminal
-        from sweep.studies.critical import critical as search
-        from sweep.studies.critical import remarks
+        click.echo(estimate(checked))
+        return
+    from sweep.progress import Terminal
+    from sweep.studies.critical import critical as search
+    from sweep.studies.critical import remarks
 
-        folder = output or Path("runs") / checked.name
-        name = f"{checked.name}_critical"
-        before = _stamps(folder, name)
-        interrupt.raise_again()
-        with Terminal(quiet, "bodies") as terminal:
-            try:
-                result = search(checked, width, folder, fresh=fresh, reporter=terminal)
-            except KeyboardInterrupt:
-                done = f"{terminal.last.done:.0f} of {terminal.last.cells} bodies" if terminal.last else "no body"
-                terminal.note(f"interrupted: {done} settled, all simulations kept; the same command resumes the search")
-                sys.exit(INTERRUPTED)
-        if found := remarks(result):
-            say("\n".join(found), err=quiet)
-        if not quiet:
-            say(_written(folder, name, before))
+    folder = output or Path("runs") / checked.name
+    name = f"{checked.name}_critical"
+    before = _stamps(folder, name)
+    interrupt.raise_again()
+    with Terminal(quiet, "bodies") as terminal, resumable(terminal, "search", "bodies"):
+        result = search(checked, width, folder, fresh=fresh, reporter=terminal)
+    if found := remarks(result):
+        say("\n".join(found), err=quiet)
+    if not quiet:
+        say(_written(folder, name, before))
 
 
 def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:

@@ -138,7 +138,7 @@ def test_processes_end_with_the_one_that_started_them(
     assert list((tmp_path / "cache").rglob("*.nbc")) == []  # they were ended, and have not come to their ends
     assert len(told) == (2 if with_signal == signal.SIGINT else 1), told
     assert told[0].startswith("compiling")
-    assert told[1:] == ["interrupted: no cell finished and kept; the same command resumes the run"][: len(told) - 1]
+    assert told[1:] == ["interrupted: no cells finished and kept; the same command resumes the run"][: len(told) - 1]
 
 
 @pytest.mark.parametrize("folder", ["a file in its place", "none at all"])

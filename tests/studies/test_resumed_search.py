@@ -104,8 +104,8 @@ def test_a_stopped_search_goes_on(
         assert process.exitcode == (130 if with_signal == signal.SIGINT else -signal.SIGKILL)
         if with_signal == signal.SIGINT:
             (said,) = [line for line in process.log.read_text().splitlines() if "interrupted" in line]
-            kept = "all simulations kept; the same command resumes the search"
-            assert re.fullmatch(rf"interrupted: (no body|\d of 6 bodies) settled, {kept}", said)
+            kept = "finished and kept; the same command resumes the search"
+            assert re.fullmatch(rf"interrupted: (no|\d of 6) bodies {kept}", said)
             assert "Traceback" not in process.log.read_text()
     assert stops >= 2
     checkpoint_left, kept = checkpoint.exists(), rounds(checkpoint)
