@@ -1,4 +1,4 @@
-"""What theory predicts for every cell: the paper's formulas, and stability by a model's eigenvalues."""
+"""Predict every cell by theory: by the paper's formulas, and by the eigenvalues of a model."""
 
 from __future__ import annotations
 

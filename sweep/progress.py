@@ -20,7 +20,7 @@ from sweep.jit import showing
 def shown(
     progress: bool | None, reporter: Reporter | None = None, unit: str = "cells"
 ) -> AbstractContextManager[Reporter]:
-    """Who is told of the progress of a call: `reporter` if there is one, else a bar where one is wanted.
+    """Choose who is told of the progress of a call: `reporter` if there is one, else a bar where one is wanted.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def shown(
 
 
 def in_notebook() -> bool:
-    """Whether this process is the kernel of a notebook."""
+    """Tell if this process is the kernel of a notebook."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 

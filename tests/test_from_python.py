@@ -113,7 +113,7 @@ def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name(mu: Any, said: str) 
 
 
 def test_a_cell_has_no_parameter_that_its_model_lacks() -> None:
-    with pytest.raises(ConfigError, match=r"^mu: no parameter of the noslip model; allowed: a, b"):
+    with pytest.raises(ConfigError, match=r"^mu: is no parameter of the noslip model; its parameters are a, b"):
         sweep.trajectory({"model": "noslip"}, mu=60)
 
 

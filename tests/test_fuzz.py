@@ -113,7 +113,7 @@ def test_axes_keep_their_order_in_a_round_trip(write: Write) -> None:
 
 def test_the_number_of_trajectories_is_limited(write: Write) -> None:
     pairs = [part for name in ("mu", "b", "n0") for i in range(1, 21) for part in ("--at", f"{name}={i}")]
-    assert "8000 trajectories; allowed: at most 1000" in refused(invoke("trajectory", write(), *pairs))
+    assert "8000 trajectories are too many; ask for at most 1000" in refused(invoke("trajectory", write(), *pairs))
 
 
 def test_a_dataset_larger_than_memory_is_refused(tmp_path: Path) -> None:
@@ -122,7 +122,7 @@ def test_a_dataset_larger_than_memory_is_refused(tmp_path: Path) -> None:
     with netCDF4.Dataset(tmp_path / "vast.nc", "w") as file:
         file.createDimension("b", 1 << 40)
         file.createVariable("b", "f8", ("b",), chunksizes=(1 << 20,))
-    assert "GiB of data; allowed" in refused(invoke("info", tmp_path / "vast.nc"))
+    assert "GiB of data are more than the memory" in refused(invoke("info", tmp_path / "vast.nc"))
 
 
 @pytest.mark.parametrize("verb", ["info", "plot"])

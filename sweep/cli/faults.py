@@ -1,4 +1,4 @@
-"""What a command says, and how it ends: exit codes, and errors as lines that a user can act on."""
+"""End commands: with exit codes, and with errors as lines that a user can act on."""
 
 from __future__ import annotations
 

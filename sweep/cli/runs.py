@@ -165,12 +165,12 @@ def critical(
 
 
 def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:
-    """What tells by their suffixes whether the results `name` in `folder` are written anew."""
+    """Return marks, by suffix, that change when the results `name` in `folder` are written anew."""
     stats = {suffix: path.stat() for suffix in (".nc", ".png") if (path := folder / f"{name}{suffix}").exists()}
     return {suffix: (stat.st_ino, stat.st_mtime_ns) for suffix, stat in stats.items()}
 
 
 def _written(folder: Path, name: str, before: dict[str, tuple[int, int]]) -> str:
-    """Which results were written since `_stamps` returned `before`."""
+    """Say which results were written since `_stamps` returned `before`."""
     new = [suffix for suffix, stamp in _stamps(folder, name).items() if stamp != before.get(suffix)]
     return f"wrote {folder / name}{' and '.join(new)}" if new else "nothing was written"

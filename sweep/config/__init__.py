@@ -36,7 +36,7 @@ from sweep.parameters import PARAMETERS, SI, Parameter, sections
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 
 ConfigLike = Config | Mapping[str, Any] | str | os.PathLike[str]
-"""What stands for a configuration: itself, what its file says, or the path of that file."""
+"""A configuration is given as itself, as what its file says, or as the path of that file."""
 
 
 def load_config(
@@ -83,7 +83,7 @@ def load_config(
 
 
 def parameters_of(config: ConfigLike, overrides: Mapping[str, Any]) -> Mapping[str, Parameter]:
-    """The parameters that a configuration with these overrides may name; errors as of `load_config`."""
+    """Return the parameters that a configuration with these overrides may name; errors as of `load_config`."""
     if isinstance(config, Config) and "model" not in overrides:
         return config.table
     return loading.table(_opened(config, overrides)[1])
@@ -95,7 +95,7 @@ def _opened(
     argument: Callable[[str], str] = str,
     announce: Callable[[str], None] | None = lambda words: None,  # noqa: ARG005
 ) -> tuple[document.Document, Origin | None]:
-    """The document of a configuration, and where its model comes from, if a user brings it."""
+    """Open the document of a configuration, and tell where its model comes from if a user brings it."""
     source = _source(config)
     for key in {"model", "model_sha256"} & set(overrides):  # what the code to run depends on
         source.set((key,), plain_data(overrides[key]), argument(key))
@@ -103,7 +103,7 @@ def _opened(
 
 
 def _source(config: ConfigLike) -> document.Document:
-    """The document of a configuration, to be changed freely."""
+    """Return the document of a configuration, to be changed freely."""
     if isinstance(config, Mapping):
         return document.Document("", plain_data(config))
     if not isinstance(config, Config):
@@ -118,7 +118,7 @@ def _source(config: ConfigLike) -> document.Document:
 
 
 def _full_path(key: str, known: Mapping[str, Parameter]) -> tuple[str, ...]:
-    """Where the value of an override belongs."""
+    """Return the path at which the value of an override belongs."""
     if key in known:
         return known[key].place
     return ("integrator", key) if key in Integrator.model_fields else tuple(key.split("."))
@@ -166,7 +166,7 @@ def _refuse(source: document.Document, misfits: Iterable[cross_checks.Misfit]) -
 
 
 def _given(values: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:
-    """The physical parameters that the document names, in its order."""
+    """Collect the physical parameters that the document names, in its order."""
     found: dict[str, Values] = {}
     for key, value in source.values.items():
         if key in sections(known):
@@ -179,14 +179,14 @@ def _given(values: Any, source: document.Document, known: Mapping[str, Parameter
 
 
 def _table(name: str, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, tuple[float, ...]]:
-    """The columns of the table of cases, which is read once for all that is made from `source`."""
+    """Read the table of cases, once for all that is made from `source`, and return its columns."""
     if not source.table or source.table[0] != name:
         source.table = name, cases.read(source, name, known)
     return source.table[1]
 
 
 def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physics:
-    """What a configuration that names these parameters says beside numbers."""
+    """Collect what a configuration that names these parameters says beside numbers."""
     made = loading.load(origin) if origin else None
     if isinstance(made, Model):  # of any body: it says its units itself
         return Physics(made.units, LAWS[PAPER_LAW], ELLIPSOID, names)
@@ -197,7 +197,7 @@ def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physi
 def _parameters(
     model: Tier, given: Mapping[str, Values], columns: Collection[str], known: Mapping[str, Parameter], physics: Physics
 ) -> dict[str, Values]:
-    """The parameters of the model but those of the table, in the order of the axes; without one that is missing."""
+    """Order the parameters of the model as axes, with defaults; columns of the table and missing ones are left out."""
     found = {}
     for name in sorted(model.parameters, key=lambda n: (_rank(n, FIRST_AXES), _rank(n, tuple(given)))):
         default = None if known[name] in physics.required else known[name].default
@@ -209,7 +209,7 @@ def _parameters(
 
 
 def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]) -> Integrator:
-    """The settings of the integrator, with the defaults that depend on the rest.
+    """Fill in the settings of the integrator whose defaults depend on the rest.
 
     `in_si` are the numbers of all parameters if they are in SI; the default time is then in seconds.
     """

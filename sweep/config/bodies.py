@@ -1,4 +1,4 @@
-"""The bodies and start points of a configuration that cannot be."""
+"""Find bodies and start points of a configuration that cannot be."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ Reason = tuple[str, int, dict[str, float]]
 
 
 def impossible(config: Config) -> str:
-    """What is wrong with the first body if none can be or can stand; "" if any can."""
+    """Say what is wrong with the first body if none can be or can stand; "" if any can."""
     found = _reasons(config)
     return _said(found[0]) if sum(cells for _, cells, _ in found) == Grid.of(config).size else ""
 
 
 def unfit(config: Config) -> str:
-    """What is wrong with the first body that cannot be or cannot stand; "" if all can."""
+    """Say what is wrong with the first body that cannot be or cannot stand; "" if all can."""
     return next(map(_said, _reasons(config)), "")
 
 
 def described_impossible(config: Config) -> dict[str, str]:
-    """The attribute of a dataset that says how many cells have a status of `impossible`, and why."""
+    """Return the attribute of a dataset that says how many cells have the status `impossible`, and why."""
     varying = {*config.axes, *(config.cases or ())}
     found = [
         f"{cells} cells, {words.partition(';')[0]}, the first at {_at(first, varying)}"
@@ -41,7 +41,7 @@ def described_impossible(config: Config) -> dict[str, str]:
 
 
 def misplaced(config: Config) -> str:
-    """What is wrong with the first cell whose start point lies off the body; "" if no cell's does."""
+    """Say what is wrong with the first cell whose start point lies off the body; "" if no cell's does."""
     surface = SURFACES[config.surface]
     if not config.of_rattlebacks or "x0" not in {*config.parameters, *(config.cases or ())}:
         return ""
@@ -68,7 +68,7 @@ def _values(columns: Mapping[str, Array], names: tuple[str, ...], cell: int) -> 
 
 
 def _reasons(config: Config) -> list[Reason]:
-    """Each reason why bodies cannot be or cannot stand; a cell counts for the first that is true of it."""
+    """Collect the reasons why bodies cannot be or cannot stand; a cell counts for the first that is true of it."""
     if not config.of_rattlebacks or not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
         return []
     grid, surface = Grid.of(config), SURFACES[config.surface]

@@ -81,7 +81,7 @@ class Config:
 
     @property
     def simulated(self) -> bool:
-        """Whether the model is simulated, and no formula."""
+        """True if the model is simulated, False if it is a formula."""
         return isinstance(self.tier, Model)
 
     @property
@@ -91,7 +91,7 @@ class Config:
 
     @property
     def of_rattlebacks(self) -> bool:
-        """Whether its bodies are ellipsoids on a plane; a user's model may be of anything else."""
+        """True if its bodies roll on a plane; a user's model may be of anything else."""
         return not self.origin or self.own_law is not None
 
     @property

@@ -1,4 +1,4 @@
-"""What has to fit together in a configuration whose values are valid by themselves.
+"""Check that values which are valid by themselves fit together.
 
 Each check yields the path of the key to be changed, and what is wrong with it and what to do.
 """
@@ -33,7 +33,7 @@ Misfit = tuple[Path, str]
 
 
 def of_physics(values: Any, physics: Physics, origin: Origin | None) -> Iterator[Misfit]:
-    """Parameters, law, units and surface that do not belong together, or that the model does not know."""
+    """Check that parameters, law, units and surface belong together, and that the model knows them."""
     if origin and not loading.law(origin):  # of any body
         if "units" in values.model_fields_set:
             yield ("units",), "are said by the model's own file; leave them out"
@@ -48,7 +48,7 @@ def of_physics(values: Any, physics: Physics, origin: Origin | None) -> Iterator
 
 
 def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
-    """Values that do not fit the model, the method or each other; `given` are those of all parameters."""
+    """Check that values fit the model, the method and each other; `given` are those of all parameters."""
     yield from _of_parameters(config, given)
     yield from _of_integrator(config)
     if config.refine:
@@ -58,7 +58,7 @@ def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
 
 
 def of_all_cells(config: Config) -> Iterator[Misfit]:
-    """What is wrong with all cells together; each check relies on those before it."""
+    """Check all cells together; each check relies on those before it."""
     cells = math.prod(map(len, config.axes.values()))
     if cells > MAX_CELLS:
         yield (), f"{cells} cells are too many; keep to {MAX_CELLS}"
@@ -121,7 +121,7 @@ def _of_refinement(config: Config) -> Iterator[Misfit]:
 
 
 def _unmeasurable(name: str, config: Config) -> Iterator[str]:
-    """What is wrong with asking for the measurement `name`."""
+    """Say why the measurement `name` cannot be made."""
     model, kind, method = config.tier, measures.MEASURES[name], methods.METHODS.get(config.integrator.method)
     possible = measures.possible(model)
     if name not in possible:
@@ -136,7 +136,7 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
 
 
 def _unusable_step(config: Config) -> str:
-    """What is wrong with a step that the configuration fixes; "" if nothing is."""
+    """Say what is wrong with a step that the configuration fixes; "" if nothing is."""
     step, model = config.integrator.step, config.tier
     if step == "auto" or not isinstance(model, Model):
         return ""

@@ -1,4 +1,4 @@
-"""What is said of a value that the schema refuses: in our words, made from the schema itself.
+"""Say why the schema refuses a value, in our words, made from the schema itself.
 
 Of pydantic's errors only the type and the place are used, never the text.
 """
@@ -31,7 +31,7 @@ def wrong(reason: str, *at: str | int) -> PydanticCustomError:
 
 
 def describe(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple[str, bool]]:
-    """By the path of each of pydantic's errors: the message, and whether the key itself is at fault."""
+    """Map the path of each of pydantic's errors to the message, and to whether the key itself is at fault."""
     found, sections = {}, _sections(schema)
     for error in errors:
         place, kind = error["loc"], error["type"]
@@ -53,7 +53,7 @@ def describe(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple
 
 
 def allowed(field: FieldInfo) -> str:
-    """What a field of the schema allows, in words."""
+    """Say in words what a field of the schema allows."""
     if words := [mark for mark in field.metadata if isinstance(mark, Allowed)]:
         return words[0]
     kind = next(kind for kind in (*get_args(field.annotation), field.annotation) if kind is not NoneType)

@@ -12,7 +12,7 @@ import numpy as np
 
 from sweep.config.configuration import Config
 from sweep.config.document import Document
-from sweep.config.faults import ConfigError, Fault, brief
+from sweep.config.faults import ConfigError, Fault, brief, either
 from sweep.models import TIERS
 from sweep.models.origin import ModelError, Origin
 from sweep.models.user import loading, trial
@@ -22,7 +22,7 @@ SUFFIX = ".py"
 
 
 def named(source: Document, announce: Callable[[str], None] | None) -> Origin | None:
-    """Where the model of a document comes from, once its code has run; None if it is one of the package's, or unknown.
+    """Run the model of a document and say where it comes from; None if it is one of the package's, or unknown.
 
     Parameters
     ----------
@@ -41,13 +41,13 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         return None  # the schema refuses it
     if announce is None:
         words = "code of a user, which is not run for a configuration that comes from a dataset"
-        raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; allowed: {', '.join(TIERS)}")])
+        raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; choose {either(TIERS)}")])
     if origin is None:
         origin = of_file(source, name)
     source.model = origin
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
-        words = f"{pinned!r}, but {brief(name)} has {origin.digest}; allowed: that, or no model_sha256"
+        words = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
         raise ConfigError([source.fault(("model_sha256",), words)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
     with explained(origin):

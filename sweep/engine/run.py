@@ -59,7 +59,7 @@ def run(
     """As `sweep.api.run`; what there is to tell goes to `reporter` alone."""
     config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
-        raise ValueError(f"rerun {rerun!r}; allowed: {', '.join(RERUN)}")
+        raise ValueError(f"rerun must be {' or '.join(RERUN)}, not {rerun!r}")
     dataset.check_names(config)
     reporter = reporter or Reporter()
     if output is None:

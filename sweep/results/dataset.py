@@ -164,7 +164,7 @@ def check_names(config: Config, series: Iterable[str] = ()) -> None:
     """Raise a `ConfigError` if a parameter has the name of a variable, or of one of these `series`."""
     names = {*VARIABLES, *(f"verified_{name}" for name in ("cell", *VERIFIED)), *series} & set(config.tier.parameters)
     if names:
-        words = f"parameter {min(names)}: also a name in datasets; allowed: another"
+        words = f"parameter {min(names)}: is reserved for a variable of the dataset; rename it"
         raise ConfigError([config.fault(("model",), words)])
 
 

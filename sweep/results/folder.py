@@ -56,7 +56,7 @@ class RunFiles:
             except BlockingIOError:
                 os.close(handle)
                 raise StoreError(
-                    f"{self.folder / self.name}: another run is at work there; allowed: wait, or another --output"
+                    f"{self.folder / self.name}: another run is at work there; wait for it, or choose another --output"
                 ) from None
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), path.stat()):

@@ -61,5 +61,5 @@ def not_resumed(path: Path, reason: str) -> StoreError:
     """The error of a file that a run cannot go on from, because it comes from `reason`."""
     return StoreError(
         f"{path}: not resumed, it comes from {reason}\n"
-        "  allowed: the same configuration or a larger one, another --output, or --fresh to discard that run"
+        "  continue it with the same configuration or a larger one, choose another --output, or discard it with --fresh"
     )

@@ -93,4 +93,4 @@ def _refuse_larger_than_memory(path: Path) -> None:
         size = sum(variable.size * np.dtype(variable.dtype).itemsize for variable in file.variables.values())
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if size > memory:
-        raise StoreError(f"{path}: {size / 2**30:.3g} GiB of data; allowed: at most {memory / 2**30:.3g}, the memory")
+        raise StoreError(f"{path}: {size / 2**30:.3g} GiB of data are more than the memory, {memory / 2**30:.3g} GiB")

@@ -144,9 +144,11 @@ def _searchable(config: Config) -> Config:
     if not config.of_rattlebacks:
         raise ConfigError([config.fault(("model",), "no rattleback; critical spins are asked of: slip, noslip")])
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
-        raise ConfigError([config.fault(("start", beyond[0]), "an axis; allowed: a number")])
+        raise ConfigError([config.fault(("start", beyond[0]), "cannot be an axis of critical spins; give one number")])
     if "n0" not in config.tier.parameters:
-        raise ConfigError([config.fault(("start",), "angles and angular velocity; allowed: x0 and y0")])
+        raise ConfigError(
+            [config.fault(("start",), "cannot be given by angles and angular velocities here; give x0 and y0")]
+        )
     parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
     return replace(config, parameters=parameters, cases=cases or None)

@@ -184,7 +184,9 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     dataset.check_names(config, SERIES)
     wanted = _numbers(config, at)
     if (count := prod(map(len, wanted.values()))) > MAX_TRAJECTORIES:
-        raise ConfigError([Fault("", None, None, (), f"{count} trajectories; allowed: at most {MAX_TRAJECTORIES}")])
+        raise ConfigError(
+            [Fault("", None, None, (), f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")]
+        )
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
         constants |= {name: column[0] for name, column in config.cases.items()}
@@ -201,8 +203,10 @@ def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, tuple[float, ..
     numbers, faults, model = {}, [], config.tier
     for name, value in at.items():
         if name not in model.parameters:
-            message = f"no parameter of the {model.name} model{suggestion(name, model.parameters)}"
-            faults.append(Fault("", None, None, (name,), f"{message}; allowed: {', '.join(model.parameters)}"))
+            message = f"is no parameter of the {model.name} model{suggestion(name, model.parameters)}"
+            faults.append(
+                Fault("", None, None, (name,), f"{message}; its parameters are {', '.join(model.parameters)}")
+            )
             continue
         try:
             numbers[name] = numbers_of(config.table[name], value)

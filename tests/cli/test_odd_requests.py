@@ -57,12 +57,18 @@ def test_an_axis_of_any_parameter_is_drawn(write: Write, tmp_path: Path) -> None
 @pytest.mark.parametrize("verb", ["critical", "trajectory"])
 def test_formulas_are_not_simulated(verb: str, write: Write) -> None:
     result = invoke(verb, write(TEXT), "--set", "model=analytic")
-    assert (result.exit_code, "the analytic model is not simulated; allowed: slip" in result.stderr) == (2, True)
+    assert (
+        result.exit_code,
+        "the analytic model is a formula and cannot be simulated; choose slip" in result.stderr,
+    ) == (2, True)
 
 
 def test_critical_spins_are_of_one_start_point(write: Write) -> None:
     result = invoke("critical", write(TEXT), "--set", "x0=[0.01,0.02]")
-    assert (result.exit_code, "--set x0: an axis; allowed: a number" in result.stderr) == (2, True)
+    assert (result.exit_code, "--set x0: cannot be an axis of critical spins; give one number" in result.stderr) == (
+        2,
+        True,
+    )
 
 
 @pytest.mark.parametrize(

@@ -187,7 +187,7 @@ def test_where_it_must_not_run_it_is_refused_unread(folder: Path, ran: Path) -> 
 
 def test_a_pinned_file_is_the_only_one_that_runs(folder: Path, ran: Path) -> None:
     digest = hashlib.sha256((folder / "pendulum.py").read_bytes()).hexdigest()
-    with pytest.raises(ConfigError, match=f"model_sha256: '{'0' * 64}', but pendulum.py has {digest}; allowed: that"):
+    with pytest.raises(ConfigError, match=f"model_sha256: '{'0' * 64}', but pendulum.py has {digest}; pin that"):
         load_config(folder / "pendulum.yaml", {"model_sha256": "0" * 64})
     assert not ran.exists()
     assert load_config(folder / "pendulum.yaml", {"model_sha256": digest}).origin.digest == digest
@@ -329,7 +329,7 @@ def test_names_of_the_dataset_are_no_names_of_parameters(folder: Path, name: str
         'columns["damping"]', f'columns["{name}"]'
     )
     (folder / "pendulum.py").write_text(text, encoding="utf-8")
-    words = f"parameter {name}: also a name in datasets; allowed: another"
+    words = f"parameter {name}: is reserved for a variable of the dataset; rename it"
     with pytest.raises(ConfigError, match=words):
         sweep.trajectory({"model": str(folder / "pendulum.py")})
     if name != "contact_x":

@@ -316,10 +316,10 @@ def test_the_suffix_names_the_format(suffix: str, tmp_path: Path) -> None:
 def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     write(tmp_path / "made.nc", made())
     for options, said in (
-        (("--output", tmp_path / "x.jpg"), "x.jpg: unknown format; allowed: a file that ends in .png, .pdf, .svg"),
-        (("--limits", "3"), "--limits 3: allowed: LOW..HIGH"),
-        (("--limits", "3..1"), "--limits 3..1: allowed: LOW..HIGH"),
-        (("--sel", "n0"), "--sel n0: allowed: NAME=NUMBER"),
+        (("--output", tmp_path / "x.jpg"), "x.jpg: unknown format; write a file that ends in .png, .pdf, .svg"),
+        (("--limits", "3"), "--limits 3: must be LOW..HIGH"),
+        (("--limits", "3..1"), "--limits 3..1: must be LOW..HIGH"),
+        (("--sel", "n0"), "--sel n0: must be NAME=NUMBER"),
         (("--x", "c"), "no axis c; allowed: mu, b, n0"),
     ):
         refused(invoke("plot", tmp_path / "made.nc", *options), said)

@@ -34,7 +34,7 @@ def test_simulation_finds_the_critical_spins_of_the_eigenvalues(tmp_path: Path) 
 def test_a_start_by_angles_has_no_spin_to_search(tmp_path: Path) -> None:
     file = tmp_path / "stone.yaml"
     file.write_text(STONE.replace("n0: 1, x0: 1.0e-3, y0: 1.0e-3", "roll: 1 deg"), encoding="utf-8")
-    with pytest.raises(ConfigError, match="allowed: x0 and y0"):
+    with pytest.raises(ConfigError, match="give x0 and y0"):
         sweep.critical(file)
 
 

@@ -194,7 +194,7 @@ def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkey
     assert [line.split(":")[0] for line in told.stdout.splitlines()] == ["trajectories", "steps", "samples", "time"]
     assert "2" in told.stdout.splitlines()[0]
     assert not out.exists()
-    refused(invoke("critical", config, "--dry-run", "--set", "model=analytic"), "not simulated")
+    refused(invoke("critical", config, "--dry-run", "--set", "model=analytic"), "cannot be simulated")
     refused(invoke("trajectory", config, "--dry-run", "--at", "mu=-1"), "--at mu: must be a finite number >= 0")
 
 

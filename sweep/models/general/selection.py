@@ -1,4 +1,4 @@
-"""Which model runs a configuration: the paper's, or a variant for what the configuration names beyond it."""
+"""Choose the model that runs a configuration: the paper's, or a variant for what is named beyond it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ INERTIA = (*rigid_body.MOMENTS, *rigid_body.PRODUCTS)
 
 @dataclass(frozen=True)
 class Physics:
-    """What a configuration says of bodies, friction and starts, beside the numbers."""
+    """The physics that a configuration describes, beside its numbers: of bodies, friction and starts."""
 
     units: str
     """`PAPER_UNITS` or `SI`."""
@@ -30,7 +30,7 @@ class Physics:
 
     @property
     def beyond(self) -> list[str]:
-        """What the paper's models do not know of it."""
+        """List what the paper's models do not know of it."""
         found = sorted(self.names - PAPER_PARAMETERS.keys())
         found += [f"law: {self.law.name}"] if self.law.name != PAPER_LAW else []
         found += [f"units: {self.units}"] if self.units != PAPER_UNITS else []
@@ -55,7 +55,7 @@ class Physics:
         return variants.variant(name, parameters, None if self.law.name in LAWS else self.law)
 
     def misfits(self) -> dict[str, str]:
-        """The named parameters that do not go with the rest, and why."""
+        """List the named parameters that do not go with the rest, and what to do about each."""
         inertia, angles = self.names & {*INERTIA}, self.names & {*starts.ANGLES, *starts.SLIP}
         found: dict[str, str] = {}
         if inertia:
