@@ -7,20 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from bokeh import models
 from bokeh.core.properties import value
-from bokeh.models import (
-    Column,
-    ColumnDataSource,
-    CustomJS,
-    Label,
-    Legend,
-    LegendItem,
-    Row,
-    Select,
-    Slider,
-    Span,
-    Toggle,
-)  # fmt: skip
 from bokeh.plotting import figure
 
 from sweep.explore.colours import CURVES
@@ -33,37 +21,35 @@ from sweep.plots import labels
 _STRETCHES = 3000
 """Of a longer curve the lowest and the highest sample of each of so many stretches are drawn, of each series."""
 
-_OVER_TIME = ("spin", "energy", "dissipated")
-_PATH = ("contact_x", "contact_y")
+_OVER_TIME, _PATH = ("spin", "energy", "dissipated"), ("contact_x", "contact_y")
 
 _CRITICAL = {"n_c1_plus": "dotted", "n_c1_minus": "dotted", "n_c2_plus": "dashed", "n_c2_minus": "dashed"}
 
-_LEGEND: dict[str, Any] = {
-    "padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.8,
-    "border_line_color": None,
-}  # fmt: skip
+_LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.8,
+           "border_line_color": None}  # fmt: skip
+
+_AXIS = {"axis_label_text_font_style": "normal", "axis_label_text_font_size": "12px", "axis_line_color": "#8a949e",
+         "major_tick_line_color": "#8a949e", "minor_tick_line_color": None}  # fmt: skip
 
 
 class Curves:
     """The figures of the trajectories, with a place for each of `MAX_CELLS` curves."""
 
     def __init__(self) -> None:
-        self.spin = _figure(260, "spin")
-        self.energy = _figure(190, "energies")
-        self.path = _figure(320, "contact path")
+        self.spin, self.energy, self.path = _figure(260, "spin"), _figure(190, "energies"), _figure(320, "contact path")
         self.path.match_aspect = True
         self.energy.x_range = self.spin.x_range
-        legend = Legend(location="top_right", name="curve legend", **_LEGEND)
-        self.spin.add_layout(legend)
         self._slots = [_Slot(self, colour) for colour in CURVES[:MAX_CELLS]]
-        legend.items = [slot.item for slot in self._slots]
-        self._critical = {name: self._critical_line(name, dash) for name, dash in _CRITICAL.items()}
-        styles = [("energy above rest", "solid"), ("work against friction", "dashed")]
-        items = [
-            LegendItem(label=words, renderers=[self.energy.line([np.nan], [np.nan], color="#4d5864", line_dash=dash)])
-            for words, dash in styles
-        ]
-        self.energy.add_layout(Legend(items=items, location="right", **_LEGEND))
+        items = [slot.item for slot in self._slots]
+        self.spin.add_layout(models.Legend(items=items, location="top_right", name="curve legend", **_LEGEND))
+        self.spin.y_range.renderers = [item.renderers[0] for item in items]  # critical spins may be far away
+        for words, dash in (("energy above rest", "solid"), ("work against friction", "dashed")):
+            self.energy.line([np.nan], [np.nan], color="#4d5864", line_dash=dash, legend_label=words)
+        self.energy.legend.update(location="right", **_LEGEND)
+        self._critical = models.ColumnDataSource({"spin": [], "time": [], "dash": [], "symbol": []})
+        self.spin.hspan("spin", source=self._critical, line_color="#6b7580", line_dash="dash", level="underlay")
+        self.spin.text("time", "spin", "symbol", source=self._critical, text_font_size="11px", text_align="right",
+                       text_color="#4d5864")  # fmt: skip
         self.player = self._player()
 
     def show(self, curves: Sequence[Curve | None], names: Sequence[str], active: int) -> None:
@@ -73,81 +59,73 @@ class Curves:
         present = [curve.dataset for curve in curves if curve]
         if present:
             self._label(present[0])
-        self._slider.end = max([float(np.nanmax(one["time"])) for one in present], default=1.0)
-        self._slider.step = self._slider.end / 2000
+        end = max([float(np.nanmax(one["time"])) for one in present], default=1.0)
+        self._slider.update(end=end, step=end / 2000)
         chosen = curves[active] if active < len(curves) else None
-        for name, (line, label) in self._critical.items():
-            spin = float(chosen.dataset[name]) if chosen and name in chosen.dataset else np.nan
-            line.visible = label.visible = bool(np.isfinite(spin))
-            if line.visible:
-                line.location = label.y = spin
-                label.x = self._slider.end * (0.93 if "c1" in name else 1.0)  # they often lie close together
+        spins = {n: float(chosen.dataset[n]) for n in _CRITICAL if n in chosen.dataset} if chosen else {}
+        shown = [name for name, spin in spins.items() if np.isfinite(spin)]
+        self._critical.data = {
+            "spin": [spins[name] for name in shown],
+            "time": [end * (0.93 if "c1" in name else 1.0) for name in shown],  # they often lie close together
+            "dash": [_CRITICAL[name] for name in shown],
+            "symbol": [critical_symbol(name) for name in shown],
+        }
 
     def _label(self, one: xr.Dataset) -> None:
         """Label the axes, in the units of a trajectory."""
         lowest, highest = (self.energy, self.spin) if "energy" in one else (self.spin, self.energy)
-        lowest.xaxis[0].axis_label, highest.xaxis[0].axis_label = labels.label(one, "time"), None
-        self._unit.text = labels.unit(one, "time")
-        for axis, name in (
-            (self.spin.yaxis, "spin"), (self.energy.yaxis, "energy"),
-            (self.path.xaxis, "contact_x"), (self.path.yaxis, "contact_y"),
+        lowest.xaxis.axis_label, highest.xaxis.axis_label = labels.label(one, "time"), None
+        self._player_unit.text = labels.unit(one, "time")
+        for axis, name, words in (
+            (self.spin.yaxis, "spin", ""), (self.energy.yaxis, "energy", "energy"),
+            (self.path.xaxis, "contact_x", "contact point x"), (self.path.yaxis, "contact_y", "contact point y"),
         ):  # fmt: skip
             if name in one:
-                words = labels.label(one, name).replace("energy above rest", "energy").replace(" along", "")
-                axis[0].axis_label = words
+                axis.axis_label = f"{words or labels.words(one, name)} ({labels.unit(one, name)})".removesuffix(" ()")
 
-    def _critical_line(self, name: str, dash: str) -> tuple[Span, Label]:
-        line = Span(
-            dimension="width", line_color="#6b7580", line_dash=dash, line_width=1, visible=False, level="underlay"
-        )
-        label = Label(x=0, y=0, text=critical_symbol(name), text_font_size="11px", text_align="right", visible=False,
-                      text_color="#4d5864")  # fmt: skip
-        self.spin.add_layout(line)
-        self.spin.add_layout(label)
-        return line, label
-
-    def _player(self) -> Column:
+    def _player(self) -> models.Column:
         """Buttons that play the trajectories; everything happens in the browser."""
-        line = Span(location=0, dimension="height", line_color="#1b2733", line_width=1, syncable=False)
-        self.spin.add_layout(line)
-        self.energy.add_layout(line)
-        clock = Label(x=6, y=6, x_units="screen", y_units="screen", text="", text_font_size="12px", syncable=False)
-        self.path.add_layout(clock)
-        self._unit = Label(x=0, y=0, text="", visible=False)
-        button = Toggle(label="▶ Play", width=84, syncable=False, name="play")
-        self._slider = Slider(start=0, end=1, step=0.001, value=0, title=None, show_value=False, syncable=False,
-                              sizing_mode="stretch_width", min_width=80, name="time")  # fmt: skip
-        speed = Select(title="lasts", value="20", width=76, options=[("10", "10 s"), ("20", "20 s"), ("60", "1 min"),
-                       ("600", "10 min")], syncable=False)  # fmt: skip
-        trail = Select(title="trail", value="0.02", width=96, options=[("0.002", "0.2 %"), ("0.02", "2 %"),
-                       ("0.2", "20 %"), ("1", "all")], syncable=False)  # fmt: skip
-        models = {
+        line = models.Span(location=0, dimension="height", line_color="#1b2733", line_width=1, syncable=False)
+        clock = models.Label(x=6, y=6, x_units="screen", y_units="screen", text_font_size="12px", syncable=False)
+        self._player_unit = models.Label(x=0, y=0, visible=False)
+        for plot, mark in ((self.spin, line), (self.energy, line), (self.path, clock)):
+            plot.add_layout(mark)
+        button = models.Toggle(label="▶ Play", width=84, syncable=False, name="play")
+        self._slider = models.Slider(start=0, end=1, value=0, title=None, show_value=False, syncable=False,
+                                     sizing_mode="stretch_width", min_width=80, name="time")  # fmt: skip
+        speed = models.Select(title="lasts", value="20", width=76, syncable=False, options=[
+            ("10", "10 s"), ("20", "20 s"), ("60", "1 min"), ("600", "10 min")])  # fmt: skip
+        trail = models.Select(title="trail", value="0.02", width=96, syncable=False, options=[
+            ("0.002", "0.2 %"), ("0.02", "2 %"), ("0.2", "20 %"), ("1", "all")])  # fmt: skip
+        parts = {
             "curves": [slot.samples for slot in self._slots], "trails": [slot.trail for slot in self._slots],
             "points": [slot.point for slot in self._slots], "line": line, "trail": trail, "clock": clock,
-            "unit": self._unit, "slider": self._slider, "speed": speed, "button": button,
+            "unit": self._player_unit, "slider": self._slider, "speed": speed, "button": button,
         }  # fmt: skip
-        moment = CustomJS(args={"models": models}, code="sweep.moment(models)")
-        changes: list[tuple[Any, str]] = [(self._slider, "value"), (self._slider, "end"), (trail, "value")]
-        for model, change in [*changes, *((slot.samples, "data") for slot in self._slots)]:
+        moment = models.CustomJS(args={"models": parts}, code="sweep.moment(models)")
+        for model, change in ((self._slider, "value"), (self._slider, "end"), (trail, "value")):
             model.js_on_change(change, moment)
+        for slot in self._slots:
+            slot.samples.js_on_change("data", moment)
         code = "cb_obj.label = cb_obj.active ? '⏸ Pause' : '▶ Play'; sweep.play(models, cb_obj.active)"
-        button.js_on_change("active", CustomJS(args={"models": models}, code=code))
-        row = Row(button, speed, trail, styles={"align-items": "end", "gap": "4px"})
-        return Column(self._slider, row, sizing_mode="stretch_width", name="player")
+        button.js_on_change("active", models.CustomJS(args={"models": parts}, code=code))
+        row = models.Row(button, speed, trail, styles={"align-items": "end", "gap": "4px"})
+        return models.Column(self._slider, row, sizing_mode="stretch_width", name="player")
 
 
 class _Slot:
     """The place of one curve in all figures."""
 
     def __init__(self, curves: Curves, colour: str) -> None:
-        self.series = ColumnDataSource({name: [] for name in ("time", *_OVER_TIME, *_PATH)})
-        self.reversals = ColumnDataSource({"x": [], "y": []})
-        self.samples = ColumnDataSource({name: [] for name in ("time", *_PATH)})
-        self.trail = ColumnDataSource({"x": [], "y": []}, syncable=False)
-        self.point = ColumnDataSource({"x": [], "y": [], "alpha": []}, syncable=False)
+        self.series, self.samples = models.ColumnDataSource(), models.ColumnDataSource()
+        self.reversals = models.ColumnDataSource()
+        self.trail = models.ColumnDataSource({"x": [], "y": []}, syncable=False)
+        self.point = models.ColumnDataSource({"x": [], "y": [], "alpha": []}, syncable=False)
+        self.item = models.LegendItem()
+        self.show(None, "")
         line = curves.spin.line("time", "spin", source=self.series, color=colour, width=1.2)
         dots = curves.spin.scatter("x", "y", source=self.reversals, color=colour, size=8, line_color="white")
-        self.item = LegendItem(label="", renderers=[line, dots], visible=False)
+        self.item.renderers = [line, dots]
         curves.energy.line("time", "energy", source=self.series, color=colour, width=1.2)
         curves.energy.line("time", "dissipated", source=self.series, color=colour, width=1.2, dash="dashed")
         curves.path.line(*_PATH, source=self.series, color=colour, width=0.5, alpha=0.25)
@@ -155,17 +133,20 @@ class _Slot:
         curves.path.scatter("x", "y", source=self.point, color=colour, size=9, line_color="white", alpha="alpha")
 
     def show(self, curve: Curve | None, name: str) -> None:
+        """Draw a curve, or nothing; what it does not tell is NaN."""
         self.item.update(label=value(name), visible=curve is not None)
-        columns, reversals = {name: np.zeros(0, "float32") for name in ("time", *_OVER_TIME, *_PATH)}, np.zeros(0)
-        if curve:
-            good, reversals = np.isfinite(curve.dataset["time"].values), curve.reversals
-            for name in columns:
-                known = curve.dataset[name].values if name in curve.dataset else np.full(len(good), np.nan)
-                columns[name] = known[good].astype("float32")
+        one, reversals = (
+            (curve.dataset, curve.reversals) if curve else (xr.Dataset({"time": ("time", [])}), np.zeros(0))
+        )
+        good = np.isfinite(one["time"].values)
+        columns = {
+            name: (one[name].values if name in one else np.full(len(good), np.nan))[good].astype("float32")
+            for name in ("time", *_OVER_TIME, *_PATH)
+        }
         at = _told([columns[name] for name in _OVER_TIME])
         self.series.data = {name: column[at] for name, column in columns.items()}
-        self.reversals.data = {"x": reversals, "y": np.zeros(len(reversals))}
         self.samples.data = {name: columns[name] for name in ("time", *_PATH)}
+        self.reversals.data = {"x": reversals, "y": np.zeros(len(reversals))}
 
 
 def _told(series: Sequence[Array]) -> Array:
@@ -174,9 +155,8 @@ def _told(series: Sequence[Array]) -> Array:
     stretch = -(-count // _STRETCHES)
     if stretch < 3:
         return np.arange(count)
-    whole = count // stretch * stretch
-    first = np.arange(0, whole, stretch)
-    tables = [one[:whole].reshape(-1, stretch) for one in series]
+    first = np.arange(0, count // stretch * stretch, stretch)
+    tables = [one[: first[-1] + stretch].reshape(-1, stretch) for one in series]
     picked = [first + pick(table, axis=1) for table in tables for pick in (np.argmin, np.argmax)]
     return np.unique([0, *np.concatenate(picked), count - 1])
 
@@ -184,13 +164,10 @@ def _told(series: Sequence[Array]) -> Array:
 def _figure(height: int, name: str) -> Any:
     plot = figure(
         height=height, min_width=220, sizing_mode="stretch_width", tools="pan,box_zoom,wheel_zoom,reset,save",
-        active_drag="box_zoom", toolbar_location="right", name=name,
+        active_drag="box_zoom", toolbar_location="right", name=name, outline_line_color=None,
     )  # fmt: skip
-    plot.toolbar.logo = None
-    plot.toolbar.autohide = True
-    plot.outline_line_color = None
+    plot.toolbar.update(logo=None, autohide=True)
     plot.grid.grid_line_color = "#e8ebee"
     for axis in plot.axis:
-        axis.update(axis_label_text_font_style="normal", axis_label_text_font_size="12px", axis_line_color="#8a949e",
-                    major_tick_line_color="#8a949e", minor_tick_line_color=None)  # fmt: skip
+        axis.update(**_AXIS)
     return plot
