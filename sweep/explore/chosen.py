@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from html import escape
 from typing import Any
 
 import numpy as np
 from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, Spinner
 
 from sweep.explore.colours import CURVES
-from sweep.explore.controls import BARE, escaped, on
+from sweep.explore.controls import BARE, on
 from sweep.explore.runner import Curve
 from sweep.explore.slices import Axis, Source
 from sweep.explore.state import MAX_CELLS, Cell
@@ -72,7 +73,7 @@ class CellControls:
             if curve:
                 status = labels.flag_words(curve.dataset, "status")[int(curve.dataset["status"])]
                 end = f"{status} at t = {float(curve.dataset['t_stop']):.6g}"
-                told.append(f"{k + 1}: {escaped(end)}, run in {curve.seconds:.2g} s")
+                told.append(f"{k + 1}: {escape(end)}, run in {curve.seconds:.2g} s")
         self._end.text = "<br>".join(told)
 
     def _row(self, k: int, activate: Callable[[int], None], remove: Callable[[int], None]) -> tuple[Row, Button]:

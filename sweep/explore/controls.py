@@ -1,37 +1,19 @@
-"""What the visitor handles to choose a map, and texts for the page."""
+"""What the visitor handles to choose a map."""
 
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from bokeh.models import Column, CustomJS, Div, RadioButtonGroup, Row, Select, Slider
 
-from sweep.explore.setup import why_still
 from sweep.explore.slices import Source
 from sweep.explore.state import Choice, State, choices
 from sweep.plots import labels
 
-_SOFT = '<p style="color:#5b6875">{}</p>'
-
-HINT = _SOFT.format(
-    "Point at a cell to read it. <b>Click</b> it to run its trajectory, with <b>Shift</b> to add it to those drawn. "
-    "With the keyboard: arrows choose a cell, Enter runs it."
-)
-EMPTY = _SOFT.format("The trajectories of the cells that you click are drawn and played here.")
-
 BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }"
-
-
-def still(source: Source) -> str:
-    """The hint for a file from which no trajectory is run."""
-    return _SOFT.format(f"Point at a cell to read it. {escaped(why_still(source))}")
-
-
-def escaped(text: str) -> str:
-    return html.escape(text)
 
 
 def on(model: Any, name: str, call: Callable[[Any], None]) -> None:
@@ -41,28 +23,6 @@ def on(model: Any, name: str, call: Callable[[Any], None]) -> None:
         call(new)
 
     model.on_change(name, changed)
-
-
-def table(here: Mapping[str, str], told: Mapping[str, str]) -> str:
-    """A cell's place and all its values as HTML."""
-    head = ", ".join(f"{escaped(name)} = {escaped(value)}" for name, value in here.items())
-    rows = "".join(
-        f'<tr><td style="color:#5b6875;padding:2px 12px 2px 0;vertical-align:top">{escaped(name)}</td>'
-        f'<td style="font-weight:600;text-align:right;vertical-align:top;white-space:nowrap">{escaped(value)}</td></tr>'
-        for name, value in told.items()
-        if name != "note"
-    )
-    note = f'<p style="margin:6px 0;color:#8a4b00">{escaped(told["note"])}</p>' if "note" in told else ""
-    return (
-        f'<div style="font-size:16px;font-weight:650;margin-bottom:4px">{head}</div>{note}'
-        f'<table style="border-collapse:collapse;font-size:12.5px;width:100%">{rows}</table>'
-    )
-
-
-def progress(text: str, share: float) -> str:
-    """A line with a bar."""
-    bar = f'<div style="width:{100 * share:.0f}%;height:4px;background:#56b4e9;border-radius:2px"></div>'
-    return f'<div>{escaped(text)}<div style="background:#fff4;border-radius:2px">{bar}</div></div>'
 
 
 class MapControls:
@@ -112,7 +72,7 @@ class _Widgets:
                                 stylesheets=[BARE])  # fmt: skip
             on(self._more, "value", lambda option: pick(choice.find(option)))
         row = Row(self._buttons, *([self._more] if self._more else []), styles={"gap": "6px", "flex-wrap": "wrap"})
-        heading = Div(text=escaped(choice.title), styles={"font-size": "12px", "color": "#5b6875"}, margin=0)
+        heading = Div(text=html.escape(choice.title), styles={"font-size": "12px", "color": "#5b6875"}, margin=0)
         self.root = Column(heading, row) if n else row
 
     def show(self, k: int) -> None:

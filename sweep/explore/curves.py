@@ -59,6 +59,9 @@ class Curves:
         present = [curve.dataset for curve in curves if curve]
         if present:
             self._label(present[0])
+        for part, series in ((self.spin, "spin"), (self.energy, "energy"), (self.path, "contact_x")):
+            part.visible = any(series in one for one in present)
+        self.player.visible = self.path.visible
         end = max([float(np.nanmax(one["time"])) for one in present], default=1.0)
         self._slider.update(end=end, step=end / 2000)
         chosen = curves[active] if active < len(curves) else None

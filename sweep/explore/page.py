@@ -12,10 +12,10 @@ from bokeh.document import Document
 from bokeh.embed import file_html
 from bokeh.models import Column, Div
 from bokeh.resources import INLINE
+from jinja2 import Environment
 
 from sweep.explore import figure, patterns, state
 from sweep.explore.colours import Scale
-from sweep.explore.controls import escaped
 from sweep.explore.lines import Lines, critical_lines
 from sweep.explore.slices import Slice, Source
 from sweep.plots import labels
@@ -27,6 +27,10 @@ _MOST_VALUES = 8_000_000
 
 def _text(name: str) -> str:
     return files("sweep.explore").joinpath(name).read_text(encoding="utf-8")
+
+
+PARTS: Any = Environment(autoescape=True).from_string(_text("page.parts.html")).module
+"""Functions that make HTML: `cell`, `empty`, `hint`, `legend` and `notice`."""
 
 
 def dress(document: Document, source: Source, query: str | None = None) -> None:
@@ -46,13 +50,7 @@ def legend(part: Slice, colours: Scale, lines: Sequence[Lines]) -> str:
     for each in lines:
         name = f"n_{each.name[2:]}" if "n0" in (part.x.name, part.y.name) else f"n₀ = n_{each.name[2:]}"
         items.append((f"border-top:2px {figure.DASHES[each.name]} #000", f"{name} ({each.source}): {each.words}"))
-    told = [
-        f'<span style="display:inline-flex;gap:7px;align-items:center">'
-        f'<i style="width:26px;flex:none;{style}"></i>{escaped(words)}</span>'
-        for style, words in items
-    ]
-    told.append(f"<span>{escaped(colours.beyond)}</span>")
-    return f'<div style="display:flex;flex-wrap:wrap;gap:4px 18px;font-size:12.5px">{"".join(told)}</div>'
+    return str(PARTS.legend(items, colours.beyond))
 
 
 def save_html(

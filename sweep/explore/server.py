@@ -35,32 +35,25 @@ def serve(source: Source, setup: Setup | None, port: int | None, *, browser: boo
     OSError
         if the port is in use.
     """
+    # Its advice to name an option of Bokeh's own command helps nobody here; the browser is refused all the same.
+    logging.getLogger("bokeh.server.views.ws").setLevel(logging.CRITICAL)
+    logging.getLogger("tornado.access").setLevel(logging.ERROR)
+    sockets, found = _bind(port)
+    hosts = [f"{host}:{found}" for host in ("localhost", ADDRESS)]
+    url = f"http://{hosts[0]}/"
     loop = IOLoop()
     loop.make_current()
-    _server, found = start(source, setup, port, loop)
-    url = f"http://localhost:{found}/"
+    application = Application(FunctionHandler(view.make(source, setup)))
+    web = _Web({"/": application}, extra_websocket_origins=hosts, absolute_url=url)
+    http = HTTPServer(web)
+    http.add_sockets(sockets)
+    BaseServer(loop, web, http).start()
     say(f"exploring {source.name} at {url} (Ctrl-C ends it)")
     if browser:
         loop.add_callback(lambda: webbrowser.open(url))
     for end in (signal.SIGINT, signal.SIGTERM):
         signal.signal(end, lambda *_: loop.add_callback_from_signal(loop.stop))
     loop.start()
-
-
-def start(source: Source, setup: Setup | None, port: int | None, loop: IOLoop) -> tuple[BaseServer, int]:
-    """A server on `ADDRESS` that takes requests as soon as the loop runs, and its port."""
-    # Its advice to name an option of Bokeh's own command helps nobody here; the browser is refused all the same.
-    logging.getLogger("bokeh.server.views.ws").setLevel(logging.CRITICAL)
-    logging.getLogger("tornado.access").setLevel(logging.ERROR)
-    sockets, found = _bind(port)
-    hosts = [f"{host}:{found}" for host in ("localhost", ADDRESS)]
-    application = Application(FunctionHandler(view.make(source, setup)))
-    web = _Web({"/": application}, extra_websocket_origins=hosts, absolute_url=f"http://{hosts[0]}/")
-    http = HTTPServer(web)
-    http.add_sockets(sockets)
-    server = BaseServer(loop, web, http)
-    server.start()
-    return server, found
 
 
 class _Web(BokehTornado):  # type: ignore[misc]  # Bokeh tells no types of it

@@ -15,12 +15,12 @@ from sweep.explore import controls, figure, page, saving
 from sweep.explore import state as states
 from sweep.explore.chosen import CellControls
 from sweep.explore.colours import CURVES
-from sweep.explore.controls import escaped
 from sweep.explore.curves import Curves
 from sweep.explore.drawn import Drawn
 from sweep.explore.lines import critical_lines
+from sweep.explore.page import PARTS
 from sweep.explore.runner import Job, Runner
-from sweep.explore.setup import Setup
+from sweep.explore.setup import Setup, why_still
 from sweep.explore.slices import Source
 from sweep.explore.state import Cell, State
 from sweep.parameters import PARAMETERS
@@ -68,17 +68,16 @@ class View:
         self._figures = Curves()
         self._controls = controls.MapControls(self._source, self._change)
         self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
-        self._hint = Div(text=controls.EMPTY, sizing_mode="stretch_width")
-        spin, energy, path, player = (getattr(self._figures, name) for name in ("spin", "energy", "path", "player"))
-        curves = Column(self._hint, spin, energy, sizing_mode="stretch_width", name="curves")
-        paths = Column(path, player, sizing_mode="stretch_width", name="path")
-        self._shown_with = {"spin": [spin], "energy": [energy], "contact_x": [path, player]}
+        self._hint = Div(text=str(PARTS.empty()), sizing_mode="stretch_width")
+        shown = self._figures
+        curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
+        path = Column(shown.path, shown.player, sizing_mode="stretch_width", name="path")
         files = {"nc": self._netcdf, "yaml": self._yaml} if self._setup else {"nc": self._netcdf}
         name = saving.stem(self._source)
-        save = saving.buttons(name, self._map, [spin, energy, path], files, self._call)
+        save = saving.buttons(name, self._map, [shown.spin, shown.energy, shown.path], files, self._call)
         # It travels with a root: what a callback of the document alone refers to is not kept up to date.
         save.tags = [self._calls]
-        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, paths,
+        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, path,
                      self._chosen.root, save):  # fmt: skip
             self._document.add_root(root)
 
@@ -124,10 +123,11 @@ class View:
         """Tell about the cell under the pointer, or else about the chosen one."""
         index = self._place(self._probe)
         if index is None:
-            self._cell.text = controls.HINT if self._setup else controls.still(self._source)
+            self._cell.text = str(PARTS.hint("" if self._setup else why_still(self._source)))
             return
-        here = {labels.symbol(d): f"{self._source.axes[d].values[index[d]]:.6g}" for d in self._source.dims}
-        self._cell.text = controls.table(here, self._source.describe(index))
+        here = [f"{labels.symbol(d)} = {self._source.axes[d].values[index[d]]:.6g}" for d in self._source.dims]
+        told = self._source.describe(index)
+        self._cell.text = str(PARTS.cell(", ".join(here), told.pop("note", ""), told))
 
     # ---- the cells whose trajectories are drawn
 
@@ -203,9 +203,6 @@ class View:
             for k, (name, curve) in enumerate(zip(self._names(), curves, strict=True), 1)
         ]
         self._hint.visible = not any(curves)
-        for series, parts in self._shown_with.items():
-            for part in parts:
-                part.visible = any(series in curve.dataset for curve in curves if curve)
         self._figures.show(curves, names, self._drawn.active)
         self._chosen.tell(curves)
 
@@ -218,11 +215,9 @@ class View:
 
     def _draw_progress(self) -> None:
         names = self._names()
-        told = [f"<div>{escaped(fault)}</div>" for fault in self._faults]
-        for k, job in self._drawn.running():
-            told.append(controls.progress(f"{names[k]}: {job.delay or f'{job.share:.0%}'}", job.share))
-        self._notice.text = "".join(told)
-        self._notice.visible = bool(told)
+        running = [(f"{names[k]}: {job.delay or f'{job.share:.0%}'}", job.share) for k, job in self._drawn.running()]
+        self._notice.text = str(PARTS.notice(self._faults, running))
+        self._notice.visible = bool(self._faults or running)
 
     # ---- files
 
