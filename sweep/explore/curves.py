@@ -78,7 +78,7 @@ class Curves:
         """Label the axes, in the units of a trajectory."""
         lowest, highest = (self.energy, self.spin) if "energy" in one else (self.spin, self.energy)
         lowest.xaxis.axis_label, highest.xaxis.axis_label = labels.label(one, "time"), None
-        self._player_unit.text = labels.unit(one, "time")
+        self._slider.tags = [labels.unit(one, "time")]
         for axis, name, words in (
             (self.spin.yaxis, "spin", ""), (self.energy.yaxis, "energy", "energy"),
             (self.path.xaxis, "contact_x", "contact point x"), (self.path.yaxis, "contact_y", "contact point y"),
@@ -90,7 +90,6 @@ class Curves:
         """Buttons that play the trajectories; everything happens in the browser."""
         line = models.Span(location=0, dimension="height", line_color="#1b2733", line_width=1, syncable=False)
         clock = models.Label(x=6, y=6, x_units="screen", y_units="screen", text_font_size="12px", syncable=False)
-        self._player_unit = models.Label(x=0, y=0, visible=False)
         for plot, mark in ((self.spin, line), (self.energy, line), (self.path, clock)):
             plot.add_layout(mark)
         button = models.Toggle(label="▶ Play", width=84, syncable=False, name="play")
@@ -103,7 +102,7 @@ class Curves:
         parts = {
             "curves": [slot.samples for slot in self._slots], "trails": [slot.trail for slot in self._slots],
             "points": [slot.point for slot in self._slots], "line": line, "trail": trail, "clock": clock,
-            "unit": self._player_unit, "slider": self._slider, "speed": speed, "button": button,
+            "slider": self._slider, "speed": speed, "button": button,
         }  # fmt: skip
         moment = models.CustomJS(args={"models": parts}, code="sweep.moment(models)")
         for model, change in ((self._slider, "value"), (self._slider, "end"), (trail, "value")):

@@ -141,10 +141,10 @@ const sweep = (() => {
   let player = null
 
   /** Show the trajectories at the slider's moment: the line in the curves, and the path of the last while. */
-  function moment({curves, trails, points, line, slider, trail, clock, unit}) {
+  function moment({curves, trails, points, line, slider, trail, clock}) {
     const time = slider.value
     line.location = time
-    clock.text = `t = ${time.toFixed(time < 100 ? 1 : 0)} ${unit.text}`
+    clock.text = `t = ${time.toFixed(time < 100 ? 1 : 0)} ${slider.tags[0] ?? ""}`.trimEnd()
     curves.forEach((curve, k) => {
       const {time: t, contact_x: x, contact_y: y} = curve.data
       const end = before(t, time), begin = before(t, time - trail.value * slider.end)

@@ -109,6 +109,8 @@ def settle(page: Page) -> None:
 
 NAMED = "Bokeh.documents[0].get_model_by_name"
 
+CLOCK = "m.center.filter((c) => c.type === 'Label')[0].text"
+
 MAP = f"{NAMED}('map').children[0]"
 
 
@@ -352,6 +354,7 @@ def test_the_trajectory_is_played(visit: Callable[..., Page]) -> None:
         page, "contact path", "[m.renderers[1].data_source.data.x.length, m.renderers[0].data_source.data.time.length]"
     )
     assert 20 < trail[0] < trail[1]
+    assert model(page, "contact path", CLOCK) == f"t = {moment:.{1 if moment < 100 else 0}f} √(c/g)"
 
 
 def test_a_link_reopens_the_page(visit: Callable[..., Page]) -> None:
@@ -435,6 +438,7 @@ def test_a_click_runs_a_users_model_that_the_user_names(browser: Browser, tmp_pa
             assert model(page, "spin", "m.left[0].axis_label") == "spin n"
             assert model(page, "spin", "m.below[0].axis_label") == "time t"
             assert not model(page, "contact path", "m.visible")
+            assert model(page, "contact path", CLOCK) == "t = 0.0"
             field = control(page, "parameter torque", "input")
             field.fill("1.5")
             field.press("Enter")

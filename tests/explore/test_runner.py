@@ -57,9 +57,15 @@ def test_a_trajectory_has_the_sweeps_numbers(source: Source, setup: Setup, opene
     cell = opened.isel(index)
     for name in ("reversals", "t_last_reversal"):
         assert curve.dataset[name].item() == cell[name].item()
-    assert curve.dataset["t_stop"].item() == setup.config.integrator.t_end
     assert len(curve.reversals) == cell["reversals"]
     assert {"contact_x", "energy", "dissipated"} <= set(curve.dataset)
+
+
+def test_a_curve_goes_on_where_a_sweep_ends(setup: Setup) -> None:
+    """A spin below 1.5 n_c1 settles within a few units of time, and is seen nevertheless."""
+    cell = {**setup.base, "mu": 75.0, "b": 3.0, "n0": -0.006}
+    assert sweep.trajectory(setup.config, **cell, stop_when_settled=True)["t_stop"].item() < 10
+    assert runner.run(setup, cell).dataset["time"][-1] == setup.config.integrator.t_end
 
 
 def test_long_trajectories_are_sampled_sparsely(
