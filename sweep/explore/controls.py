@@ -1,4 +1,4 @@
-"""What the visitor handles to choose a map."""
+"""The widgets by which the visitor chooses a map."""
 
 from __future__ import annotations
 

@@ -59,12 +59,12 @@ class Job(Reporter):
     cell: Cell
     tell: Callable[[Job], None]
     share: float = 0.0
-    """How much of the run is over."""
+    """The part of the run that is over."""
     delay: str = ""
-    """Why it does not get on, if it does not."""
+    """The reason if it does not get on."""
     curve: Curve | None = None
     fault: str = ""
-    """Why there will be no curve."""
+    """The reason if there will be no curve."""
     dropped: bool = False
     """Set by whoever no longer waits: the run is not begun, or ends at its next chunk, and nothing more is told."""
     _told: float = 0.0

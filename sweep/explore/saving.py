@@ -1,4 +1,4 @@
-"""What is seen as files: slice and trajectories as netCDF, the configuration that makes them, and their buttons."""
+"""Files of what is seen: slice and trajectories as netCDF, the configuration that makes them, and their buttons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the trajectories of a dataset are run: by its configuration, and by a user's model if that is named."""
+"""The trajectories of a dataset are run by its configuration, and by a user's model if that is named."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Announce = Callable[[str], None]
 
 
 class Setup:
-    """How the dataset's trajectories are run: its configuration, and the parameters of a cell that are not named.
+    """The configuration that runs the dataset's trajectories, and the parameters of a cell that are not named.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Setup:
 
 
 def why_still(source: Source) -> str:
-    """Why no trajectory is run of a file that is not `usable`."""
+    """Say why no trajectory is run of a file that is not `usable`."""
     if place := source.dataset.attrs.get("model_place"):
         return f"Its model is code of a user, {place}, and runs only if you name it: sweep explore FILE --model MODEL."
     return "This file tells no configuration to run trajectories from."
@@ -55,7 +55,7 @@ def usable(source: Source) -> Setup | None:
 
 
 def _named(source: Source, model: str) -> dict[str, str]:
-    """What the configuration has to say of the model that the user names: it runs only if its hash is the dataset's.
+    """The keys by which the configuration names the user's model, which runs only if its hash is the dataset's.
 
     What the dataset says of its file does not matter: the dataset may come from anybody.
     """

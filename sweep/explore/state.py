@@ -1,4 +1,4 @@
-"""What the page shows, the choices that lead there, and both as an address says them.
+"""The state of the page, the choices that change it, and the address that tells it.
 
 Every value that comes from an address or from a browser is checked here.
 """
@@ -51,9 +51,9 @@ class Choice:
     title: str
     options: Sequence[str]
     words: Sequence[str]
-    """What the page says of each option."""
+    """The options as the page says them."""
     buttons: int = 0
-    """How many of the options, from the first on, have a button each; the others share a list or a slider."""
+    """The number of options, from the first on, that have a button each; the others share a list or a slider."""
     axis: Axis | None = None
     """The axis of the dataset on which the options are places."""
 
@@ -97,7 +97,7 @@ def choices(source: Source) -> dict[str, Choice]:
 
 
 def first(source: Source) -> State:
-    """What is shown when the address asks for nothing, over the two longest axes, in the dataset's order."""
+    """The state when the address asks for nothing: the dataset's subject over its two longest axes, in its order."""
     longest = sorted(source.dims, key=lambda d: -len(source.axes[d].values))[:2]
     x, *rest = [d for d in source.dims if d in longest]
     about = subject(source.dataset)
@@ -145,7 +145,7 @@ def read(
 
 
 def wrong_value(parameter: Parameter, value: float) -> str:
-    """What is wrong with the value of a parameter; "" if nothing is."""
+    """Say what is wrong with the value of a parameter; "" if nothing is."""
     if math.isfinite(value) and parameter.allows(value):
         return ""
     return f"{parameter.name} has to be {parameter.allowed}"

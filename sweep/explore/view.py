@@ -27,7 +27,7 @@ from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 
 _BESIDE = ("reversals", "reversals_predicted", "status")
-"""What the pointer shows of a cell at once; the server adds everything else."""
+"""The pointer shows these of a cell at once; the server adds everything else."""
 
 _NOTICE = {"background": "#1b2733", "border-radius": "8px", "box-shadow": "0 4px 18px #0004", "color": "white",
            "max-width": "calc(100vw - 72px)", "padding": "8px 16px"}  # fmt: skip
@@ -207,7 +207,7 @@ class View:
         self._chosen.tell(curves)
 
     def _names(self) -> list[str]:
-        """What tells the cells apart."""
+        """Name each cell by what tells it from the others."""
         cells, base = self._drawn.cells, self._base
         varied = [n for n in base if n not in self._source.dims and any(cell[n] != base[n] for cell in cells)]
         varied = [*(n for n in self._source.dims if n in base), *varied]
@@ -233,7 +233,7 @@ class View:
 
 
 def make(source: Source, setup: Setup | None) -> Callable[[Document], None]:
-    """What fills the document of each visitor."""
+    """A function that fills the document of each visitor."""
     runner = Runner(setup) if setup else None
     if setup and runner:
         # Compiles the simulation, or loads it from the cache, before the first click needs it.
