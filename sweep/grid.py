@@ -16,7 +16,7 @@ from sweep.parameters import PARAMETERS, START
 Array = NDArray[Any]
 
 Tile = tuple[slice, ...]
-"""A block of cells of a grid: a range of each of its dimensions."""
+"""A part of a grid: a range of each of its dimensions."""
 
 
 class Sweepable(Protocol):
@@ -71,17 +71,17 @@ class Grid:
         return varying | {name: np.full(self.size, value) for name, value in self.constants.items()}
 
     def tiles(self, cells: int) -> list[Tile]:
-        """Blocks of about `cells` cells that cover the grid; each is contiguous in C order."""
-        block, inner = [1] * len(self.shape), self.size
+        """Tiles of about `cells` cells that cover the grid; each is contiguous in C order."""
+        sides, inner = [1] * len(self.shape), self.size
         for position, length in enumerate(self.shape):
             inner //= length
             if inner <= cells:
                 pieces = -(-length // max(1, cells // inner))
-                block[position:] = [-(-length // pieces), *self.shape[position + 1 :]]
+                sides[position:] = [-(-length // pieces), *self.shape[position + 1 :]]
                 break
-        ranges = [range(0, length, step) for length, step in zip(self.shape, block, strict=True)]
+        ranges = [range(0, length, step) for length, step in zip(self.shape, sides, strict=True)]
         return [
-            tuple(slice(i, min(i + step, n)) for i, step, n in zip(corner, block, self.shape, strict=True))
+            tuple(slice(i, min(i + step, n)) for i, step, n in zip(corner, sides, self.shape, strict=True))
             for corner in product(*ranges)
         ]
 

@@ -177,8 +177,8 @@ class _Top(Strict):
     )  # fmt: skip
     refine: Whole = Field(
         default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1,
-        description="the largest blocks of cells whose inside is inferred from their sides have 2^refine cells a side; "
-        "0 simulates every cell",
+        description="the largest patches, whose inside is inferred from their sides, have 2^refine cells a side; 0 "
+        "simulates every cell",
     )  # fmt: skip
     max_failed_fraction: float = Field(
         default=0.01, ge=0, le=1, description="share of failed cells beyond which the command exits with 3"

@@ -19,7 +19,7 @@ from typing import Any
 import numba
 
 from sweep.config import Config
-from sweep.engine.local import Done, run_group
+from sweep.engine.local import Done, run_batch
 from sweep.engine.plan import kernels
 from sweep.grid import Tile
 from sweep.interrupt import point
@@ -132,7 +132,7 @@ def _work(shared: Shared, tile: int) -> Done:
     with _one_tile:
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         numba.set_num_threads(min(get_worker().state.nthreads, most))
-        (done,) = run_group(config, tiles, [tile])
+        (done,) = run_batch(config, tiles, [tile])
     return done
 
 

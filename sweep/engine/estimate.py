@@ -7,7 +7,7 @@ import numpy as np
 from sweep.config import Config
 from sweep.config.user_models import explained
 from sweep.engine.executor import nominal_seconds
-from sweep.engine.local import GROUP
+from sweep.engine.local import BATCH
 from sweep.engine.plan import choose
 from sweep.grid import Grid
 
@@ -32,7 +32,7 @@ def estimate(config: Config) -> str:
     total, seconds = sum(each.sum() for each in steps) * share, sum(map(nominal_seconds, steps)) * share
     numbers = sum(len(each.cells) * len(each.kernel.layout.names) for each in chosen)
     bytes_a_cell = np.dtype(float).itemsize * numbers / sample.size
-    memory, disk = min(grid.size, GROUP) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
+    memory, disk = min(grid.size, BATCH) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
     return "\n".join(
         [
             cells,

@@ -21,8 +21,8 @@ from sweep.results import dataset
 from sweep.results.provenance import this_cpu
 from sweep.results.store import Running, Store
 
-GROUP = 32_768
-"""Cells simulated together (50 MB of images).  Lanes idle only at the end of such a group of tiles."""
+BATCH = 32_768
+"""Cells simulated together (50 MB of images).  Lanes idle only at the end of such a batch of tiles."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def run(
     *,
     after_chunk: Callable[[Array], None],
 ) -> Iterator[Done]:
-    """Run the tiles `todo`, group by group, and yield them as they are finished.
+    """Run the tiles `todo`, batch by batch, and yield them as they are finished.
 
     Parameters
     ----------
@@ -52,34 +52,34 @@ def run(
     after_chunk : called with the statuses of the cells at work
     """
     grid = Grid.of(config)
-    for group, left in _groups(grid, tiles, todo, store):
-        yield from run_group(config, tiles, group, store=store, left=left, after_chunk=after_chunk)
+    for batch, left in _batches(grid, tiles, todo, store):
+        yield from run_batch(config, tiles, batch, store=store, left=left, after_chunk=after_chunk)
 
 
-def run_group(
+def run_batch(
     config: Config,
     tiles: Sequence[Tile],
-    group: Sequence[int],
+    batch: Sequence[int],
     *,
     store: Store | None = None,
     left: Running | None = None,
     after_chunk: Callable[[Array], None] = lambda status: None,  # noqa: ARG005
 ) -> Iterator[Done]:
-    """Run the tiles `group` together.
+    """Run the tiles `batch` together.
 
     Parameters
     ----------
     store : keeps the images after each chunk
-    left : the images of this group that an earlier run left, to be continued
-    after_chunk : called with the statuses of the group's cells
+    left : the images of this batch that an earlier run left, to be continued
+    after_chunk : called with the statuses of the batch's cells
     """
     grid, cpu = Grid.of(config), this_cpu()
     if not config.simulated:
-        for i in group:
+        for i in batch:
             point()
             yield Done(i, _evaluate(config, grid.part(tiles[i])), 0.0, cpu)
         return
-    plans, tables = pool(plan(config, grid.part(tiles[i])) for i in group)
+    plans, tables = pool(plan(config, grid.part(tiles[i])) for i in batch)
     for kernel, _ in tables.values():
         kernel.compile()
     images, began = {method: table for method, (_, table) in tables.items()}, time.perf_counter()
@@ -94,7 +94,7 @@ def run_group(
     def chunk() -> None:
         # Images are saved only here, between two chunks: anywhere else an interrupt may find half of them advanced.
         if store:
-            store.save_running(Running(list(group), images, time.perf_counter() - began))
+            store.save_running(Running(list(batch), images, time.perf_counter() - began))
         # What looks like a failure is decided only after all cells have ended.
         status = statuses()
         after_chunk(np.where(np.isin(status, FAILURES), RUNNING, status))
@@ -104,17 +104,17 @@ def run_group(
         executor.execute(kernel, table, stop_when_settled=settle, after_chunk=chunk)
     # Not saved: a run that is killed here goes on from the ends of the first runs.
     repeat_all(plans, tables, lambda: after_chunk(statuses()))
-    seconds = (time.perf_counter() - began) / len(group)
+    seconds = (time.perf_counter() - began) / len(batch)
     results = [job.results() for job in plans]
-    again = _verified(config, grid, [tiles[i] for i in group], results, lambda: after_chunk(statuses()))
-    for i, job, first, second in zip(group, plans, results, again, strict=True):
+    again = _verified(config, grid, [tiles[i] for i in batch], results, lambda: after_chunk(statuses()))
+    for i, job, first, second in zip(batch, plans, results, again, strict=True):
         arrays = first | second
         if runs_asked_for(job):
             arrays |= sensitivity(job, lambda: after_chunk(statuses()))
         yield Done(i, arrays, seconds, cpu)
 
 
-def _groups(
+def _batches(
     grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], store: Store
 ) -> Iterator[tuple[list[int], Running | None]]:
     """The tiles to run together: first those whose images the store has, along with these."""
@@ -123,17 +123,17 @@ def _groups(
     if left and set(left.tiles) <= set(waiting):
         yield left.tiles, left
         waiting = [i for i in waiting if i not in left.tiles]
-    group: list[int] = []
+    batch: list[int] = []
     cells = 0
     for i in waiting:
         size = grid.part(tiles[i]).size
-        if group and cells + size > GROUP:
-            yield group, None
-            group, cells = [], 0
-        group.append(i)
+        if batch and cells + size > BATCH:
+            yield batch, None
+            batch, cells = [], 0
+        batch.append(i)
         cells += size
-    if group:
-        yield group, None
+    if batch:
+        yield batch, None
 
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:

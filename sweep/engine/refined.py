@@ -44,10 +44,10 @@ class Refined:
 
     @cached_property
     def _refined(self) -> list[int]:
-        """Indices of the axes that are ranges and longer than a block."""
+        """Indices of the axes that are ranges and longer than a patch."""
         specs = [self.config.parameters[name].spec for name in self.grid.axes]
-        block = 2**self.config.refine
-        return [i for i, spec in enumerate(specs) if isinstance(spec, dict) and self.grid.shape[i] > block]
+        patch = 2**self.config.refine
+        return [i for i, spec in enumerate(specs) if isinstance(spec, dict) and self.grid.shape[i] > patch]
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
         """Add the nodes to simulate next, judging by the outcomes of all tiles so far.  False if there are none.

@@ -1,12 +1,12 @@
 """Which nodes of a map to simulate if its outcome changes only across lines: the nodes near these lines.
 
-The map is cut into blocks with 2^depth intervals along each refined axis.  Neighbouring blocks share the
-nodes of their common side, and the last block of an axis may be shorter.
+The map is cut into patches with 2^depth intervals along each refined axis.  Neighbouring patches share the
+nodes of their common side, and the last patch of an axis may be shorter.
 
-1. The corners of every block are simulated.
-2. A block in which, or on whose sides, known outcomes differ is halved along each axis, and so on down
-   to blocks of two intervals.  The inside of every other block has the outcome of its corners.
-3. Inside a block of two intervals whose outcomes differ, a node is inferred if two opposite neighbours
+1. The corners of every patch are simulated.
+2. A patch in which, or on whose sides, known outcomes differ is halved along each axis, and so on down
+   to patches of two intervals.  The inside of every other patch has the outcome of its corners.
+3. Inside a patch of two intervals whose outcomes differ, a node is inferred if two opposite neighbours
    agree, and no two others agree on another outcome.  So along a line every second node is simulated,
    and each node where the line turns.
 4. Lines one node wide would be lost by that.  Therefore, if most neighbours of a simulated node have
@@ -41,7 +41,7 @@ def missing(outcome: Outcomes, refined: Sequence[int], depth: int) -> Nodes:
     ----------
     outcome : outcomes of the nodes, of any shape; `UNKNOWN` where not simulated yet
     refined : indices of the refined axes
-    depth : level of the largest blocks, at least 1
+    depth : level of the largest patches, at least 1
     """
     wanted, _ = _search(outcome, refined, depth)
     return np.flatnonzero(wanted & (outcome == UNKNOWN))
@@ -59,14 +59,14 @@ def _search(outcome: Outcomes, refined: Sequence[int], depth: int) -> tuple[Flag
     """Which nodes to simulate, and for each node the one whose outcome it has (itself if that is not known yet)."""
     wanted = np.zeros(outcome.shape, bool)
     source = np.arange(outcome.size).reshape(outcome.shape)
-    for level, blocks, halved in _levels(outcome, refined, depth):
+    for level, patches, halved in _levels(outcome, refined, depth):
         size = 2**level
         at = [_corner_places(n, size) for n in outcome.shape]
-        wanted[_mesh(outcome, refined, at)] |= _corners(blocks, refined)
-        # A node on the sides of several blocks has the same outcome in each: any of them will do.
-        block = [np.minimum(np.arange(n), n - 2) // size for n in outcome.shape]
-        inferred = (blocks & ~halved)[_mesh(outcome, refined, block)] & (outcome == UNKNOWN)
-        first = _mesh(outcome, refined, [size * i for i in block])
+        wanted[_mesh(outcome, refined, at)] |= _corners(patches, refined)
+        # A node on the sides of several patches has the same outcome in each: any of them will do.
+        patch = [np.minimum(np.arange(n), n - 2) // size for n in outcome.shape]
+        inferred = (patches & ~halved)[_mesh(outcome, refined, patch)] & (outcome == UNKNOWN)
+        first = _mesh(outcome, refined, [size * i for i in patch])
         np.copyto(source, np.ravel_multi_index(first, outcome.shape), where=inferred)
     _infer_between(outcome, refined, wanted, source)
     wanted |= _beside_tips(outcome, refined, outcome.ravel()[source])
@@ -74,7 +74,7 @@ def _search(outcome: Outcomes, refined: Sequence[int], depth: int) -> tuple[Flag
 
 
 def _infer_between(outcome: Outcomes, refined: Sequence[int], wanted: Flags, source: Nodes) -> None:
-    """Infer the nodes between the corners of the smallest blocks, or mark them as wanted; in place.
+    """Infer the nodes between the corners of the smallest patches, or mark them as wanted; in place.
 
     Midpoints of edges come first, then those of faces, then those of bodies, so that the neighbours
     of a node are decided before it.
@@ -123,7 +123,7 @@ def _beside_tips(outcome: Outcomes, refined: Sequence[int], value: Outcomes) -> 
 
 
 def _corner_places(nodes: int, size: int) -> Nodes:
-    """The corners of blocks of `size` intervals, as indices along an axis."""
+    """The corners of patches of `size` intervals, as indices along an axis."""
     return np.append(np.arange(0, nodes - 1, size), nodes - 1)
 
 
@@ -133,19 +133,19 @@ def _mesh(outcome: Outcomes, refined: Sequence[int], places: Sequence[Any]) -> t
 
 
 def _levels(outcome: Outcomes, refined: Sequence[int], depth: int) -> Iterator[tuple[int, Flags, Flags]]:
-    """Level, which blocks there are, and which of these are halved; from the largest down to those of two intervals."""
+    """Yield level, patches and which of these are halved; from the largest down to those of two intervals."""
     changed = _changed(outcome, refined, depth)
-    blocks = np.ones_like(changed[depth])
+    patches = np.ones_like(changed[depth])
     for level in range(depth, 0, -1):
-        halved = blocks & changed[level]
-        yield level, blocks, halved
-        blocks = halved
+        halved = patches & changed[level]
+        yield level, patches, halved
+        patches = halved
         for axis in refined:
-            blocks = blocks.repeat(2, axis).take(range(changed[level - 1].shape[axis]), axis)
+            patches = patches.repeat(2, axis).take(range(changed[level - 1].shape[axis]), axis)
 
 
 def _changed(outcome: Outcomes, refined: Sequence[int], depth: int) -> list[Flags]:
-    """By level: the blocks in which, or on whose sides, known outcomes differ."""
+    """By level: the patches in which, or on whose sides, known outcomes differ."""
     lowest, highest = np.where(outcome == UNKNOWN, np.iinfo(outcome.dtype).max, outcome), outcome
     for axis in refined:
         lowest, highest = _pairs(np.minimum, lowest, axis), _pairs(np.maximum, highest, axis)
@@ -165,9 +165,9 @@ def _pairs(function: np.ufunc, values: Any, axis: int) -> Any:
     return np.moveaxis(function(values[:-1], values[1:]), 0, axis)
 
 
-def _corners(blocks: Flags, refined: Sequence[int]) -> Flags:
-    """The nodes of a level that are corners of `blocks`."""
+def _corners(patches: Flags, refined: Sequence[int]) -> Flags:
+    """The nodes of a level that are corners of `patches`."""
     for axis in refined:
-        framed = np.pad(blocks, [(int(i == axis),) * 2 for i in range(blocks.ndim)])
-        blocks = _pairs(np.logical_or, framed, axis)
-    return blocks
+        framed = np.pad(patches, [(int(i == axis),) * 2 for i in range(patches.ndim)])
+        patches = _pairs(np.logical_or, framed, axis)
+    return patches

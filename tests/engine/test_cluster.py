@@ -161,7 +161,7 @@ def test_a_tile_that_kills_its_workers_is_reported(config: Path, client: distrib
     def die() -> None:
         import sweep.engine.cluster
 
-        sweep.engine.cluster.run_group = lambda *_: os._exit(1)
+        sweep.engine.cluster.run_batch = lambda *_: os._exit(1)
 
     allowed, local.scheduler.allowed_failures = local.scheduler.allowed_failures, 0
     try:

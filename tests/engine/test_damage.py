@@ -38,7 +38,7 @@ TILE = 3
 def _many_tiles() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sweep.engine.run.tile_size", lambda cells: TILE)  # noqa: ARG005
-        patch.setattr(local, "GROUP", 2 * TILE)
+        patch.setattr(local, "BATCH", 2 * TILE)
         yield
 
 

@@ -79,7 +79,7 @@ def test_tiles_of_impossible_bodies_and_a_resumed_run(
     edge: xr.Dataset, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
     monkeypatch.setattr(run, "tile_size", lambda cells: size)  # noqa: ARG005
-    monkeypatch.setattr(local, "GROUP", size)
+    monkeypatch.setattr(local, "BATCH", size)
     with pytest.raises(KeyboardInterrupt):
         sweep.run(write(TEXT), tmp_path, reporter=Stop(3))
     reporter = Stop(10**6)

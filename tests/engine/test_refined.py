@@ -226,15 +226,15 @@ def test_resumes_and_recomputes_nothing(
     file: Path, refined: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ran = Counter[int]()
-    run_group = local.run_group
+    run_batch = local.run_batch
 
     def counted(*arguments: Any, **options: Any) -> Iterator[Done]:
-        for done in run_group(*arguments, **options):
+        for done in run_batch(*arguments, **options):
             ran[done.tile] += 1
             yield done
 
-    monkeypatch.setattr(local, "run_group", counted)
-    monkeypatch.setattr(local, "GROUP", 20)
+    monkeypatch.setattr(local, "run_batch", counted)
+    monkeypatch.setattr(local, "BATCH", 20)
     monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: 20)  # noqa: ARG005
     interruptions = 0
     while True:

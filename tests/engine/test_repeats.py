@@ -201,7 +201,7 @@ def test_tiles_and_threads_do_not_touch_the_numbers(
     assert {TIME_LIMIT, *ENDS} <= set(whole.status.values.tolist())
     assert REPEAT in whole.step_rule
     monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: size)  # noqa: ARG005
-    monkeypatch.setattr("sweep.engine.local.GROUP", 2 * size)
+    monkeypatch.setattr("sweep.engine.local.BATCH", 2 * size)
     with threads(1):
         same_numbers(cells(MIXED, **settings), whole)
     same_numbers(cells(MIXED[::-1], **settings).isel(case=slice(None, None, -1)).assign_coords(case=whole.case), whole)

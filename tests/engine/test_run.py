@@ -73,7 +73,7 @@ def test_tiles_do_not_touch_the_numbers(
     write: Write, tmp_path: Path, small: xr.Dataset, size: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: size)  # noqa: ARG005
-    monkeypatch.setattr("sweep.engine.local.GROUP", 2)
+    monkeypatch.setattr("sweep.engine.local.BATCH", 2)
     same_numbers(sweep.run(write()), small)
     with pytest.raises(KeyboardInterrupt):
         sweep.run(write(), tmp_path / "out", reporter=Stop(3))

@@ -87,14 +87,14 @@ def test_a_refined_run_in_memory_simulates_no_tile_twice(tmp_path: Path, monkeyp
         "integrator: {t_end: 1000}\nrefine: 2\n",
         encoding="utf-8",
     )
-    run_group, ran = local.run_group, list[int]()
+    run_batch, ran = local.run_batch, list[int]()
 
     def counted(*arguments: Any, **options: Any) -> Iterator[Done]:
-        for done in run_group(*arguments, **options):
+        for done in run_batch(*arguments, **options):
             ran.append(done.tile)
             yield done
 
-    monkeypatch.setattr(local, "run_group", counted)
+    monkeypatch.setattr(local, "run_batch", counted)
     sweep.run(path)
     assert len(ran) > 1
     assert sorted(ran) == list(range(len(ran)))

@@ -63,7 +63,7 @@ def command(
     faulthandler.enable()
     executor.CHUNK_SECONDS = 0.004
     engine_run.tile_size = lambda cells: TILE  # noqa: ARG005
-    local.GROUP = 2 * TILE
+    local.BATCH = 2 * TILE
     if versions:
         true_version = metadata.version
         metadata.version = lambda name: versions.get(name) or true_version(name)
