@@ -12,6 +12,7 @@ import click
 from sweep import interrupt
 from sweep.cli.faults import DONE, about, needs_bokeh, refuse, say
 from sweep.cli.options import FILE, PATH, announce, parse_pair, parse_span
+from sweep.plots import formats
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 @click.option(
     "--output",
     type=PATH,
-    help="Picture to write; its suffix names the format: png, pdf, svg or html [default: a PNG beside FILE].",
+    help=f"Picture to write; its suffix names the format: {formats.ANY} [default: a PNG beside FILE].",
 )
 def plot(
     files: tuple[Path, ...], variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...],
@@ -46,13 +47,13 @@ def plot(
     interrupt.raise_again()
     stem = "-".join(file.stem for file in files)
     target = output or files[0].with_name(f"{stem}{f'_{variable}' if variable else ''}.png")
-    if picture.suffix(target) == "html":
+    if formats.suffix(target) == formats.PAGE:
         if len(files) > 1:
-            refuse(f"--output {target}", f"a page shows one dataset; write {picture.ALLOWED} of several")
+            refuse(f"--output {target}", f"a page shows one dataset; write a {formats.A_PICTURE} of several")
         _plot_page(files[0], target, variable, x, y, sel, limits, cmap)
         return
-    if picture.suffix(target) not in picture.FORMATS:
-        refuse(f"--output {target}", f"unknown format; write {picture.ALLOWED}, .html")
+    if formats.suffix(target) not in formats.PICTURES:
+        refuse(f"--output {target}", f"unknown format; write a {formats.ANY}")
     datasets = [opened(file) for file in files]
     for file, dataset in zip(files, datasets, strict=True):
         with about(file):
@@ -107,7 +108,7 @@ def _plot_page(
         from sweep.explore.page import save_html
     for option, value in (("--limits", limits), ("--cmap", cmap)):
         if value is not None:
-            refuse(option, "not for a page; write a png, pdf or svg")
+            refuse(option, f"not for a page; write a {formats.A_PICTURE}")
     with about(file):
         save_html(opened(file), target, variable, x, y, sel)
     say(f"wrote {target}")

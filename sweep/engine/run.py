@@ -158,7 +158,7 @@ def _draw(result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
     if files.picture.exists():
         return
     try:
-        figure = picture.draw(result)
+        figure = picture.plot(result)
     except ValueError as error:
         reporter.note(f"no picture: {error}")
         return

@@ -13,10 +13,11 @@ from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, Spinner
 from sweep.explore.colours import CURVES
 from sweep.explore.controls import BARE, on
 from sweep.explore.runner import Curve
-from sweep.explore.slices import Axis, Source
+from sweep.explore.slices import Source
 from sweep.explore.state import MAX_CELLS, Cell
 from sweep.parameters import Parameter
 from sweep.plots import labels
+from sweep.plots.axis import Axis
 
 
 class CellControls:

@@ -13,10 +13,9 @@ from bokeh.plotting import figure
 
 from sweep.explore.colours import CURVES
 from sweep.explore.runner import Curve
-from sweep.explore.slices import critical_symbol
 from sweep.explore.state import MAX_CELLS
 from sweep.grid import Array
-from sweep.plots import labels
+from sweep.plots import labels, theory
 
 _STRETCHES = 3000
 """Of a longer curve the lowest and the highest sample of each of so many stretches are drawn, of each series."""
@@ -71,7 +70,7 @@ class Curves:
             "spin": [spins[name] for name in shown],
             "time": [end * (0.93 if "c1" in name else 1.0) for name in shown],  # they often lie close together
             "dash": [_CRITICAL[name] for name in shown],
-            "symbol": [critical_symbol(name) for name in shown],
+            "symbol": [theory.symbol(name) for name in shown],
         }
 
     def _label(self, one: xr.Dataset) -> None:

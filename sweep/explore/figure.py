@@ -5,7 +5,7 @@ There is no glyph per cell: an image and a table of bits are sent as binary arra
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,12 +23,13 @@ from bokeh.models import (
 )  # fmt: skip
 from bokeh.plotting import figure
 
-from sweep.explore.colours import Scale, scale
-from sweep.explore.lines import Lines
+from sweep.explore.colours import is_logarithmic, mapping
 from sweep.explore.patterns import TILES
-from sweep.explore.slices import Axis, Slice, Source, plain
+from sweep.explore.slices import PlacedAxis, Source, plain
 from sweep.grid import Array
-from sweep.plots import labels
+from sweep.plots import labels, scales
+from sweep.plots.description import Map, common_scale
+from sweep.plots.scales import Scale
 
 HEIGHT = 480
 """Of the map, in pixels."""
@@ -39,7 +40,7 @@ _SHORT = {"reversals": "simulated", "reversals_predicted": "predicted", "differe
 _TICKS = 12
 """On an axis whose values are listed one by one, at most."""
 
-DASHES = {"n_c1": "dotted", "n_c2": "solid"}
+DASHES = {"n_c1": "dotted", "n_c2": "solid", "best": "dashed"}
 """Of the lines of theory."""
 
 _BAR = {
@@ -54,7 +55,7 @@ _STYLE = {
 }  # fmt: skip
 
 
-class Map:
+class MapFigure:
     """The map over two axes, which shows one slice after another.
 
     The models stay the same from slice to slice: a browser does not forget models that are replaced.
@@ -66,12 +67,19 @@ class Map:
     """
 
     def __init__(
-        self, source: Source, x: Axis, y: Axis, probe: ColumnDataSource | None = None,
+        self, source: Source, x: str, y: str, probe: ColumnDataSource | None = None,
         request: ColumnDataSource | None = None,
     ) -> None:  # fmt: skip
-        self._source, self._place = source, _place(x.edges, y.edges)
-        self.axes = (x.name, y.name)
-        self.figure = plot = _frame(source, x, y)
+        self._source, self.axes = source, (x, y)
+        self._x, self._y = (source.axes.get(axis, PlacedAxis("", np.zeros(1))) for axis in (x, y))
+        edges_x, edges_y = self._x.drawn_edges, self._y.drawn_edges
+        self._place = {
+            "x": [edges_x[0]],
+            "y": [edges_y[0]],
+            "dw": [edges_x[-1] - edges_x[0]],
+            "dh": [edges_y[-1] - edges_y[0]],
+        }
+        self.figure = plot = _frame(source, self._x, self._y)
         self._cells = ColumnDataSource({"image": [np.zeros((1, 1), "uint8")], **self._place})
         # Two images, because an image goes on with the mapper that it was made with.
         self._images = [
@@ -87,48 +95,43 @@ class Map:
         self._kinds = ColumnDataSource({"kinds": [np.zeros((1, 1), "uint8")]})
         _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
-                 "ex": x.edges, "ey": y.edges, "cursor": self.cursor, "probe": probe,
+                 "ex": edges_x, "ey": edges_y, "cursor": self.cursor, "probe": probe,
                  "request": request})  # fmt: skip
 
-    def show(self, part: Slice, columns: Mapping[str, Any], lines: Sequence[Lines] = ()) -> Scale:
-        """Show a slice; returns how its values become colours.
+    def show(self, part: Map, columns: Mapping[str, Array]) -> Scale:
+        """Show a map over these axes; returns how its values become colours.
 
         Parameters
         ----------
         columns : what the pointer shows of a cell beside its place: tables of shape (y, x) by their variables
-        lines : of theory, drawn over the map
         """
-        colours = scale(part)
-        tables = {name: [plain(table)] for name, table in columns.items()}
+        scale = scales.flags(part.flags) if part.flags else common_scale([part])
+        logarithmic = is_logarithmic(scale)
         for image in self._images:
-            image.visible = (image is self._images[1]) == colours.logarithmic
-        mapper = self._images[colours.logarithmic].glyph.color_mapper
-        mapper.update(palette=colours.palette, low=colours.low, high=colours.high)
+            image.visible = (image is self._images[1]) == logarithmic
+        mapper = self._images[logarithmic].glyph.color_mapper
+        mapper.update(**mapping(scale))
+        tables = {name: [plain(table)] for name, table in columns.items()}
         self._cells.data = {"image": [plain(part.values)], **self._place, **tables}
-        self._kinds.data = {"kinds": [part.kinds]}
-        drawn = {each.name: each.parts for each in lines}
+        kinds = np.packbits(np.stack(list(part.marks.values()), axis=-1), axis=-1, bitorder="little")
+        self._kinds.data = {"kinds": [kinds[..., 0]]}
         for name, source in self._lines.items():
-            parts = drawn.get(name, [])
-            source.data = {"xs": [x for x, _ in parts], "ys": [y for _, y in parts]}
+            parts = [points for line in part.lines if line.name == name for points in line.parts]
+            source.data = {"xs": [self._x.place(x) for x, _ in parts], "ys": [self._y.place(y) for _, y in parts]}
         self.figure.title.text = self._source.label(part.name)
-        unit = labels.unit(part.dataset, part.name)
-        chosen_by_bokeh: Any = "auto" if colours.logarithmic else BasicTicker()
-        ticker = FixedTicker(ticks=colours.ticks, minor_ticks=[]) if colours.ticks else chosen_by_bokeh
         # A new bar, because an old one leaves out ticks beyond its first scale.
-        self.figure.right = [
-            ColorBar(
-                color_mapper=mapper, ticker=ticker, title=unit or None,
-                major_label_overrides=colours.words, **_BAR,
-            )
-        ]  # fmt: skip
+        self.figure.right = [self._bar(part, scale, mapper)]
         tip, formatters = _tip(self._source, part, list(columns))
         self._hover.update(tooltips=tip, formatters=formatters)
-        return colours
+        return scale
 
-
-def _place(x: Array, y: Array) -> dict[str, list[float]]:
-    """Where an image between the first and the last edges lies."""
-    return {"x": [x[0]], "y": [y[0]], "dw": [x[-1] - x[0]], "dh": [y[-1] - y[0]]}
+    def _bar(self, part: Map, scale: Scale, mapper: Any) -> ColorBar:
+        chosen_by_bokeh: Any = "auto" if is_logarithmic(scale) else BasicTicker()
+        ticks = scale.ticks or {}
+        return ColorBar(
+            color_mapper=mapper, ticker=FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
+            title=labels.unit(self._source.cell, part.name) or None, major_label_overrides=ticks, **_BAR,
+        )  # fmt: skip
 
 
 def _line(plot: Any, dash: str) -> ColumnDataSource:
@@ -158,9 +161,9 @@ def _pins(plot: Any) -> ColumnDataSource:
     return source
 
 
-def _frame(source: Source, across: Axis, up: Axis) -> Any:
+def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
     """The empty figure, with axes that suit the spacing of the values."""
-    x, y = across.edges, up.edges
+    x, y = across.drawn_edges, up.drawn_edges
     plot = figure(
         height=HEIGHT if up.name else 240,
         sizing_mode="stretch_width", min_width=240,
@@ -180,18 +183,18 @@ def _frame(source: Source, across: Axis, up: Axis) -> Any:
     plot.title.update(text_font_size="14px", text_font_style="bold")
     plot.yaxis.visible = bool(up.name)
     for axis, drawn in ((across, plot.xaxis[0]), (up, plot.yaxis[0])):
-        if axis.spacing == "list":
+        if axis.spacing == "uneven":
             _list_ticks(axis, drawn)
     return plot
 
 
-def _list_ticks(axis: Axis, drawn: Any) -> None:
+def _list_ticks(axis: PlacedAxis, drawn: Any) -> None:
     ticks = [float(t) for t in range(0, len(axis.values), -(-len(axis.values) // _TICKS))]
     drawn.ticker = FixedTicker(ticks=ticks, minor_ticks=[])
     drawn.major_label_overrides = {t: f"{axis.values[int(t)]:g}" for t in ticks}
 
 
-def _tip(source: Source, part: Slice, columns: list[str]) -> tuple[str, dict[str, CustomJSHover]]:
+def _tip(source: Source, part: Map, columns: list[str]) -> tuple[str, dict[str, CustomJSHover]]:
     """A table of the cell under the pointer, and what looks its numbers up by the index of the cell."""
     rows, formatters = [], dict[str, Any]()
     for axis, variable, index in ((part.x, "$x", "i"), (part.y, "$y", "j")):
@@ -201,7 +204,7 @@ def _tip(source: Source, part: Slice, columns: list[str]) -> tuple[str, dict[str
             formatters[variable] = CustomJSHover(args={"values": axis.values}, code=code)
     for name in columns:
         rows.append((_SHORT.get(name) or source.words(name), f"@{{{name}}}{{custom}}"))
-        flags = labels.flag_words(part.dataset, name)
+        flags = labels.flag_words(source.cell, name)
         code = "return words[value] ?? (Number.isFinite(value) ? Number(value.toPrecision(6)).toString() : 'none')"
         formatters[f"@{{{name}}}"] = CustomJSHover(args={"words": {str(k): w for k, w in flags.items()}}, code=code)
     table = "".join(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,12 @@ from bokeh.resources import INLINE
 from jinja2 import Environment
 
 from sweep.explore import figure, patterns, state
-from sweep.explore.colours import Scale
-from sweep.explore.lines import Lines, critical_lines
-from sweep.explore.slices import Slice, Source
+from sweep.explore.colours import beyond
+from sweep.explore.slices import Source
+from sweep.grid import Array
 from sweep.plots import labels
+from sweep.plots.description import Map
+from sweep.plots.scales import Scale
 from sweep.results.writing import replacing
 
 _MOST_VALUES = 8_000_000
@@ -43,14 +44,13 @@ def dress(document: Document, source: Source, query: str | None = None) -> None:
     )  # fmt: skip
 
 
-def legend(part: Slice, colours: Scale, lines: Sequence[Lines]) -> str:
+def legend(part: Map, scale: Scale) -> str:
     """The patterns and lines that occur in a map, and what lies beyond its scale, as HTML."""
     box = "height:14px;border:1px solid #8a949e;border-radius:2px"
     items = [(f"{box};background:{patterns.swatch(kind)}", words) for kind, words in part.legend.items()]
-    for each in lines:
-        name = f"n_{each.name[2:]}" if "n0" in (part.x.name, part.y.name) else f"n₀ = n_{each.name[2:]}"
-        items.append((f"border-top:2px {figure.DASHES[each.name]} #000", f"{name} ({each.source}): {each.words}"))
-    return str(PARTS.legend(items, colours.beyond))
+    lines = {line.words: f"border-top:2px {figure.DASHES[line.name]} #000" for line in part.lines}
+    items += [(style, words) for words, style in lines.items()]
+    return str(PARTS.legend(items, beyond(part, scale)))
 
 
 def save_html(
@@ -77,13 +77,12 @@ def save_html(
     shown, faults = state.read({k: [v] for k, v in query.items() if v}, source, {})
     if faults:
         raise ValueError("; ".join(faults))
-    part, columns = _all_values(source, shown)
-    lines = critical_lines(source, part, shown.at)
-    drawn = figure.Map(source, part.x, part.y)
-    colours = drawn.show(part, columns, lines)
+    part = source.map(shown.show, shown.x, shown.y, shown.at)
+    drawn = figure.MapFigure(source, shown.x, shown.y)
+    scale = drawn.show(part, _all_values(source, shown))
     document = Document()
     document.add_root(Column(drawn.figure, sizing_mode="stretch_width", name="map"))
-    document.add_root(Div(text=legend(part, colours, lines), sizing_mode="stretch_width", name="legend"))
+    document.add_root(Div(text=legend(part, scale), sizing_mode="stretch_width", name="legend"))
     dress(document, source)
     variables = document.template_variables
     rest = {*source.dims_of(shown.show), *source.dims} - {shown.x, shown.y}
@@ -94,11 +93,10 @@ def save_html(
         temporary.write_text(html, encoding="utf-8")
 
 
-def _all_values(source: Source, shown: state.State) -> tuple[Slice, dict[str, Any]]:
-    """The slice, and the tables of all its variables; of a large map only the counts and how they came about."""
+def _all_values(source: Source, shown: state.State) -> dict[str, Array]:
+    """The tables of all variables over the map; of a large one only the counts and how they came about."""
     plain = [n for n in source.variables if source.dims_of(n) <= set(source.dims)]
     cells = len(source.axes[shown.x].values) * (len(source.axes[shown.y].values) if shown.y else 1)
     if cells * len(plain) > _MOST_VALUES:
         plain = [n for n in plain if n in (shown.show, "reversals", "reversals_predicted", "difference", "status")]
-    part = source.slice(shown.show, shown.x, shown.y, shown.at, tuple(plain))
-    return part, {n: part.dataset[n].values for n in plain}
+    return source.tables(plain, shown.x, shown.y, shown.at)

@@ -17,7 +17,6 @@ from sweep.explore.chosen import CellControls
 from sweep.explore.colours import CURVES
 from sweep.explore.curves import Curves
 from sweep.explore.drawn import Drawn
-from sweep.explore.lines import critical_lines
 from sweep.explore.page import PARTS
 from sweep.explore.runner import Job, Runner
 from sweep.explore.setup import Setup, why_still
@@ -44,7 +43,7 @@ class View:
         self._base: Cell = setup.base if setup else {}
         self._known = setup.config.table if setup else PARAMETERS
         self.state, self._faults = states.read(query, source, self._base, self._known)
-        self._shown: figure.Map | None = None
+        self._shown: figure.MapFigure | None = None
         self._build()
         self._drawn = Drawn(self.state.cells, runner, self._tell)
         self._draw_map()
@@ -97,15 +96,14 @@ class View:
 
     def _draw_map(self) -> None:
         state = self.state
-        beside = tuple(n for n in _BESIDE if n in self._source.variables)
-        part = self._source.slice(state.show, state.x, state.y, state.at, beside)
-        columns = {state.show: part.values, **{name: part.dataset[name].values for name in beside}}
-        lines = critical_lines(self._source, part, state.at)
+        beside = [n for n in _BESIDE if n in self._source.variables]
+        part = self._source.map(state.show, state.x, state.y, state.at)
+        tables = self._source.tables(beside, state.x, state.y, state.at)
         if self._shown is None or self._shown.axes != (state.x, state.y):
-            self._shown = figure.Map(self._source, part.x, part.y, self._probe, self._request)
+            self._shown = figure.MapFigure(self._source, state.x, state.y, self._probe, self._request)
             self._map.children = [self._shown.figure]
         self._part = part
-        self._legend.text = page.legend(part, self._shown.show(part, columns, lines), lines)
+        self._legend.text = page.legend(part, self._shown.show(part, {state.show: part.values, **tables}))
         self._controls.show(state)
 
     def _place(self, source: ColumnDataSource) -> dict[str, int] | None:

@@ -13,12 +13,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
-from sweep.plots import labels, legends, theory
-from sweep.plots.axes import set_scale
-from sweep.plots.figure import Picture
-from sweep.plots.maps import arrangement
-from sweep.plots.marks import blank, legend, marks
-from sweep.plots.panels import Panels, heading, title
+from sweep.plots import labels, lines, theory
+from sweep.plots.description import describe
+from sweep.plots.figure import framed, set_scale
+from sweep.plots.marks import BLANK, legend
+from sweep.plots.panels import Panels
 from sweep.plots.quantities import COMPARISONS, PREDICTIONS
 from sweep.plots.scales import Limits
 
@@ -40,58 +39,45 @@ def draw(panels: Panels, limits: Limits | None = None) -> Figure:
     """The variables over the one long axis, in a panel for each value of the others."""
     dataset, names = panels.dataset, [name for name in panels.names if name not in COMPARISONS] or panels.names
     names = names[:1] + [name for name in names[1:] if dataset[name].notnull().any()]
-    rows, columns = arrangement(len(panels.each), 2)
-    width = min(7.0, 14 / columns)
-    figure = Picture(figsize=(width * columns, 1.9 + 2.6 * rows), dpi=110, layout="constrained")
-    figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
-    grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
-    x = panels.across[0] if panels.across else None
+    x = panels.across[0] if panels.across else ""
+    figure, frames = framed(dataset, panels.each, x, 7.0, 1.9, 2.6)
     entries: dict[str, Artist] = {}
-    for k, (axes, panel) in enumerate(zip(grid.flat, panels.each, strict=False)):
-        entries |= _panel(axes, dataset.isel(panel), names, x)
-        axes.set_title(title(dataset, panel), fontsize=9)
+    for axes, chosen in frames:
+        entries |= _panel(axes, chosen, names, x)
         counts = len(names) > 1 and names[0] == "reversals"
         axes.set_ylabel("spin reversals" if counts else labels.label(dataset, names[0]), fontsize=9)
-        if k + columns >= len(panels.each):
-            axes.set_xlabel(labels.label(dataset, x) if x else "", fontsize=9)
-            axes.tick_params(labelbottom=True)
         if limits:
-            axes.set_ylim(*limits)
-    for axes in grid.flat[len(panels.each) :]:
-        axes.remove()
+            axes.set_ylim(limits)
     words = legend(dataset, names[0])
     for name, entry in entries.items():
         entry.set_label(words.get(name, entry.get_label()))
-    legends.below(figure, list(entries.values()))
+    figure.explain(list(entries.values()))
     return figure
 
 
-def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str | None) -> dict[str, Artist]:
+def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str) -> dict[str, Artist]:
     """Draw one panel; returns the entries for the legend."""
     entries: dict[str, Artist] = {}
-    at = np.atleast_1d(chosen[x].values) if x else np.zeros(1)
+    described = [describe(chosen, name, x) for name in names]
+    first = described[0]
+    at = first.x.values
     set_scale(axes, "x", at)
-    for name in names:
-        kinds = marks(chosen, name)
-        empty = np.atleast_1d(blank(kinds).values)
-        values = np.where(empty, np.nan, np.atleast_1d(chosen[name].values).astype(float))
-        style = {"marker": "x", "color": "C0"} | _STYLES.get(name, {})
-        entries[name] = _points(axes, at, values, style, labels.words(chosen, name))
-        if name != names[0]:
-            continue
-        for kind, where in kinds.items():
-            if (some := np.atleast_1d(where.values)).any():
-                height = np.zeros(some.sum()) if empty[some].all() else values[some]
-                entries[kind] = _points(axes, at[some], height, _STYLES[kind], kind)
-    if chosen[names[0]].dtype.kind == "i":
+    for shown in described:
+        height = np.where(shown.blank, np.nan, shown.values)[0]
+        style = {"marker": "x", "color": "C0"} | _STYLES.get(shown.name, {})
+        entries[shown.name] = _points(axes, at, height, style, labels.words(chosen, shown.name))
+        for kind, (where,) in shown.marks.items() if shown is first else ():
+            if where.any():
+                place = np.zeros(where.sum()) if kind in BLANK else height[where]
+                entries[kind] = _points(axes, at[where], place, _STYLES[kind], kind)
+    if first.values.dtype.kind == "i":
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    if meanings := labels.flag_words(chosen, names[0]):
-        present = [int(value) for value in np.unique(chosen[names[0]])]
-        axes.set_yticks(present, labels=[meanings.get(value, str(value)) for value in present])
+    if first.flags:
+        present = [int(value) for value in np.unique(first.values)]
+        axes.set_yticks(present, labels=[first.flags.get(value, str(value)) for value in present])
     axes.grid(alpha=0.3)
-    axes.tick_params(labelsize=8)
-    if names[0] in theory.REVERSALS:
-        entries |= theory.draw_at(axes, chosen, x)
+    if first.name in theory.REVERSALS:
+        entries |= lines.draw_vertical(axes, theory.crossings(chosen, x))
         if x == "b" and "form_factor" in chosen:
             entries["form_factor"] = _form_factor(axes, chosen)
     return entries

@@ -114,12 +114,17 @@ def label(dataset: xr.Dataset, name: str) -> str:
 def flag_words(dataset: xr.Dataset, name: str) -> dict[int, str]:
     """The meaning of each value of a variable with flags, in words; empty for another variable."""
     attributes = dataset[name].attrs
-    if "flag_values" not in attributes:
+    if "flag_values" not in attributes or not is_code(dataset[name]):
         return {}
     values = [int(value) for value in attributes["flag_values"]]
     meanings = dict(zip(values, str(attributes.get("flag_meanings", "")).split(), strict=False))
     known = _FLAG_WORDS.get(name, {})
     return {value: known.get(value, meanings.get(value, str(value)).replace("_", " ")) for value in values}
+
+
+def is_code(flags: xr.DataArray) -> bool:
+    """Whether the values of a variable with flags still are its codes: a mean of codes is none, though it has flags."""
+    return flags.dtype.kind in "iub"
 
 
 def number(at: float) -> str:

@@ -11,9 +11,8 @@ from functools import reduce
 import numpy as np
 import xarray as xr
 
-from sweep.grid import Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT
-from sweep.plots.labels import STATUS_WORDS, flag_words
+from sweep.plots.labels import STATUS_WORDS, is_code
 from sweep.plots.quantities import DERIVED, field
 from sweep.results.dataset import VARIABLES
 
@@ -60,22 +59,19 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     cannot fail, a final spin is no count) are false everywhere.
     """
     found, simulated = field(dataset, name), _is_simulated(name)
+    none = found.isnull() & False
 
-    def among(variable: str, *values: int) -> Array:
-        """Where a variable with flags has one of these values, over the dimensions of `found`."""
-        if not simulated or variable not in dataset:
-            return np.zeros(found.shape, bool)
-        flags = dataset[variable].variable
-        where = np.isin(flags.values, values).transpose([flags.dims.index(d) for d in found.dims if d in flags.dims])
-        places = tuple(slice(None) if d in flags.dims else None for d in found.dims)
-        return np.asarray(np.broadcast_to(where[places], found.shape))
+    def among(variable: str, *values: int) -> xr.DataArray:
+        """Where a variable with flags has one of these values; nowhere where it has become something else."""
+        if not simulated or variable not in dataset or not is_code(dataset[variable]):
+            return none
+        return none | dataset[variable].isin(values)
 
     not_run, failed, inferred = among("status", 0), among("status", *FAILURES), among("inferred", 1)
-    impossible = among("status", IMPOSSIBLE)
-    missing = np.isnan(found.values) if found.dtype.kind == "f" else np.zeros(found.shape, bool)
+    impossible, missing = among("status", IMPOSSIBLE), found.isnull()
     sound = ~(not_run | failed | impossible)
     grows, limited = name in _GROWING, name in _GROWING or (name, "time_limit") in _PER_VARIABLE
-    kinds = {
+    return {
         "not_run": not_run,
         "failed": failed,
         "impossible": impossible,
@@ -85,37 +81,33 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
         "noise_limited": among("noise_limited", 1) & sound,
         "uncertain": (among("sensitive", 1) | among("window_dependent", 1)) & sound & grows,
     }
-    coordinates = {dim: dataset[dim].values for dim in found.dims if dim in dataset.coords}
-    return {kind: xr.DataArray(kinds[kind], coordinates, found.dims) for kind in WORDS}
 
 
-def legend(dataset: xr.Dataset, name: str, among: dict[str, xr.DataArray] | None = None) -> dict[str, str]:
+def legend(dataset: xr.Dataset, name: str, *others: xr.Dataset) -> dict[str, str]:
     """What a legend says of each kind that occurs: its words, and how many cells are of it.
 
     Parameters
     ----------
-    among : the kinds of the cells; by default those of `marks`
+    others : datasets drawn beside it, whose cells are counted for themselves
     """
-    kinds = marks(dataset, name) if among is None else among
-    counts = {kind: (int(where.sum()), where.size) for kind, where in kinds.items()}
-    return {
-        kind: f"{meaning(dataset, name, kind)} ({count} of {size})" for kind, (count, size) in counts.items() if count
-    }
+    datasets = (dataset, *others)
+    found, entries = [marks(each, name) for each in datasets], {}
+    for kind in WORDS:
+        counts = [int(kinds[kind].sum()) for kinds in found]
+        if any(counts):
+            first = next(each for each, count in zip(datasets, counts, strict=True) if count)
+            entries[kind] = f"{meaning(first, name, kind)} ({of_all(counts, [kinds[kind].size for kinds in found])})"
+    return entries
+
+
+def of_all(counts: list[int], sizes: list[int]) -> str:
+    """Numbers of cells in one dataset after the other: "3 of 80 and 5 of 80"."""
+    return " and ".join(f"{count} of {size}" for count, size in zip(counts, sizes, strict=True))
 
 
 def blank(kinds: dict[str, xr.DataArray]) -> xr.DataArray:
     """Where there is no result to draw, by the kinds of the cells."""
     return reduce(operator.or_, (kinds[kind] for kind in BLANK))
-
-
-def in_words(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """A variable with flags, such as `status`, as words instead of numbers."""
-    meanings = flag_words(dataset, name)
-    values = dataset[name]
-    found = np.full(values.shape, "", dtype=object)
-    for value, meaning in meanings.items():
-        found[values.values == value] = meaning
-    return xr.DataArray(found, values.coords, values.dims, name)
 
 
 def meaning(dataset: xr.Dataset, name: str, kind: str) -> str:

@@ -14,8 +14,6 @@ from textwrap import fill
 import numpy as np
 import xarray as xr
 
-from sweep.grid import Array
-from sweep.models.ladder.analytic import best_b
 from sweep.plots import labels
 from sweep.plots.quantities import PREDICTIONS, field, subject
 
@@ -29,6 +27,10 @@ _PANEL_VALUES = 4
 """An axis of more values is drawn as an axis; one of fewer gets a panel for each value."""
 
 
+Panel = dict[str, int]
+"""The index along every axis that is not drawn."""
+
+
 @dataclass(frozen=True)
 class Panels:
     """What to draw, and where."""
@@ -38,8 +40,7 @@ class Panels:
     """Variables, among them perhaps `difference`."""
     across: list[str]
     """Dimensions drawn as axes, the vertical one first: up to two."""
-    each: list[dict[str, int]]
-    """For each panel, its index along every other dimension."""
+    each: list[Panel]
 
 
 def choose(
@@ -93,13 +94,13 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
     return found
 
 
-def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:
+def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[Panel]:
     """All indices along `dims`, a panel each."""
     for index in product(*(range(dataset.sizes[d]) for d in dims)):
         yield dict(zip(dims, index, strict=True))
 
 
-def title(dataset: xr.Dataset, panel: dict[str, int]) -> str:
+def title(dataset: xr.Dataset, panel: Panel) -> str:
     """What sets a panel apart from the others."""
     return ", ".join(labels.measured(dataset, d, float(dataset[d][i])) for d, i in panel.items())
 
@@ -114,36 +115,6 @@ def in_lines(constants: str, width: float) -> str:
     space = "\N{NO-BREAK SPACE}"
     breakable = constants.replace(" ", space).replace(f",{space}", ", ")
     return fill(breakable, min(_HEADING, int(_LETTERS * width)), break_on_hyphens=False).replace(space, " ")
-
-
-def best_shape(dataset: xr.Dataset) -> float | None:
-    """b of the largest form factor, if it is the same in the whole dataset and lies within its axis b."""
-    if any(name not in dataset or dataset[name].ndim for name in ("a", "c")) or "b" not in dataset.dims:
-        return None
-    b = best_b(float(dataset["a"]), float(dataset["c"]))
-    return b if dataset["b"].min() <= b <= dataset["b"].max() else None
-
-
-def is_logarithmic(values: Array) -> bool:
-    """Whether the values of an axis, in increasing order, have equal ratios rather than equal distances."""
-    if len(values) < 3 or values[0] <= 0:
-        return False
-    ratios = np.diff(np.log(values))
-    return bool(np.allclose(ratios, ratios[0], rtol=1e-6) and values[-1] > 1.5 * values[0])
-
-
-def edges(values: Array) -> Array:
-    """The edges of cells around the values of an axis: halfway between them, on a logarithmic axis in the logarithm."""
-    if is_logarithmic(values):
-        return np.asarray(np.exp(_midpoints(np.log(values))))
-    return _midpoints(values)
-
-
-def _midpoints(values: Array) -> Array:
-    if len(values) == 1:
-        return np.asarray(values[0] + [-0.5, 0.5])
-    between = (values[1:] + values[:-1]) / 2
-    return np.concatenate([[2 * values[0] - between[0]], between, [2 * values[-1] - between[-1]]])
 
 
 def _variables(dataset: xr.Dataset, variable: str | None) -> list[str]:

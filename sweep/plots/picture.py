@@ -10,17 +10,13 @@ import matplotlib as mpl
 import xarray as xr
 from matplotlib.figure import Figure
 
-from sweep.plots import beside, critical, curves, maps, panels, scales, trajectories
+from sweep.plots import critical, curves, maps, panels, scales, trajectories
+from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import subject
 from sweep.plots.scales import Limits
 from sweep.results.kind import CRITICAL, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
-
-FORMATS = ("png", "pdf", "svg")
-"""Formats that a figure can be saved in, each named by the suffix of the file."""
-
-ALLOWED = f"a file that ends in .{', .'.join(FORMATS)}"
 
 _NO_DATE: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _DPI = 110
@@ -69,58 +65,35 @@ def plot(
     StoreError
         if the file is not a dataset, or `output` cannot be written.
     """
-    if output is not None and suffix(Path(output)) not in FORMATS:
-        raise ValueError(f"output: {output}: unknown format; allowed: {ALLOWED}")
+    if output is not None and suffix(Path(output)) not in PICTURES:
+        raise ValueError(f"output: {output}: unknown format; write a {A_PICTURE}")
+    if limits is not None and not limits[0] < limits[1]:
+        raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; allowed: a lower and a higher number")
+    if cmap is not None:
+        scales.colour_map(cmap)  # raises if there is none
     several = [dataset] if isinstance(dataset, Source) else dataset
     opened = [each if isinstance(each, xr.Dataset) else open_dataset(Path(each)) for each in several]
-    figure = draw(opened, variable, x=x, y=y, sel=sel, limits=limits, cmap=cmap)
+    figure = _drawn(opened, variable, {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap})
     if output is not None:
         save(figure, Path(output))
     return figure
 
 
-def draw(
-    dataset: xr.Dataset | Sequence[xr.Dataset],
-    variable: str | None = None,
-    *,
-    x: str | None = None,
-    y: str | None = None,
-    sel: Mapping[str, float] | None = None,
-    limits: Limits | None = None,
-    cmap: str | None = None,
-) -> Figure:
-    """The figure of a dataset, or of several; parameters and errors as of `plot`."""
-    if limits is not None and not limits[0] < limits[1]:
-        raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; allowed: a lower and a higher number")
-    if cmap is not None:
-        scales.colour_map(cmap)  # raises if there is none
-    if not isinstance(dataset, xr.Dataset):
-        if len(dataset) != 1:
-            return _beside(dataset, variable, limits, cmap, x=x, y=y, sel=sel)
-        (dataset,) = dataset
-    found = kind(dataset)
+def _drawn(datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], colours: dict[str, Any]) -> Figure:
+    """The figure of datasets, of whatever kind they are."""
+    kinds = {kind(each) for each in datasets}
+    if len(datasets) != 1:
+        if not datasets or kinds & {CRITICAL, TRAJECTORY}:
+            raise ValueError("several datasets can be drawn side by side only if each is of a run")
+        common = variable or subject(datasets[0])
+        return maps.draw_beside([panels.choose(each, common, **axes) for each in datasets], **colours)
+    (dataset,), (found,) = datasets, kinds
     if found == TRAJECTORY or (found == CRITICAL and variable is None):
-        given = {"x": x, "y": y, "limits": limits, "cmap": cmap, "sel": sel or None}
-        if beyond := [name for name, value in given.items() if value is not None]:
-            raise ValueError(f"{beyond[0]}: not for a figure of {found}; allowed: maps of a run")
+        if given := [name for name, value in {**axes, **colours}.items() if value]:
+            raise ValueError(f"{given[0]}: not for a figure of {found}; name it for the maps of a run alone")
         return trajectories.draw(dataset, variable) if found == TRAJECTORY else critical.draw(dataset)
-    chosen = panels.choose(dataset, variable, x=x, y=y, sel=sel)
-    return maps.draw(chosen, limits, cmap) if len(chosen.across) == 2 else curves.draw(chosen, limits)
-
-
-def _beside(
-    datasets: Sequence[xr.Dataset], variable: str | None, limits: Limits | None, cmap: str | None, **axes: Any
-) -> Figure:
-    """The figure of several datasets."""
-    if not datasets or any(kind(each) in (CRITICAL, TRAJECTORY) for each in datasets):
-        raise ValueError("several datasets; allowed: side by side, those of runs")
-    common = variable or subject(datasets[0])
-    return beside.draw([panels.choose(each, common, **axes) for each in datasets], limits, cmap)
-
-
-def suffix(path: Path) -> str:
-    """The format that a file's suffix names."""
-    return path.suffix.removeprefix(".").lower()
+    chosen = panels.choose(dataset, variable, **axes)
+    return maps.draw(chosen, **colours) if len(chosen.across) == 2 else curves.draw(chosen, colours["limits"])
 
 
 def save(figure: Figure, path: Path) -> None:

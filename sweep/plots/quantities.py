@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import xarray as xr
 
 from sweep.kernels.measures import MEASURES
-from sweep.plots import regimes
+from sweep.plots import labels, regimes
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,8 @@ class Derived:
 
 
 def _difference(dataset: xr.Dataset) -> xr.DataArray:
-    found = dataset["reversals"].astype("int32") - dataset["reversals_predicted"]
+    simulated = dataset["reversals"]  # whose integers are too short for a difference
+    found = (simulated.astype("int32") if simulated.dtype.kind == "i" else simulated) - dataset["reversals_predicted"]
     long_name = "spin reversals simulated less those predicted by Takano (2011)"
     return found.rename("difference").assign_attrs(long_name=long_name, units="1")
 
@@ -56,8 +57,10 @@ _SERVE = {"cycles": "regime", "lyapunov": "regime"}
 
 
 def derivable(dataset: xr.Dataset) -> list[str]:
-    """The quantities that can be derived from the variables of a dataset."""
-    return [name for name, derived in DERIVED.items() if set(derived.needs) <= set(dataset.data_vars)]
+    """The quantities that can be derived from the variables of a dataset, of which the status has to be one still."""
+    coded = "status" in dataset and labels.is_code(dataset["status"])
+    there = {str(name) for name in dataset.data_vars if name != "status" or coded}
+    return [name for name, derived in DERIVED.items() if set(derived.needs) <= there]
 
 
 def field(dataset: xr.Dataset, name: str) -> xr.DataArray:

@@ -12,8 +12,6 @@ from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colorbar import Colorbar
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize
 
 from sweep.grid import Array
@@ -37,12 +35,12 @@ _MAX_TICKS = 12
 
 @dataclass(frozen=True)
 class Scale:
-    """Colours of values, and the labels of the bar."""
+    """How values become colours."""
 
     colours: Colormap
     norm: Normalize
-    labels: list[str] | None = None
-    """For each colour, what it stands for; None for a continuous scale."""
+    ticks: dict[float, str] | None = None
+    """What stands beside the bar, and where; chosen by the library that draws if None."""
     arrows: Arrows = "neither"
     """Ends of the bar beyond which there are values."""
 
@@ -52,26 +50,6 @@ class Scale:
     def lightness(self, values: Array) -> Array:
         """Luma of the colour of each value, from 0 to 1."""
         return np.asarray(self.rgba(values)[..., :3] @ [0.299, 0.587, 0.114])
-
-    def mappable(self) -> ScalarMappable:
-        return ScalarMappable(self.norm, self.colours)
-
-    def label(self, bar: Colorbar) -> None:
-        """Write the labels beside the bar of a scale of steps, and of a logarithmic one without a power of ten."""
-        low, high = self.norm.vmin or 0.0, self.norm.vmax or 0.0
-        if isinstance(self.norm, LogNorm) and 0.1 < low < high < 10:
-            ticks = np.geomspace(low, high, 5)
-            bar.set_ticks(ticks.tolist(), labels=[f"{tick:.2g}" for tick in ticks])
-            bar.ax.minorticks_off()
-        if not isinstance(self.norm, BoundaryNorm) or self.labels is None:
-            return
-        boundaries = np.asarray(self.norm.boundaries)
-        every = -(-len(self.labels) // _MAX_TICKS)
-        # Of differences, zero is always labelled.
-        first = self.labels.index("0") % every if "0" in self.labels else 0
-        at = slice(first, None, every)
-        bar.set_ticks(((boundaries[:-1] + boundaries[1:]) / 2)[at].tolist(), labels=self.labels[at])
-        bar.ax.tick_params(which="minor", length=0)
 
 
 def colour_map(name: str) -> Colormap:
@@ -90,26 +68,22 @@ def counts(values: Array, limits: Limits | None = None, name: str | None = None)
     limits : lowest and highest count with colours of their own; all beyond share one on either side
     """
     low, high = (round(limit) for limit in limits) if limits else (int(values.min()), int(values.max()))
-    steps = low + _steps(high - low, _MAX_COUNTS)
-    return _stepped(
-        steps, colour_map(name or SEQUENTIAL), bool((values < low).any()), bool((values >= steps[-1]).any())
-    )
+    return _stepped(low + _steps(high - low, _MAX_COUNTS), values, name or SEQUENTIAL)
 
 
 def differences(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
     """A diverging scale of integers, the same on both sides of zero, which has a colour of its own."""
     top = max(round(max(map(abs, limits))) if limits else int(np.abs(values).max(initial=0)), 1)
     side = 1 + _steps(top - 1, _MAX_DIFFERENCES)
-    steps = np.concatenate([1 - side[::-1], side])
-    return _stepped(
-        steps, colour_map(name or DIVERGING), bool((values < steps[0]).any()), bool((values >= steps[-1]).any())
-    )
+    return _stepped(np.concatenate([1 - side[::-1], side]), values, name or DIVERGING)
 
 
 def continuous(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
     """A scale of real numbers: about zero if they have both signs, logarithmic if they span orders of magnitude."""
     finite = values[np.isfinite(values)]
     low, high = limits or ((float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0))
+    if low == high:
+        low, high = low - 0.1 * (abs(low) or 1.0), high + 0.1 * (abs(high) or 1.0)
     if low < 0 < high:
         high = max(-low, high)
         return _smooth(finite, Normalize(-high, high), name or DIVERGING)
@@ -125,22 +99,27 @@ def ratios(values: Array, limits: Limits | None = None, name: str | None = None)
     return _smooth(finite, LogNorm(exp(-top), exp(top)), name or DIVERGING)
 
 
-def flags(present: list[int], name: str | None = None) -> Scale:
-    """A colour for each of the values that occur, in increasing order, from light to dark."""
-    shades = colour_map(name or SEQUENTIAL)(np.linspace(0.95, 0.05, len(present)))
-    bounds = [present[0] - 0.5, *((a + b) / 2 for a, b in pairwise(present)), present[-1] + 0.5]
-    return Scale(ListedColormap(shades), BoundaryNorm(bounds, len(present)))
+def flags(words: dict[int, str], name: str | None = None) -> Scale:
+    """A colour for each of the values in `words`, which are in increasing order, from light to dark."""
+    values = list(words)
+    shades = colour_map(name or SEQUENTIAL)(np.linspace(0.95, 0.05, len(values)))
+    bounds = [values[0] - 0.5, *((a + b) / 2 for a, b in pairwise(values)), values[-1] + 0.5]
+    return Scale(ListedColormap(shades), BoundaryNorm(bounds, len(values)), {float(v): words[v] for v in values})
 
 
 def _smooth(values: Array, norm: Normalize, name: str) -> Scale:
     """A continuous scale, with arrows where values lie beyond it."""
     low, high = norm.vmin or 0.0, norm.vmax or 0.0
+    arrows = _arrows(values, low, high)
+    short = isinstance(norm, LogNorm) and 0.1 < low < high < 10  # without a power of ten
+    ticks = {float(tick): f"{tick:.2g}" for tick in np.geomspace(low, high, 5)} if short else None
+    return Scale(colour_map(name), norm, ticks, arrows)
+
+
+def _arrows(values: Array, low: float, high: float) -> Arrows:
+    """At which ends there are values beyond."""
     slack = 1e-9 * max(abs(low), abs(high))
-    arrows = _arrows(bool((values < low - slack).any()), bool((values > high + slack).any()))
-    return Scale(colour_map(name), norm, arrows=arrows)
-
-
-def _arrows(below: bool, above: bool) -> Arrows:
+    below, above = (values < low - slack).any(), (values > high + slack).any()
     return "both" if below and above else "min" if below else "max" if above else "neither"
 
 
@@ -155,13 +134,15 @@ def _steps(top: int, most: int) -> Array:
     return np.array(steps)
 
 
-def _stepped(steps: Array, colours: Colormap, below: bool, above: bool) -> Scale:
+def _stepped(steps: Array, values: Array, name: str) -> Scale:
     """A colour for each of the ranges of integers that begin at `steps`."""
-    number = len(steps) - 1 + below + above
-    arrows = _arrows(below, above)
+    arrows = _arrows(values, steps[0], steps[-1] - 1)
+    number = len(steps) - 1 + {"both": 2, "neither": 0}.get(arrows, 1)
     norm = BoundaryNorm(steps - 0.5, number, extend=arrows)
-    labels = [_integers(first, last - 1) for first, last in pairwise(steps.tolist())]
-    return Scale(colours.resampled(number), norm, labels, arrows)
+    ticks = {(first + last - 1) / 2: _integers(first, last - 1) for first, last in pairwise(steps.tolist())}
+    every = -(-len(ticks) // _MAX_TICKS)
+    start = list(ticks).index(0) % every if 0 in ticks else 0  # of differences, zero is always labelled
+    return Scale(colour_map(name).resampled(number), norm, dict(list(ticks.items())[start::every]), arrows)
 
 
 def _integers(first: int, last: int) -> str:

@@ -1,21 +1,23 @@
-"""What theory draws over a map: the critical spins, which explain its edges, and the shape of the largest L(f)."""
+"""What theory says of a picture: the critical spins, which explain edges, and the shape of the largest L(f).
+
+From the dataset alone, and without any library that draws.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.patheffects import Stroke, withStroke
+from contourpy import contour_generator
 
 from sweep.grid import Array
-from sweep.plots.panels import best_shape
+from sweep.models.ladder.analytic import best_b
+from sweep.plots.axis import Axis
 
 REVERSALS = ("reversals", "reversals_predicted", "difference", "raw_reversals", "reversals_low", "reversals_high")
-"""The variables over which theory is drawn."""
+"""The variables that theory explains."""
 
 _SOURCES = {
     "n_c1": (("_linear", "eigenvalues"), ("", "formula")),
@@ -24,156 +26,115 @@ _SOURCES = {
 """Where a critical spin comes from: the full model if the dataset has it, else the formula of Takano (2011)."""
 
 WORDS = {"n_c1": "a tiny rattle grows", "n_c2": "the spin reverses"}
-STYLES: dict[str, Any] = {"n_c1": (0, (1.5, 1.5)), "n_c2": "-", "best": (0, (6, 3))}
 
-_LINE: dict[str, Any] = {"color": "black", "linewidth": 1.2}
-
-
-def _halo(width: float) -> list[Stroke]:
-    return [withStroke(linewidth=width, foreground="white")]
+Points = tuple[Array, Array]
+"""x and y of a line."""
 
 
-def draw(axes: Axes, dataset: xr.Dataset, across: tuple[str, str], *, labelled: bool) -> dict[str, Line2D]:
-    """Draw the lines of theory on a map, and return their entries for the legend.
+@dataclass(frozen=True)
+class Line:
+    """A line over a map or, at some values of x, over curves."""
 
-    Parameters
-    ----------
-    dataset : of one panel
-    across : vertical and horizontal dimension
-    labelled : whether there is room for labels at the lines
-    """
-    box = axes.axis()
-    entries = _critical_spins(axes, dataset, across, labelled)
-    if b := best_shape(dataset):
-        line = axes.axvline if across[1] == "b" else axes.axhline if across[0] == "b" else None
-        if line:
-            line(b, linestyle=STYLES["best"], path_effects=_halo(2.4), gid="best", **_LINE)
-            entries["best"] = handle("best", f"b = {b:.2f}, where the form factor L(f) is largest")
-    axes.axis(box)
-    return entries
-
-
-def entry(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> Line2D:
-    """The entry of a legend for n_c1 or n_c2, on figures over the spin or over other parameters."""
-    if over_n0:
-        return handle(name, f"n$_{{{name[2:]}}}$ ({source}): {WORDS[name]} where |{spin}| is larger")
-    return handle(name, f"{spin} = n$_{{{name[2:]}}}$ ({source}): {WORDS[name]} where that is smaller")
-
-
-def symbol(name: str, side: str) -> str:
-    """Such as n_c1 with a plus, as matplotlib sets it."""
-    return f"n$_{{{name[2:]}}}^{'+' if side == 'plus' else '-'}$"
-
-
-def handle(key: str, words: str) -> Line2D:
-    """The entry of a legend for a line of theory."""
-    return Line2D([], [], linestyle=STYLES[key], label=words, **_LINE)
+    name: str
+    """What decides its style: `n_c1`, `n_c2`, or `best` for the shape of the largest form factor."""
+    words: str
+    """What a legend says of it, with symbols such as n_c1."""
+    parts: list[Points]
+    """Over curves, y is empty."""
+    symbol: str = ""
+    """What stands beside it, such as n_c1⁺."""
 
 
 def critical_spins(dataset: xr.Dataset, name: str) -> Iterator[tuple[str, xr.DataArray, str]]:
-    """The side, values and source of n_c1 or n_c2, for both signs, as far as the dataset has them."""
+    """The symbol, values and source of n_c1 or n_c2, for both signs, as far as the dataset has them."""
     for side in ("plus", "minus"):
         for suffix, source in _SOURCES[name]:
             if f"{name}_{side}{suffix}" in dataset:
-                yield side, dataset[f"{name}_{side}{suffix}"], source
+                yield symbol(f"{name}_{side}"), dataset[f"{name}_{side}{suffix}"], source
                 break
 
 
-def _critical_spins(axes: Axes, dataset: xr.Dataset, across: tuple[str, str], labelled: bool) -> dict[str, Line2D]:
-    entries = {}
-    for name in ("n_c1", "n_c2"):
-        for side, values, source in critical_spins(dataset, name):
-            if "n0" in across:
-                seen = _curve(axes, dataset, values, across, name)
-            else:
-                seen = _contour(axes, dataset, values, across, name)
-            if seen is not None:
-                entries[name] = entry(name, source, over_n0="n0" in across)
-                # Over n0 the lines of n_c1 are too close to those of n_c2 for a label of their own.
-                if labelled and ("n0" not in across or name == "n_c2"):
-                    _label(axes, seen, name, side, across)
-    return entries
+def symbol(name: str) -> str:
+    """The symbol of a critical spin: n_c1⁺ for `n_c1_plus` and for `n_c1_plus_linear`."""
+    _, number, side, *_ = name.split("_")
+    return f"n_{number}{'⁺' if side == 'plus' else '⁻'}"
 
 
-def _curve(axes: Axes, dataset: xr.Dataset, values: xr.DataArray, across: tuple[str, str], name: str) -> Array | None:
-    """A critical spin over the other axis of a map with an axis n0; its points on the map, None if it has none."""
-    (other,) = (dim for dim in across if dim != "n0")
-    if set(values.dims) - {other}:
-        return None
-    spins = values.broadcast_like(dataset[other]).values
-    points = np.stack([spins, dataset[other].values] if across[1] == "n0" else [dataset[other].values, spins], axis=1)
-    if values.ndim == 0:  # it does not depend on the other axis: right across the map
-        low, high = axes.get_ylim() if across[1] == "n0" else axes.get_xlim()
-        points[[0, -1], 1 if across[1] == "n0" else 0] = low, high
-    within = (float(dataset["n0"].min()) <= spins) & (spins <= float(dataset["n0"].max()))
-    if not within.any():
-        return None
-    axes.plot(*points.T, linestyle=STYLES[name], path_effects=_halo(2.4), gid=name, **_LINE)
-    return points[within]
+def words(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> str:
+    """What a legend says of n_c1 or n_c2, in figures over the spin or over other parameters."""
+    if over_n0:
+        return f"{name} ({source}): {WORDS[name]} where |{spin}| is larger"
+    return f"{spin} = {name} ({source}): {WORDS[name]} where that is smaller"
 
 
-def _contour(axes: Axes, dataset: xr.Dataset, values: xr.DataArray, across: tuple[str, str], name: str) -> Array | None:
-    """Where a critical spin equals the n0 of the map; its points, None if it does nowhere."""
-    n0 = float(dataset["n0"]) if "n0" in dataset.coords and dataset["n0"].ndim == 0 else 0.0
-    if set(values.dims) - set(across):
-        return None
-    down, right = across
-    field = values.broadcast_like(dataset[down] * dataset[right]).transpose(down, right).values
-    if min(field.shape) < 2 or not np.nanmin(field, initial=np.inf) < n0 < np.nanmax(field, initial=-np.inf):
-        return None
-    lines = axes.contour(
-        dataset[right], dataset[down], np.ma.masked_invalid(field), [n0],
-        colors="black", linewidths=_LINE["linewidth"], linestyles=[STYLES[name]],
-    )  # fmt: skip
-    lines.set(path_effects=_halo(2.4), gid=name)
-    parts = [np.asarray(path.vertices) for path in lines.get_paths()]
-    return max(parts, key=len) if any(map(len, parts)) else None
+def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
+    """The lines over a map with these axes, for which all other axes of the dataset are fixed."""
+    across, found = {x.name, y.name}, list[Line]()
+    for name, sign, values, source in _explaining(dataset, across):
+        parts = _over_spins(values, x, y) if "n0" in across else _contours(values, float(dataset["n0"]), x, y)
+        if parts:
+            found.append(Line(name, words(name, source, over_n0="n0" in across), parts, sign))
+    if "b" in across and (b := best_shape(dataset)):
+        at = np.array([b, b])
+        part = (at, y.edges[[0, -1]]) if x.name == "b" else (x.edges[[0, -1]], at)
+        found.append(Line("best", _best_words(b), [part]))
+    return found
 
 
-def _label(axes: Axes, points: Array, name: str, side: str, across: tuple[str, str]) -> None:
-    """The symbol of a critical spin beside its line, on the side of the larger spins or on the roomier one."""
-    place_on_map = axes.transData + axes.transAxes.inverted()
-    last = len(points) - 1
-    if name == "n_c1":  # the lines are farthest apart near the ends that are closer to the middle
-        x, y = min(
-            points[[last // 8, last - last // 8]],
-            key=lambda point: float(np.hypot(*(place_on_map.transform(point) - 0.5))),
-        )
-    else:
-        x, y = points[int(0.6 * last)]
-    outwards = 1 if side == "plus" else -1
-    if across[0] == "n0":
-        place: dict[str, Any] = {"xytext": (0, 4 * outwards), "ha": "center", "va": "bottom" if outwards > 0 else "top"}
-    else:
-        if across[1] != "n0":
-            outwards = 1 if place_on_map.transform((x, y))[0] < 0.5 else -1
-        place = {"xytext": (4 * outwards, 0), "ha": "left" if outwards > 0 else "right", "va": "center"}
-    axes.annotate(symbol(name, side), (x, y), textcoords="offset points", fontsize=9, path_effects=_halo(2), **place)
-
-
-def draw_at(axes: Axes, dataset: xr.Dataset, x: str | None) -> dict[str, Line2D]:
-    """Draw vertical lines on curves over `x`, where the start spin is a critical one and where L(f) is largest."""
-    entries = {}
-    for name in ("n_c1", "n_c2"):
-        for side, values, source in critical_spins(dataset, name):
-            if x is None or "n0" not in dataset.coords or set(values.dims) - {x} or dataset["n0"].ndim > (x == "n0"):
-                continue
-            crossings = _crossings(dataset, values, x, side)
-            for at in crossings:
-                axes.axvline(at, linestyle=STYLES[name], color="black", linewidth=0.8, gid=name)
-            if crossings:
-                entries[name] = entry(name, source, over_n0=x == "n0")
+def crossings(dataset: xr.Dataset, x: str) -> list[Line]:
+    """Where along the one axis `x` of curves the start spin passes a critical spin, and where L(f) is largest."""
+    found = list[Line]()
+    for name, sign, values, source in _explaining(dataset, {x}) if x else ():
+        at = dataset[x].values
+        beyond = np.broadcast_to(dataset["n0"].values - values.values, at.shape) * (1 if "⁺" in sign else -1)
+        known = np.isfinite(beyond)
+        k = np.flatnonzero(((beyond[1:] < 0) != (beyond[:-1] < 0)) & known[1:] & known[:-1])
+        if len(k):
+            passed = at[k] + (at[k + 1] - at[k]) * beyond[k] / (beyond[k] - beyond[k + 1])
+            found.append(Line(name, words(name, source, over_n0=x == "n0"), [(passed, np.array([]))], sign))
     if x == "b" and (b := best_shape(dataset)):
-        axes.axvline(b, linestyle=STYLES["best"], color="black", linewidth=0.8, gid="best")
-        entries["best"] = handle("best", f"b = {b:.2f}, where the form factor L(f) is largest")
-    return entries
+        found.append(Line("best", _best_words(b), [(np.array([b]), np.array([]))]))
+    return found
 
 
-def _crossings(dataset: xr.Dataset, values: xr.DataArray, x: str, side: str) -> list[float]:
-    """Where along `x` the start spin passes a critical spin."""
-    at = dataset[x].values
-    beyond = np.broadcast_to(dataset["n0"].values, at.shape) - np.broadcast_to(values.values, at.shape)
-    beyond = beyond if side == "plus" else -beyond
-    known = np.isfinite(beyond)
-    k = np.flatnonzero(((beyond[1:] < 0) != (beyond[:-1] < 0)) & known[1:] & known[:-1])
-    return [float(v) for v in at[k] + (at[k + 1] - at[k]) * beyond[k] / (beyond[k] - beyond[k + 1])]
+def _explaining(dataset: xr.Dataset, across: set[str]) -> Iterator[tuple[str, str, xr.DataArray, str]]:
+    """The name, symbol, values and source of the critical spins that vary over no other axes, beside a start spin."""
+    if "n0" in dataset.coords and set(dataset["n0"].dims) <= across & {"n0"}:
+        for name in ("n_c1", "n_c2"):
+            for sign, values, source in critical_spins(dataset, name):
+                if set(values.dims) <= across:
+                    yield name, sign, values, source
+
+
+def best_shape(dataset: xr.Dataset) -> float | None:
+    """b of the largest form factor, if it is the same in the whole dataset and lies within its axis b."""
+    if any(name not in dataset or dataset[name].ndim for name in ("a", "c")) or "b" not in dataset.dims:
+        return None
+    b = best_b(float(dataset["a"]), float(dataset["c"]))
+    return b if dataset["b"].min() <= b <= dataset["b"].max() else None
+
+
+def _best_words(b: float) -> str:
+    return f"b = {b:.2f}, where the form factor L(f) is largest"
+
+
+def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
+    """A critical spin over the other axis than n0, right across the map if it does not depend on that axis."""
+    spin, other = (x, y) if x.name == "n0" else (y, x)
+    spins = np.broadcast_to(values.values, len(other.values)).astype(float)
+    if not ((spin.values[0] <= spins) & (spins <= spin.values[-1])).any():
+        return []
+    along = other.values.astype(float)
+    if values.ndim == 0:
+        along[[0, -1]] = other.edges[[0, -1]]
+    return [(spins, along) if spin is x else (along, spins)]
+
+
+def _contours(values: xr.DataArray, n0: float, x: Axis, y: Axis) -> list[Points]:
+    """Where a critical spin equals the start spin of the map."""
+    if min(len(x.values), len(y.values)) < 2:
+        return []
+    template = xr.DataArray(np.zeros((len(y.values), len(x.values))), dims=(y.name, x.name))
+    field = values.drop_vars(values.coords).broadcast_like(template).transpose(y.name, x.name).values
+    found = contour_generator(x.straight(x.values), y.straight(y.values), np.ma.masked_invalid(field)).lines(n0)
+    return [(x.bent(part[:, 0]), y.bent(part[:, 1])) for part in map(np.asarray, found)]

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from sweep.grid import Array
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.plots import labels, legends, theory
+from sweep.plots import labels, lines, theory
 from sweep.plots.figure import Picture
 from sweep.plots.panels import heading
 from sweep.results.kind import is_of_own_body, parameters
@@ -67,7 +67,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
-    figure = Picture(figsize=(11, 4.2 + 1.9 * rows), dpi=110, layout="constrained")
+    figure = Picture(11, 4.2 + 1.9 * rows)
     figure.suptitle(heading(_constants_apart(dataset), figure.get_figwidth()), fontsize=10)
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
@@ -88,7 +88,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
             axes.set_xlabel(time, fontsize=9)
     if not panels:
         first.set_xlabel(time, fontsize=9)
-    legends.below(figure, entries)
+    figure.explain(entries)
     return figure
 
 
@@ -139,29 +139,27 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
 
 def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
     """Lines at the critical spins, one set a body: in the colour of its first trajectory if there are several."""
-    bodies: dict[tuple[float, ...], int] = {}
+    bodies: dict[tuple[tuple[str, str, float, str], ...], int] = {}
     for i in range(dataset.sizes["trajectory"]):
         one = dataset.isel(trajectory=i)
-        found = [v for name in ("n_c1", "n_c2") for _, v, _ in theory.critical_spins(one, name)]
-        bodies.setdefault(tuple(map(float, found)), i)
+        spins = ((name, *found) for name in ("n_c2", "n_c1") for found in theory.critical_spins(one, name))
+        found = [(name, symbol, float(at), source) for name, symbol, at, source in spins if np.isfinite(at)]
+        bodies.setdefault(tuple(found), i)
     entries: dict[str, Line2D] = {}
     written: list[float] = []
     low, high = axes.get_ylim()
-    for i in bodies.values():
+    for body, i in bodies.items():
         colour = "0.4" if len(bodies) == 1 else f"C{i}"
-        for name in ("n_c2", "n_c1"):
-            for side, value, source in theory.critical_spins(dataset.isel(trajectory=i), name):
-                if not np.isfinite(at := float(value)):
-                    continue
-                axes.axhline(at, color=colour, linestyle=_CRITICAL[name], linewidth=0.9, gid=name)
-                entries[name] = theory.entry(name, source, over_n0=True, spin="n")
-                entries[name].set(linestyle=_CRITICAL[name], linewidth=0.9)
-                if all(abs(at - other) > 0.04 * (high - low) for other in written):
-                    axes.annotate(
-                        theory.symbol(name, side), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
-                        textcoords="offset points", fontsize=8, va="center", color=colour,
-                    )  # fmt: skip
-                    written.append(at)
+        for name, symbol, at, source in body:
+            axes.axhline(at, color=colour, linestyle=_CRITICAL[name], linewidth=0.9, gid=name)
+            entries[name] = lines.entry(name, theory.words(name, source, over_n0=True, spin="n"))
+            entries[name].set(linestyle=_CRITICAL[name], linewidth=0.9)
+            if all(abs(at - other) > 0.04 * (high - low) for other in written):
+                axes.annotate(
+                    lines.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
+                    textcoords="offset points", fontsize=8, va="center", color=colour,
+                )  # fmt: skip
+                written.append(at)
     return list(entries.values())
 
 

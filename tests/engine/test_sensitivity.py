@@ -41,7 +41,7 @@ def test_maps_mark_counts_that_are_not_certain() -> None:
 
 def labels(dataset: xr.Dataset) -> str:
     """The entries of the legend of the maps."""
-    return " ".join(text.get_text() for legend in picture.draw(dataset).legends for text in legend.get_texts())
+    return " ".join(text.get_text() for legend in picture.plot(dataset).legends for text in legend.get_texts())
 
 
 def test_settled_trajectories_stay_where_they_are_said_to() -> None:

@@ -216,7 +216,7 @@ def test_the_map_shows_the_dataset(visit: Callable[..., Page], opened: xr.Datase
         elif (i, j) in [(2, 0), (3, 0)]:  # a lower bound, and limited by round-off
             assert 0.6 < share < 0.95
         elif opened["status"].values[i, j, N0] == 1:
-            assert share == 1, (i, j)
+            assert share > 0.8, (i, j)  # a line may run through the cell
     legend = text(page, "legend")
     for words in ("lower bound", "failed: 1 lifted off the table", "limited by round-off"):
         assert words in legend

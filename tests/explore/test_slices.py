@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from sweep.explore import slices
-from sweep.explore.slices import Axis, Source, open_source
+from sweep.explore.slices import PlacedAxis, Source, open_source
 from sweep.plots import marks
 from sweep.results.store import StoreError
 
@@ -21,15 +21,16 @@ def test_a_slice_is_the_selection(name: str, x: str, y: str, tiny: Path, opened:
     (rest,) = {"mu", "b", "n0"} - {x, y}
     whole = opened["reversals"] - opened["reversals_predicted"] if name == "difference" else opened[name]
     expected = whole.broadcast_like(opened["status"]).isel({rest: 1}).transpose(y, x).values
-    part = open_source(tiny).slice(name, x, y, {rest: 1})
+    part = open_source(tiny).map(name, x, y, {rest: 1})
     np.testing.assert_array_equal(part.values, expected)
+    np.testing.assert_array_equal(open_source(tiny).tables([name], x, y, {rest: 1})[name], expected)
 
 
 def test_kinds_are_those_of_the_figures(tiny: Path, opened: xr.Dataset) -> None:
-    part = open_source(tiny).slice("reversals", "mu", "b", {"n0": 1})
-    for k, (kind, where) in enumerate(marks.marks(opened.isel(n0=1), "reversals").items()):
-        np.testing.assert_array_equal(part.kinds >> k & 1, where.transpose("b", "mu").values, kind)
-    assert part.kinds[0, 0]
+    part = open_source(tiny).map("reversals", "mu", "b", {"n0": 1})
+    for kind, where in marks.marks(opened.isel(n0=1), "reversals").items():
+        np.testing.assert_array_equal(part.marks[kind], where.transpose("b", "mu").values, kind)
+    assert part.marks["failed"][0, 0]
     assert len(part.shown) == 19
 
 
@@ -45,16 +46,17 @@ def test_descending_axes_are_turned(opened: xr.Dataset) -> None:
 SPACINGS = {
     "linear": ([1, 2, 3], [0.5, 1.5, 2.5, 3.5]),
     "log": ([1, 100, 10000], [0.1, 10, 1000, 100000]),
-    "list": ([1, 2, 10], [-0.5, 0.5, 1.5, 2.5]),
+    "uneven": ([1, 2, 10], [-0.5, 0.5, 1.5, 2.5]),
 }
 
 
 @pytest.mark.parametrize(("spacing", "values", "edges"), [(k, *v) for k, v in SPACINGS.items()], ids=SPACINGS)
 def test_cells_end_half_way_between_values(spacing: str, values: list[float], edges: list[float]) -> None:
-    axis = Axis("mu", np.array(values, float))
+    axis = PlacedAxis("mu", np.array(values, float))
     assert axis.spacing == spacing
-    np.testing.assert_allclose(axis.edges, edges)
-    assert [axis.place(v) for v in values] == list(axis.places)
+    np.testing.assert_allclose(axis.drawn_edges, edges)
+    np.testing.assert_allclose(axis.place(axis.edges[[0, -1]]), axis.drawn_edges[[0, -1]])
+    np.testing.assert_array_equal(axis.place(values), [0, 1, 2] if spacing == "uneven" else values)
 
 
 def test_a_cell_is_told_in_words(tiny: Path, opened: xr.Dataset) -> None:
@@ -75,14 +77,14 @@ def test_a_large_dataset_is_read_slice_by_slice(tiny: Path, monkeypatch: pytest.
     monkeypatch.setattr(slices, "IN_MEMORY", 10)
     source = open_source(tiny)
     assert not source.dataset["reversals"].variable._in_memory
-    part = source.slice("reversals", "mu", "b", {"n0": 1})
-    np.testing.assert_array_equal(part.values, open_source(tiny).slice("reversals", "mu", "b", {"n0": 1}).values)
+    part = source.map("reversals", "mu", "b", {"n0": 1})
+    np.testing.assert_array_equal(part.values, open_source(tiny).map("reversals", "mu", "b", {"n0": 1}).values)
     assert not source.dataset["reversals"].variable._in_memory
 
 
 def test_one_axis_is_a_row(opened: xr.Dataset) -> None:
     source = Source(opened.isel(b=0, n0=0))
-    part = source.slice("reversals", "mu", "", {})
+    part = source.map("reversals", "mu", "", {})
     np.testing.assert_array_equal(part.values, opened["reversals"].isel(b=0, n0=0).values[None])
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support.cli import invoke, refused
+from support.figures import entries
 
 import sweep
 from sweep.plots import picture
@@ -40,30 +41,31 @@ def test_one_scale_and_axes_of_their_own(two: list[xr.Dataset]) -> None:
 
 def test_the_legend_counts_the_cells_of_each(two: list[xr.Dataset]) -> None:
     limits = [int((dataset["status"] == 2).sum()) for dataset in two]
-    (legend,) = picture.draw(two, x="b", y="mu").legends
-    assert f"({limits[0]} of 6 and {limits[1]} of 6)" in legend.get_texts()[0].get_text()
+    assert f"({limits[0]} of 6 and {limits[1]} of 6)" in entries(picture.plot(two, x="b", y="mu"))[0]
 
 
 def test_flags_and_real_numbers(two: list[xr.Dataset]) -> None:
     two[0]["status"] = xr.full_like(two[0]["status"], 1)
-    figure = picture.draw(two, "status", x="b", y="mu")
+    figure = picture.plot(two, "status", x="b", y="mu")
     assert len(figure.axes) == 2
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["settled", "ended at the time limit"]
+    assert entries(figure) == [
+        "settled (6 of 6 and 0 of 6)", "ended at the time limit (0 of 6 and 6 of 6)",
+    ]  # fmt: skip
     colours = [axes.collections[0].to_rgba([1, 2]) for axes in figure.axes]
     np.testing.assert_array_equal(*colours)
-    one, other, _ = picture.draw(two, "spin_final", x="b", y="mu").axes
+    one, other, _ = picture.plot(two, "spin_final", x="b", y="mu").axes
     assert one.collections[0].get_clim() == other.collections[0].get_clim()
 
 
 def test_what_cannot_stand_side_by_side(two: list[xr.Dataset], small: xr.Dataset) -> None:
     with pytest.raises(ValueError, match="no two axes"):
-        picture.draw([two[0], two[1].isel(mu=0)], x="b")
+        picture.plot([two[0], two[1].isel(mu=0)], x="b")
     with pytest.raises(ValueError, match="10 maps side by side; allowed: 8"):
-        picture.draw([small] * 5, x="b", y="mu")
+        picture.plot([small] * 5, x="b", y="mu")
     critical = xr.Dataset({"critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]})
     for several in ([], [critical, critical]):
-        with pytest.raises(ValueError, match="allowed: side by side, those of runs"):
-            picture.draw(several)
+        with pytest.raises(ValueError, match="side by side only if each is of a run"):
+            picture.plot(several)
 
 
 def test_from_the_shell(two: list[xr.Dataset], tmp_path: Path) -> None:

@@ -12,13 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, to_rgb
 from matplotlib.figure import Figure
 from support.cli import invoke, refused
+from support.figures import entries
 
 import sweep
 from sweep.kernels.status import DIVERGED, SETTLED, TIME_LIMIT
 from sweep.plots import picture, scales
-from sweep.plots.cells import outline
-from sweep.plots.maps import arrangement
-from sweep.plots.panels import edges
+from sweep.plots.hatches import outline
 from sweep.results.dataset import VARIABLES, described, numbers_along
 from sweep.results.netcdf import write
 
@@ -66,12 +65,8 @@ def marked(axes: Axes, kind: str) -> list[Any]:
     return [patch for patch in axes.patches if patch.get_gid() == kind]
 
 
-def entries(figure: Figure) -> list[str]:
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-
-
 def test_simulated_predicted_and_their_difference_stand_side_by_side() -> None:
-    figure = picture.draw(made())
+    figure = picture.plot(made())
     assert [axes.get_title().split(",")[0] for axes in maps(figure)] == [
         "simulated", "predicted (Takano 2011)", "simulated − predicted",
     ]  # fmt: skip
@@ -83,22 +78,18 @@ def test_simulated_predicted_and_their_difference_stand_side_by_side() -> None:
 def test_a_difference_is_coloured_evenly_about_zero() -> None:
     dataset = made()
     dataset["reversals_predicted"] += xr.where(dataset.mu > 100, -9, 3).astype("int16")
-    norm = mesh(maps(picture.draw(dataset))[2]).norm
+    norm = mesh(maps(picture.plot(dataset))[2]).norm
     np.testing.assert_array_equal(norm.boundaries, -norm.boundaries[::-1])
     assert norm(0) == (norm.Ncmap - 1) / 2
     assert norm.boundaries[-1] > 7
 
 
-@pytest.mark.parametrize("name", [scales.SEQUENTIAL, "cividis"])
-def test_counts_get_steadily_lighter(name: str) -> None:
-    lightness = scales.counts(np.arange(18), name=name).lightness(np.arange(18))
-    assert (np.diff(lightness) > 0.01).all()
-
-
-def test_differences_get_steadily_darker_on_both_sides() -> None:
-    lightness = scales.differences(np.arange(-10, 11)).lightness(np.arange(-10, 11))
-    assert (np.diff(lightness[:11]) > 0.01).all()
-    assert (np.diff(lightness[10:]) < -0.01).all()
+def test_the_lightness_of_colours_tells_values_apart() -> None:
+    counts, differences = np.arange(18), np.arange(-10, 11)
+    for name in (scales.SEQUENTIAL, "cividis"):
+        assert (np.diff(scales.counts(counts, name=name).lightness(counts)) > 0.01).all()
+    steps = np.diff(scales.differences(differences).lightness(differences))
+    assert (steps * np.repeat([1, -1], 10) > 0.01).all()  # darker on both sides
 
 
 @pytest.mark.parametrize("top", [1, 6, 16, 33, 41, 200, 3000])
@@ -109,19 +100,19 @@ def test_every_count_has_a_colour_and_high_ones_are_told_apart(top: int) -> None
     assert scale.norm.boundaries[-1] > top
     assert scale.norm.extend == "neither"
     assert scale.norm.Ncmap <= 24
-    # No range is wider than a quarter of the counts in it.
+    # No range is wider than four fifths of the count at which it begins.
     first = scale.norm.boundaries[:-1] + 0.5
     assert (np.diff(scale.norm.boundaries) <= np.maximum(1, 0.8 * first)).all()
     assert len({tuple(c) for c in scale.rgba(first)}) == len(first)
 
 
 def test_limits_leave_arrows_for_what_is_beyond() -> None:
-    norm = mesh(maps(picture.draw(made(), limits=(3, 5)))[0]).norm
+    norm = mesh(maps(picture.plot(made(), limits=(3, 5)))[0]).norm
     assert (norm.boundaries[0], norm.boundaries[-1], norm.extend) == (2.5, 5.5, "both")
 
 
 def test_the_ticks_of_counts_are_integers() -> None:
-    figure = picture.draw(made())
+    figure = picture.plot(made())
     bars = [axes for axes in figure.axes if axes not in maps(figure)]
     assert len(bars) == 2
     for bar in bars:
@@ -131,7 +122,7 @@ def test_the_ticks_of_counts_are_integers() -> None:
 
 
 def test_lower_bounds_are_hatched_and_explained() -> None:
-    figure = picture.draw(made())
+    figure = picture.plot(made())
     simulated, predicted, difference = maps(figure)
     for axes in (simulated, difference):
         (patch,) = marked(axes, "time_limit")
@@ -142,7 +133,7 @@ def test_lower_bounds_are_hatched_and_explained() -> None:
 
 
 def test_legends_are_never_over_the_data() -> None:
-    figure = picture.draw(made())
+    figure = picture.plot(made())
     figure.draw_without_rendering()
     assert not any(axes.get_legend() for axes in figure.axes)
     (legend,) = figure.legends
@@ -155,7 +146,7 @@ def test_legends_are_never_over_the_data() -> None:
 def test_hatches_stand_out_from_dark_and_light_cells() -> None:
     dataset = made()
     dataset["status"][:] = TIME_LIMIT
-    axes = maps(picture.draw(dataset))[0]
+    axes = maps(picture.plot(dataset))[0]
     white, black = marked(axes, "time_limit")
     assert to_rgb(white.get_edgecolor()) == (1, 1, 1)
     assert to_rgb(black.get_edgecolor()) == (0, 0, 0)
@@ -167,11 +158,12 @@ def test_failed_inferred_and_noise_limited_cells_are_told_apart() -> None:
     dataset["status"][0] = DIVERGED
     dataset["noise_limited"][3] = 1
     dataset["inferred"] = dataset["noise_limited"].copy(data=np.roll(dataset["noise_limited"], 2, axis=0))
-    figure = picture.draw(dataset)
+    figure = picture.plot(dataset)
     axes = maps(figure)[0]
     hatches = {marked(axes, kind)[0].get_hatch() for kind in ("failed", "noise_limited", "inferred", "time_limit")}
     assert len(hatches) == 4
     assert mesh(axes).get_array().mask[0].all()
+    assert not mesh(maps(figure)[1]).get_array().mask.any()  # a prediction cannot fail
     assert not mesh(axes).get_array().mask[1:].any()
     assert [text.split(" ")[0] for text in entries(figure)[:4]] == ["failed:", "lower", "inferred", "limited"]
 
@@ -184,26 +176,24 @@ def test_one_patch_covers_the_cells_and_nothing_else() -> None:
 
 
 def test_the_critical_spins_are_contours_where_they_equal_the_start_spin() -> None:
-    axes = maps(picture.draw(made(n0=[0.02])))[0]
-    lines = {line.get_gid(): line for line in axes.collections if line.get_gid()}
+    axes = maps(picture.plot(made(n0=[0.02])))[0]
     # n_c1 = 1/mu of the eigenvalues, not the 3/mu of the formula; n_c2 = 2/mu.
     for name, factor in (("n_c1", 1.0), ("n_c2", 2.0)):
-        (path,) = [p for p in lines[name].get_paths() if len(p.vertices)]
-        np.testing.assert_allclose(path.vertices[:, 1], factor / 0.02, rtol=0.05)
-        assert np.ptp(path.vertices[:, 0]) == 7
+        (line,) = [line for line in axes.lines if line.get_gid() == name]
+        np.testing.assert_allclose(line.get_ydata(), factor / 0.02, rtol=0.05)
+        assert np.ptp(line.get_xdata()) == 7
 
 
 def test_no_contour_of_a_spin_of_the_other_sign() -> None:
-    figure = picture.draw(made(n0=[-0.02]))
-    lines = {line.get_gid() for line in maps(figure)[0].collections}
-    assert {"n_c1", "n_c2"} <= lines
+    figure = picture.plot(made(n0=[-0.02]))
+    assert {"n_c1", "n_c2"} <= {line.get_gid() for line in maps(figure)[0].lines}
     below = made(n0=[-0.02]).drop_vars(["n_c1_minus_linear", "n_c2_minus"])
-    assert not {"n_c1", "n_c2"} & {line.get_gid() for line in maps(picture.draw(below))[0].collections}
+    assert not {"n_c1", "n_c2"} & {line.get_gid() for line in maps(picture.plot(below))[0].lines}
 
 
 @pytest.mark.parametrize(("x", "y"), [("n0", "mu"), ("mu", "n0")])
 def test_the_critical_spins_are_curves_over_start_spins(x: str, y: str) -> None:
-    figure = picture.draw(made(n0=np.linspace(-0.2, 0.2, 21)), x=x, y=y, sel={"b": 3.0})
+    figure = picture.plot(made(n0=np.linspace(-0.2, 0.2, 21)), x=x, y=y, sel={"b": 3.0})
     for axes in maps(figure):
         curves = [line for line in axes.lines if line.get_gid() == "n_c2"]
         assert len(curves) == 2
@@ -216,59 +206,72 @@ def test_the_critical_spins_are_curves_over_start_spins(x: str, y: str) -> None:
 
 def test_theory_is_drawn_over_reversals_alone() -> None:
     for variable, lines in (("reversals", {"best", "n_c1", "n_c2"}), ("status", set()), ("spin_final", set())):
-        axes = maps(picture.draw(made(n0=[0.02]), variable))[0]
-        assert {artist.get_gid() for artist in [*axes.lines, *axes.collections] if artist.get_gid()} == lines
-    assert any("L(f) is largest" in text for text in entries(picture.draw(made())))
+        axes = maps(picture.plot(made(n0=[0.02]), variable))[0]
+        assert {artist.get_gid() for artist in axes.lines if artist.get_gid()} == lines
+    assert any("L(f) is largest" in text for text in entries(picture.plot(made())))
 
 
 def test_a_status_is_told_in_words() -> None:
-    figure = picture.draw(made(), "status")
+    figure = picture.plot(made(), "status")
     assert entries(figure) == ["settled (79 of 80)", "ended at the time limit (1 of 80)"]
     assert len(figure.axes) == 1  # and no bar with numbers
 
 
+@pytest.mark.parametrize("variable", [None, "status", "difference", "t_last_reversal"])
+def test_a_mean_over_an_axis_has_no_marks(variable: str | None) -> None:
+    """A mean of the codes of a status is no status."""
+    dataset = made(n0=[0.02, 0.05])
+    dataset["status"][:] = TIME_LIMIT
+    dataset["t_last_reversal"] = dataset["spin_final"] ** 2
+    figure = picture.plot(dataset.mean("n0"), variable)
+    assert not any(axes.patches for axes in figure.axes)
+    assert not [text for text in entries(figure) if "n$_" not in text and "L(f)" not in text]
+    assert len(figure.axes) == (5 if variable is None else 2)  # with bars, also of the status
+
+
+def test_a_mean_difference_keeps_its_fraction() -> None:
+    dataset = made(n0=[0.02, 0.05])
+    dataset["reversals"][:, :, 0] += 1
+    mean = dataset.mean("n0")
+    np.testing.assert_allclose(mesh(maps(picture.plot(mean, "difference"))[0]).get_array(), -1.5)
+
+
 def test_signed_values_are_coloured_evenly_about_zero() -> None:
-    norm = mesh(maps(picture.draw(made(), "spin_final"))[0]).norm
+    norm = mesh(maps(picture.plot(made(), "spin_final"))[0]).norm
     assert (norm.vmin, norm.vmax) == (-0.1, 0.1)
-
-
-@pytest.mark.parametrize(("panels", "names"), [(n, m) for n in range(1, 9) for m in (1, 2, 3)])
-def test_a_page_is_compact(panels: int, names: int) -> None:
-    rows, groups = arrangement(panels, names)
-    assert rows * groups >= panels > (rows - 1) * groups
 
 
 @pytest.mark.parametrize("starts", [1, 3, 4, 8])
 def test_a_page_fits_a_screen(starts: int) -> None:
     dataset = made(n0=np.linspace(0.02, 0.1, starts))
     for variable in (None, "reversals", "status"):
-        wide, high = picture.draw(dataset, variable, x="b", y="mu").get_size_inches() * 110
+        wide, high = picture.plot(dataset, variable, x="b", y="mu").get_size_inches() * 110
         assert wide <= 1700
         assert high <= 1500
 
 
 def test_the_nearest_value_is_drawn() -> None:
     dataset = made(n0=[0.02, 0.05])
-    figure = picture.draw(dataset, sel={"n0": 0.04})
+    figure = picture.plot(dataset, sel={"n0": 0.04})
     assert "n₀ = 0.05" in figure.get_suptitle()
     with pytest.raises(ValueError, match="no axis q; allowed: mu, b, n0"):
-        picture.draw(dataset, sel={"q": 1})
+        picture.plot(dataset, sel={"q": 1})
 
 
 def test_logarithmic_and_uneven_axes_are_drawn_so() -> None:
     mu = np.geomspace(20, 200, 7)
-    axes = maps(picture.draw(made(mu=mu, b=[2, 3, 5, 6, 9])))[0]
+    axes = maps(picture.plot(made(mu=mu, b=[2, 3, 5, 6, 9])))[0]
     assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "log")
     axes.figure.draw_without_rendering()
     assert {text.get_text() for text in axes.get_yticklabels()} >= {"20", "50", "100", "200"}
-    np.testing.assert_allclose(edges(mu), np.geomspace(mu[0] ** 1.5 / mu[1] ** 0.5, mu[6] ** 1.5 / mu[5] ** 0.5, 8))
-    np.testing.assert_array_equal(edges(np.array([2.0, 3, 5])), [1.5, 2.5, 4, 6])
-    np.testing.assert_array_equal(mesh(axes).get_coordinates()[0, :, 0], edges(np.array([2.0, 3, 5, 6, 9])))
+    corners = mesh(axes).get_coordinates()
+    np.testing.assert_allclose(corners[:, 0, 1], 20 * 10 ** ((np.arange(8) - 0.5) / 6))
+    np.testing.assert_array_equal(corners[0, :, 0], [1.5, 2.5, 4, 5.5, 7.5, 10.5])
 
 
 def test_axes_in_any_order_of_values() -> None:
     dataset = made()
-    one, other = (mesh(maps(picture.draw(d))[0]).get_array() for d in (dataset, dataset.isel(mu=slice(None, None, -1))))
+    one, other = (mesh(maps(picture.plot(d))[0]).get_array() for d in (dataset, dataset.isel(mu=slice(None, None, -1))))
     np.testing.assert_array_equal(one, other)
 
 
@@ -280,7 +283,7 @@ def test_axes_in_any_order_of_values() -> None:
         ({"cmap": "q"}, "no colour map q; allowed"),
         ({"limits": (2, 1)}, r"limits: 2..1; allowed"),
         ({"variable": "q"}, "no variable q; allowed: reversals"),
-        ({"output": "x.jpg"}, r"x.jpg: unknown format; allowed: a file that ends in .png, .pdf, .svg"),
+        ({"output": "x.jpg"}, "x.jpg: unknown format; write a png, pdf or svg"),
     ],
 )
 def test_wrong_choices_are_refused(wrong: dict[str, Any], said: str) -> None:
@@ -289,7 +292,7 @@ def test_wrong_choices_are_refused(wrong: dict[str, Any], said: str) -> None:
 
 
 def test_curves_tell_lower_bounds_and_crossings() -> None:
-    figure = picture.draw(made(b=[2, 3, 4, 5], n0=[0.02]).isel(b=3, n0=0))
+    figure = picture.plot(made(b=[2, 3, 4, 5], n0=[0.02]).isel(b=3, n0=0))
     (axes,) = figure.axes
     at = {line.get_gid(): line.get_xdata()[0] for line in axes.lines if line.get_gid()}
     assert at == {"n_c1": pytest.approx(50, rel=0.1), "n_c2": pytest.approx(100, rel=0.1)}
@@ -313,10 +316,15 @@ def test_the_suffix_names_the_format(suffix: str, tmp_path: Path) -> None:
     assert (tmp_path / f"one.{suffix}").read_bytes() == (tmp_path / f"two.{suffix}").read_bytes()
 
 
+def test_help_names_every_format() -> None:
+    said = " ".join(invoke("plot", "--help").output.split())
+    assert all(name in said for name in (*MAGIC, "html"))
+
+
 def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     write(tmp_path / "made.nc", made())
     for options, said in (
-        (("--output", tmp_path / "x.jpg"), "x.jpg: unknown format; write a file that ends in .png, .pdf, .svg"),
+        (("--output", tmp_path / "x.jpg"), "x.jpg: unknown format; write a png, pdf, svg or html"),
         (("--limits", "3"), "--limits 3: must be LOW..HIGH"),
         (("--limits", "3..1"), "--limits 3..1: must be LOW..HIGH"),
         (("--sel", "n0"), "--sel n0: must be NAME=NUMBER"),
@@ -326,12 +334,10 @@ def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["made.nc"]
 
 
-def test_a_large_map_is_drawn_with_all_its_marks() -> None:
-    large = made(mu=np.linspace(20, 200, 300), b=np.linspace(2, 9, 300))
-    large["status"][:] = np.where(np.random.default_rng(1).random(large["status"].shape) < 0.5, SETTLED, TIME_LIMIT)
-    figure = picture.draw(large)
-    assert mesh(maps(figure)[0]).get_array().shape == (300, 300)
-    figure.draw_without_rendering()
+def test_of_a_long_axis_as_many_values_are_drawn_as_can_be_seen() -> None:
+    figure = picture.plot(made(mu=np.linspace(20, 200, 1100), b=[2, 3, 4, 5, 6]), x="b", y="mu")
+    assert [mesh(axes).get_array().shape for axes in maps(figure)] == 3 * [(550, 5)]
+    assert any("(1 of 5500)" in text for text in entries(figure))
 
 
 def test_numbers_along_a_further_dimension_get_panels() -> None:
@@ -340,7 +346,7 @@ def test_numbers_along_a_further_dimension_get_panels() -> None:
     spec = VARIABLES["reversal_times"]
     more = dataset.assign(reversal_times=(("mu", "b", "n0", "reversal"), times, described(spec)))
     more = more.assign_coords(numbers_along({"reversal_times": times.shape}))
-    assert len(maps(picture.draw(more, "reversal_times"))) == 2
+    assert len(maps(picture.plot(more, "reversal_times"))) == 2
 
 
 def test_a_notebook_shows_a_map_before_pyplot_is_imported(small: xr.Dataset) -> None:

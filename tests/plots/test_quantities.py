@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import to_rgb
 from support import ROOT
+from support.figures import entries
 
 import sweep
 from sweep.config import load_config
@@ -72,7 +74,7 @@ def test_what_is_measured_first_is_shown_first(measured: str, whole: xr.Dataset)
     assert subject(dataset) == variable
     assert titles(sweep.plot(dataset)) == maps
     assert state.first(Source(dataset)).show == variable
-    beside = picture.draw([dataset, whole])  # which does not say what it measured
+    beside = picture.plot([dataset, whole])  # which does not say what it measured
     assert beside.get_suptitle().startswith(labels.words(field(dataset, variable).to_dataset(name=variable), variable))
 
 
@@ -114,8 +116,8 @@ def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
     assert set(DERIVED) == set(derivable(whole)) < set(source.variables)
     assert source.variables[:5] == ["reversals", "reversals_predicted", "difference", "ratio", "regime"]
     for name in source.variables:
-        picture.draw(whole, name)
-        part = source.slice(name, "delta", "n0", {})
+        picture.plot(whole, name)
+        part = source.map(name, "delta", "n0", {})
         np.testing.assert_array_equal(part.values, field(whole, name).values)
     assert not set(DERIVED) & set(Source(whole[["status", "reversals", "energy_error"]]).variables)
 
@@ -127,37 +129,44 @@ def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None
         assert told["regime of motion"] == REGIMES[regime].replace("_", " ")
         assert told["first reversal, simulated / predicted"] == "1.25"
         assert told["simulated − predicted"] == "+2"
-    assert source.slice("regime", "delta", "n0", {}).legend["failed"] == "failed: 1 lifted off the table (1 of 42)"
+    assert source.map("regime", "delta", "n0", {}).legend["failed"] == "failed: 1 lifted off the table (1 of 42)"
 
 
 @pytest.mark.browser
-def test_ratios_have_the_same_scale_in_pictures_and_explorer(whole: xr.Dataset) -> None:
-    from sweep.explore.colours import scale  # needs Bokeh
+@pytest.mark.parametrize(
+    "name", ["reversals", "difference", "ratio", "t_first_reversal_predicted", "energy_error", "lyapunov"]
+)
+def test_pictures_and_explorer_have_the_same_colours(name: str, whole: xr.Dataset) -> None:
+    from sweep.explore.figure import MapFigure  # needs Bokeh
 
-    assert all(scale(Source(whole).slice(name, "delta", "n0", {})).palette for name in Source(whole).variables)
-    found = scale(Source(whole).slice("ratio", "delta", "n0", {}))
-    figure = picture.draw(whole, "ratio")
-    norm = figure.axes[0].collections[0].norm
-    assert (found.low, found.high) == (norm.vmin, norm.vmax) == (0.5, 2)
-    assert (found.logarithmic, found.words[found.ticks[2]]) == (True, "1")
-    assert found.beyond == "the last colours also stand for ratios up to 5"
+    whole["reversals"] += xr.DataArray(np.arange(SIZE[1], dtype="int16") ** 3, dims="delta")
+    part, shown = Source(whole).map(name, "delta", "n0", {}), MapFigure(Source(whole), "delta", "n0")
+    shown.show(part, {})
+    (bar,) = shown.figure.right
+    mapper, values = bar.color_mapper, np.unique(part.shown)
+    straight = np.log if "Log" in type(mapper).__name__ else np.asarray
+    low, high, at = (straight(v) for v in (mapper.low, mapper.high, values))
+    index = ((at - low) / (high - low) * len(mapper.palette)).astype(int).clip(0, len(mapper.palette) - 1)
+    expected = picture.plot(whole, name).axes[0].collections[0].to_rgba(values)[:, :3]
+    np.testing.assert_allclose([to_rgb(mapper.palette[i]) for i in index], expected, atol=0.02)
+    if name == "ratio":
+        assert (mapper.low, mapper.high, list(bar.major_label_overrides.values())[2]) == (0.5, 2, "1")
 
 
 @pytest.mark.parametrize(("variable", "limits", "arrows"), [("ratio", None, "max"), ("energy_error", None, "neither"),
                                                             ("t_first_reversal", (100, 200), "max"),
                                                             ("lyapunov_error", (2, 3), "min")])  # fmt: skip
 def test_a_bar_has_arrows_where_values_lie_beyond(variable: str, limits: Any, arrows: str, whole: xr.Dataset) -> None:
-    bars = [axes for axes in picture.draw(whole, variable, limits=limits).axes if hasattr(axes, "_colorbar")]
+    bars = [axes for axes in picture.plot(whole, variable, limits=limits).axes if hasattr(axes, "_colorbar")]
     assert bars[0]._colorbar.extend == arrows
+    assert variable != "ratio" or bars[0].get_yticklabels()[2].get_text() == "1"
 
 
 def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None:
     whole["t_first_reversal_predicted"][:, :2] = np.nan
-    (legend,) = picture.draw(whole, "t_first_reversal").legends
-    assert "no reversal, or none predicted (12 of 42)" in [text.get_text() for text in legend.get_texts()]
+    assert "no reversal, or none predicted (12 of 42)" in entries(picture.plot(whole, "t_first_reversal"))
     whole["t_first_reversal_predicted"][3:5, 3] = np.nan
-    figure = picture.draw(whole.isel(delta=3), "t_first_reversal")
+    figure = picture.plot(whole.isel(delta=3), "t_first_reversal")
     (missing,) = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
     assert (missing.get_label(), len(missing.get_xdata())) == ("no reversal (1 of 6)", 1)
-    none = picture.draw(whole.isel(delta=1), "t_first_reversal")
-    assert [text.get_text() for text in none.legends[0].get_texts()] == ["time of the first reversal"]
+    assert entries(picture.plot(whole.isel(delta=1), "t_first_reversal")) == ["time of the first reversal"]

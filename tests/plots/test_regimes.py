@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from support.figures import entries
 
 import sweep
 from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
@@ -43,27 +44,9 @@ def test_a_regime_is_told_by_its_thresholds(regime: int) -> None:
 def test_a_body_that_lifts_off_has_none() -> None:
     found = dataset([*CELLS.values(), cell(LIFT_OFF, 0, np.nan, np.nan)])
     assert "failed: 1 lifted off" in legend(found, "regime")["failed"]
-    words = [text.get_text() for text in sweep.plot(found, "regime").legends[0].get_texts()]
-    assert any("lifted off" in each for each in words)
+    assert any("lifted off" in each for each in entries(sweep.plot(found, "regime")))
 
 
 def test_without_an_exponent_there_is_no_regime() -> None:
     with pytest.raises(ValueError, match="no variable regime"):
         field(dataset([CELLS[REGULAR]]).drop_vars("lyapunov"), "regime")
-
-
-def test_the_first_reversal_is_drawn_beside_its_prediction() -> None:
-    times = np.array([[100.0, 50.0, np.nan], [40.0, 20.0, 10.0]]).repeat(3, 0).repeat(2, 1)
-    found = xr.Dataset(
-        {"t_first_reversal": (("n0", "delta"), times), "t_first_reversal_predicted": (("n0", "delta"), times / 1.25)},
-        {"n0": np.arange(6) + 1.0, "delta": np.arange(6) + 1.0},
-    )
-    np.testing.assert_allclose(field(found, "ratio").values[np.isfinite(times)], 1.25)
-    titles = [axes.get_title() for axes in sweep.plot(found, "t_first_reversal").axes]
-    assert [title for title in titles if title] == [
-        "simulated",
-        "predicted (Garcia and Hubbard 1988)",
-        "simulated / predicted",
-    ]
-    bar = next(axes for axes in sweep.plot(found, "ratio").axes if "simulated / predicted" in axes.get_ylabel())
-    assert [text.get_text() for text in bar.get_yticklabels()][2] == "1"

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.figure import Figure
 from support.cli import invoke, refused
+from support.figures import entries
 
 from sweep.plots import picture, trajectories
 from sweep.plots.panels import in_lines
@@ -35,10 +35,6 @@ def made(mu: list[float], **given: Any) -> xr.Dataset:
     dataset["time"].attrs = {"long_name": "time, in sqrt(c/g)", "units": "1"}
     dataset["spin"].attrs = {"long_name": "spin about the upward normal, in sqrt(g/c)", "units": "1"}
     return dataset
-
-
-def entries(figure: Figure) -> list[str]:
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
 def test_every_curve_is_in_a_legend() -> None:
@@ -88,7 +84,7 @@ def test_a_body_in_si_has_its_units_everywhere() -> None:
 
 def test_critical_spins_have_their_unit_and_sources() -> None:
     spins = {f"{name}_simulated": ("mu", [1.0, 2.0], {"units": "radian s-1"}) for name in CRITICAL}
-    figure = picture.draw(xr.Dataset({**spins, "critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]}))
+    figure = picture.plot(xr.Dataset({**spins, "critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]}))
     assert figure.axes[0].get_ylabel() == "spin n (rad/s)"
     assert entries(figure)[2:] == ["simulation"]
 
@@ -102,10 +98,10 @@ def test_constants_break_between_them_alone() -> None:
 
 
 def test_one_series_is_drawn_alone() -> None:
-    (axes,) = picture.draw(made([60, 100]), "energy").axes
+    (axes,) = picture.plot(made([60, 100]), "energy").axes
     assert {line.get_gid() for line in axes.lines} == {"energy"}
     with pytest.raises(ValueError, match="no series reversals; allowed: spin, contact_x"):
-        picture.draw(made([60]), "reversals")
+        picture.plot(made([60]), "reversals")
 
 
 def test_a_page_of_all_series_fits_a_screen() -> None:

@@ -1,0 +1,48 @@
+"""An axis of a map: its values, how they follow one another, and where the cells around them end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from sweep.grid import Array
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis, with its values in increasing order."""
+
+    name: str
+    values: Array
+
+    @cached_property
+    def spacing(self) -> Literal["linear", "log", "uneven"]:
+        """Equal distances, equal ratios, or neither."""
+        v = self.values
+        if len(v) == 2 or (len(v) > 2 and np.allclose(np.diff(v), v[1] - v[0], rtol=1e-6, atol=0)):
+            return "linear"
+        equal = len(v) > 2 and v[0] > 0 and np.allclose(np.diff(np.log(v)), np.log(v[1] / v[0]), rtol=1e-6)
+        return "log" if equal else "uneven"
+
+    @cached_property
+    def edges(self) -> Array:
+        """Where the cells begin and end, shape (values + 1,): halfway, on a logarithmic axis in the logarithm."""
+        v = self.straight(self.values)
+        if len(v) == 1:
+            return np.asarray(v[0] + [-0.5, 0.5])
+        between = (v[1:] + v[:-1]) / 2
+        return self.bent(np.concatenate([[2 * v[0] - between[0]], between, [2 * v[-1] - between[-1]]]))
+
+    def straight(self, values: Array) -> Array:
+        """What is linear along the drawn axis: the values, or their logarithms."""
+        return np.asarray(np.log(values) if self.spacing == "log" else values)
+
+    def bent(self, places: Array) -> Array:
+        """The inverse of `straight`."""
+        return np.asarray(np.exp(places) if self.spacing == "log" else places)
+
+    def nearest(self, value: float) -> int:
+        return int(np.abs(self.values - value).argmin())

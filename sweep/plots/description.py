@@ -1,0 +1,108 @@
+"""What a map shows, told from a dataset alone: its values and their colours, the marks of its cells, lines and words.
+
+Two draw it: `sweep.plots.maps` by matplotlib and `sweep.explore.figure` by Bokeh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from sweep.grid import Array
+from sweep.plots import labels, scales, theory
+from sweep.plots.axis import Axis
+from sweep.plots.marks import BLANK, legend, marks
+from sweep.plots.quantities import DERIVED, field
+from sweep.plots.scales import Limits, Scale
+
+_NEEDED_BY_MARKS = ("status", "inferred", "noise_limited", "sensitive", "window_dependent")
+
+
+@dataclass(frozen=True)
+class Map:
+    """A variable over two axes, all other axes being fixed."""
+
+    name: str
+    label: str
+    """The variable in words, with its unit."""
+    x: Axis
+    y: Axis
+    """Of one value, and without a name, where the dataset has a single axis."""
+    values: Array
+    """Shape (y, x)."""
+    marks: dict[str, Array]
+    """Where the cells are of each kind of `marks.WORDS`, shape (y, x)."""
+    legend: dict[str, str]
+    """What a legend says of the kinds that occur."""
+    flags: dict[int, str]
+    """The meaning of each value; empty if they are numbers."""
+    lines: list[theory.Line]
+
+    @property
+    def blank(self) -> Array:
+        """Cells without a value to draw, shape (y, x)."""
+        none = np.isnan(self.values) if self.values.dtype.kind == "f" else np.zeros(self.values.shape, bool)
+        return np.asarray(np.any([none, *(self.marks[kind] for kind in BLANK)], axis=0))
+
+    @property
+    def shown(self) -> Array:
+        """The values that are drawn, shape (cells,)."""
+        return self.values[~self.blank]
+
+
+def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
+    """The map of a variable, or its one row.
+
+    Parameters
+    ----------
+    dataset : in which all axes but `x` and `y` are fixed, and the values of these are in increasing order
+    name : as `sweep.plots.quantities.field` takes it
+    x, y : empty where there is no such axis
+    """
+    found, kinds = field(dataset, name), marks(dataset, name)
+    across, up = Axis(x, along(dataset, x)), Axis(y, along(dataset, y))
+    lines = theory.lines(dataset, across, up) if y and name in theory.REVERSALS else []
+    return Map(
+        name, labels.label(dataset.assign({name: found}), name), across, up, table(found, across, up),
+        {kind: table(where, across, up) for kind, where in kinds.items()},
+        legend(dataset, name), labels.flag_words(dataset.assign({name: found}), name), lines,
+    )  # fmt: skip
+
+
+def needed(dataset: xr.Dataset, name: str) -> set[str]:
+    """The variables of a dataset that `describe` looks at."""
+    lines = [str(n) for n in dataset.data_vars if str(n).startswith("n_c")] if name in theory.REVERSALS else []
+    return {*(DERIVED[name].needs if name in DERIVED else (name,)), *_NEEDED_BY_MARKS, *lines} & set(dataset.data_vars)
+
+
+def along(dataset: xr.Dataset, dim: str) -> Array:
+    """The values of an axis, counted from zero if it has none; a zero without an axis."""
+    if not dim:
+        return np.zeros(1)
+    return np.asarray(dataset[dim].values if dim in dataset.coords else np.arange(dataset.sizes[dim]), float)
+
+
+def table(array: xr.DataArray, x: Axis, y: Axis) -> Array:
+    """An array as a table of shape (y, x), along whichever of the two axes it does not vary."""
+    sizes = {y.name or "_y": len(y.values), x.name or "_x": len(x.values)}
+    template = xr.DataArray(np.zeros(list(sizes.values()), bool), dims=list(sizes))
+    return np.ascontiguousarray(array.drop_vars(array.coords).broadcast_like(template).transpose(*sizes).values)
+
+
+def common_scale(maps: Sequence[Map], limits: Limits | None = None, cmap: str | None = None) -> Scale:
+    """The scale of a map, or that which several of one kind of values share."""
+    first = maps[0]
+    values = np.concatenate([each.shown for each in maps])
+    if first.flags:
+        present = {int(v): first.flags.get(int(v), str(v)) for v in np.unique(values)}
+        return scales.flags(present or first.flags, cmap)
+    if not values.size:
+        values = np.zeros(1, first.values.dtype)
+    if first.name == "ratio":
+        return scales.ratios(values, limits, cmap)
+    if values.dtype.kind not in "iu":
+        return scales.continuous(values, limits, cmap)
+    return (scales.differences if first.name == "difference" else scales.counts)(values, limits, cmap)

@@ -1,0 +1,17 @@
+"""The formats that `plot` writes, each named by the suffix of the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+PICTURES = ("png", "pdf", "svg")
+PAGE = "html"
+"""A map as a page of its own, from the command alone; the explorer writes it."""
+
+A_PICTURE, ANY = "png, pdf or svg", "png, pdf, svg or html"
+"""The same in words."""
+
+
+def suffix(path: Path) -> str:
+    """The format that a file's suffix names."""
+    return path.suffix.removeprefix(".").lower()

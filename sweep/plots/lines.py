@@ -1,0 +1,83 @@
+"""How matplotlib draws the lines of theory."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import Stroke, withStroke
+
+from sweep.plots.description import Map
+from sweep.plots.theory import Line
+
+_STYLES: dict[str, Any] = {"n_c1": (0, (1.5, 1.5)), "n_c2": "-", "best": (0, (6, 3))}
+_LINE: dict[str, Any] = {"color": "black", "linewidth": 1.2}
+
+
+def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
+    """Draw the lines of a map; returns their entries for the legend.
+
+    Parameters
+    ----------
+    labelled : whether there is room for symbols at the lines
+    """
+    box, over_n0 = axes.axis(), "n0" in (shown.x.name, shown.y.name)
+    for line in shown.lines:
+        for part in line.parts:
+            axes.plot(*part, linestyle=_STYLES[line.name], path_effects=_halo(2.4), gid=line.name, **_LINE)
+    axes.axis(box)
+    for line in shown.lines:
+        # Over n0 the lines of n_c1 are too close to those of n_c2 for a symbol of their own.
+        if labelled and line.symbol and (not over_n0 or line.name == "n_c2"):
+            _label(axes, shown, line)
+    return {line.name: entry(line.name, line.words) for line in shown.lines}
+
+
+def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
+    """Draw lines over curves; returns their entries for the legend."""
+    for line in lines:
+        for at in line.parts[0][0]:
+            axes.axvline(at, linestyle=_STYLES[line.name], color="black", linewidth=0.8, gid=line.name)
+    return {line.name: entry(line.name, line.words) for line in lines}
+
+
+def entry(name: str, words: str) -> Line2D:
+    """The entry of a legend for a line."""
+    return Line2D([], [], linestyle=_STYLES[name], label=in_maths(words), **_LINE)
+
+
+def in_maths(words: str) -> str:
+    """Words in which n_c1 and n_c1⁺ are set as symbols."""
+    signs = {"": "", "⁺": "^+", "⁻": "^-"}
+    return re.sub(r"n_(c\d)([⁺⁻]?)", lambda found: f"n$_{{{found[1]}}}{signs[found[2]]}$", words)
+
+
+def _halo(width: float) -> list[Stroke]:
+    return [withStroke(linewidth=width, foreground="white")]
+
+
+def _label(axes: Axes, shown: Map, line: Line) -> None:
+    """The symbol of a critical spin beside its line, on the side of the larger spins or on the roomier one."""
+    x, y = max(line.parts, key=lambda part: len(part[0]))
+    inside = (shown.x.edges[0] <= x) & (x <= shown.x.edges[-1]) & (shown.y.edges[0] <= y) & (y <= shown.y.edges[-1])
+    points = np.stack([x, y], axis=1)[inside]
+    place_on_map = axes.transData + axes.transAxes.inverted()
+    last = len(points) - 1
+    if line.name == "n_c1":  # the lines are farthest apart near the ends that are closer to the middle
+        at = min(
+            points[[last // 8, last - last // 8]],
+            key=lambda point: float(np.hypot(*(place_on_map.transform(point) - 0.5))),
+        )
+    else:
+        at = points[int(0.6 * last)]
+    outwards = 1 if "⁺" in line.symbol else -1
+    if shown.y.name == "n0":
+        place: dict[str, Any] = {"xytext": (0, 4 * outwards), "ha": "center", "va": "bottom" if outwards > 0 else "top"}
+    else:
+        if shown.x.name != "n0":
+            outwards = 1 if place_on_map.transform(at)[0] < 0.5 else -1
+        place = {"xytext": (4 * outwards, 0), "ha": "left" if outwards > 0 else "right", "va": "center"}
+    axes.annotate(in_maths(line.symbol), at, textcoords="offset points", fontsize=9, path_effects=_halo(2), **place)
