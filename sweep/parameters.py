@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, pi
 from sys import float_info
+from typing import Any
 
 PAPER_UNITS, SI = "paper", "SI"
 """Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
@@ -58,88 +59,70 @@ class Parameter:
         return "a finite number" + (f" {' and '.join(bounds)}" if bounds else "")
 
 
+_SIZE = {"above": 0, "below": 1e6}
+_MASS = {"above": 0, "below": 1e12}
+_MOMENT = {"above": 0, "below": 1e24}
+_PRODUCT = {"above": -1e24, "below": 1e24}
+_COEFFICIENT = {"at_least": 0, "below": 1e6}
+_VISCOUS = {"at_least": 0, "below": 1e12}
+_SPIN = {"above": -1e3, "below": 1e3}
+_SLIP = {"above": -1e6, "below": 1e6}
+_ANGLE = {"units": "radian", "above": -pi / 2, "below": pi / 2}
+_POINT: dict[str, Any] = {}
+
+_Row = tuple[str, str, float | None, dict[str, Any]]
+"""Name, meaning, default, and the bounds of a parameter."""
+
+_SECTIONS: dict[str, tuple[_Row, ...]] = {
+    "body": (
+        ("a", "semi-axis of the ellipsoid at delta from x (long axis), in c", 10.0, _SIZE),
+        ("b", "semi-axis of the ellipsoid at delta from y (short axis), in c", 3.0, _SIZE),
+        ("c", "semi-axis of the ellipsoid along z, the unit of length", 1.0, _SIZE),
+        ("delta", "angle from the ellipsoid's axes to the axes of inertia", 0.03, _ANGLE),
+        ("offset", "depth of the centre of mass below the ellipsoid's centre, in c", 0.0, _POINT),
+        ("mass", "mass, in m", None, _MASS),
+        ("Ixx", "central moment of inertia about x, in m c^2", None, _MOMENT),
+        ("Iyy", "central moment of inertia about y, in m c^2", None, _MOMENT),
+        ("Izz", "central moment of inertia about z, in m c^2", None, _MOMENT),
+        ("Ixy", "element xy of the central matrix of inertia, in m c^2", 0.0, _PRODUCT),
+        ("Ixz", "element xz of the central matrix of inertia, in m c^2", 0.0, _PRODUCT),
+        ("Iyz", "element yz of the central matrix of inertia, in m c^2", 0.0, _PRODUCT),
+    ),
+    "": (("gravity", "acceleration of free fall, in g", 9.80665, _SIZE),),
+    "friction": (
+        ("mu", "viscous friction coefficient, in 1/sqrt(g c)", None, _VISCOUS),
+        ("speed", "slip velocity from which on friction is that of slipping, in sqrt(g c)", None, _SIZE),
+        ("mu_static", "coefficient of friction at no slip", None, _COEFFICIENT),
+        ("speed_stick", "slip velocity over which static friction sets in, in sqrt(g c)", None, _SIZE),
+        ("radius_contact", "radius of the contact, in c", None, _SIZE),
+        ("mu_viscous", "viscous part of the coefficient of friction, in 1/sqrt(g c)", 0.0, _VISCOUS),
+        ("sigma", "couple per angular velocity that opposes it, in m c sqrt(g c)", 0.0, _VISCOUS),
+        ("mu_rolling", "coefficient of rolling friction", None, _COEFFICIENT),
+        ("radius", "contact radius of rolling friction, in c", None, _SIZE),
+        ("speed_rolling", "angular velocity below which rolling friction fades, in sqrt(g/c)", None, _SIZE),
+        ("mu_spinning", "coefficient of spinning friction", None, _COEFFICIENT),
+        ("radius_spinning", "contact radius of spinning friction, in c", None, _SIZE),
+        ("speed_spinning", "spin below which spinning friction fades, in sqrt(g/c)", None, _SIZE),
+    ),
+    "start": (
+        ("n0", "start spin about the upward normal, in sqrt(g/c)", 0.05, _SPIN),
+        ("x0", "start contact point along x, in c", 0.01, _POINT),
+        ("y0", "start contact point along y, in c", 0.01, _POINT),
+        ("roll", "start angle about the axis of a", 0.0, _ANGLE),
+        ("pitch", "start angle about the axis of b, after roll", 0.0, _ANGLE),
+        ("omega1", "start angular velocity about the axis of a, in sqrt(g/c)", 0.0, _SPIN),
+        ("omega2", "start angular velocity about the axis of b, in sqrt(g/c)", 0.0, _SPIN),
+        ("omega3", "start angular velocity about z, in sqrt(g/c)", 0.0, _SPIN),
+        ("slip1", "start slip along the ground, at heading zero along x, in sqrt(g c)", 0.0, _SLIP),
+        ("slip2", "start slip along the ground, at heading zero along y, in sqrt(g c)", 0.0, _SLIP),
+    ),
+}
+
 PARAMETERS: dict[str, Parameter] = {
-    p.name: p
-    for p in (
-        Parameter(
-            "a", "body", "1", "semi-axis of the ellipsoid at delta from x (long axis), in c", 10.0, above=0, below=1e6
-        ),
-        Parameter(
-            "b", "body", "1", "semi-axis of the ellipsoid at delta from y (short axis), in c", 3.0, above=0, below=1e6
-        ),
-        Parameter(
-            "c", "body", "1", "semi-axis of the ellipsoid along z, the unit of length", 1.0, above=0, below=1e6
-        ),
-        Parameter(
-            "delta", "body", "radian", "angle from the ellipsoid's axes to the axes of inertia",
-            0.03, above=-pi / 2, below=pi / 2,
-        ),
-        Parameter("offset", "body", "1", "depth of the centre of mass below the ellipsoid's centre, in c", 0.0),
-        Parameter("mass", "body", "1", "mass, in m", None, above=0, below=1e12),
-        *(
-            Parameter(f"I{i}{i}", "body", "1", f"central moment of inertia about {i}, in m c^2", None,
-                      above=0, below=1e24)
-            for i in "xyz"
-        ),
-        *(
-            Parameter(f"I{i}{j}", "body", "1", f"element {i}{j} of the central matrix of inertia, in m c^2", 0.0,
-                      above=-1e24, below=1e24)
-            for i, j in ("xy", "xz", "yz")
-        ),
-        Parameter("gravity", "", "1", "acceleration of free fall, in g", 9.80665, above=0, below=1e6),
-        Parameter(
-            "mu", "friction", "1", "viscous friction coefficient, in 1/sqrt(g c)", None, at_least=0, below=1e12
-        ),
-        Parameter(
-            "speed", "friction", "1", "slip velocity from which on friction is that of slipping, in sqrt(g c)", None,
-            above=0, below=1e6,
-        ),
-        Parameter("mu_static", "friction", "1", "coefficient of friction at no slip", None, at_least=0, below=1e6),
-        Parameter(
-            "speed_stick", "friction", "1", "slip velocity over which static friction sets in, in sqrt(g c)", None,
-            above=0, below=1e6,
-        ),
-        Parameter("radius_contact", "friction", "1", "radius of the contact, in c", None, above=0, below=1e6),
-        Parameter(
-            "mu_viscous", "friction", "1", "viscous part of the coefficient of friction, in 1/sqrt(g c)", 0.0,
-            at_least=0, below=1e12,
-        ),
-        Parameter("sigma", "friction", "1", "couple per angular velocity that opposes it, in m c sqrt(g c)", 0.0,
-                  at_least=0, below=1e12),
-        Parameter("mu_rolling", "friction", "1", "coefficient of rolling friction", None, at_least=0, below=1e6),
-        Parameter("radius", "friction", "1", "contact radius of rolling friction, in c", None, above=0, below=1e6),
-        Parameter(
-            "speed_rolling", "friction", "1", "angular velocity below which rolling friction fades, in sqrt(g/c)", None,
-            above=0, below=1e6,
-        ),
-        Parameter("mu_spinning", "friction", "1", "coefficient of spinning friction", None, at_least=0, below=1e6),
-        Parameter(
-            "radius_spinning", "friction", "1", "contact radius of spinning friction, in c", None, above=0, below=1e6
-        ),
-        Parameter(
-            "speed_spinning", "friction", "1", "spin below which spinning friction fades, in sqrt(g/c)", None,
-            above=0, below=1e6,
-        ),
-        Parameter(
-            "n0", "start", "1", "start spin about the upward normal, in sqrt(g/c)", 0.05, above=-1e3, below=1e3
-        ),
-        Parameter("x0", "start", "1", "start contact point along x, in c", 0.01),
-        Parameter("y0", "start", "1", "start contact point along y, in c", 0.01),
-        Parameter("roll", "start", "radian", "start angle about the axis of a", 0.0, above=-pi / 2, below=pi / 2),
-        Parameter(
-            "pitch", "start", "radian", "start angle about the axis of b, after roll", 0.0, above=-pi / 2, below=pi / 2
-        ),
-        *(
-            Parameter(f"omega{i}", "start", "1", f"start angular velocity about {axis}, in sqrt(g/c)", 0.0,
-                      above=-1e3, below=1e3)
-            for i, axis in ((1, "the axis of a"), (2, "the axis of b"), (3, "z"))
-        ),
-        Parameter("slip1", "start", "1", "start slip along the ground, at heading zero along x, in sqrt(g c)", 0.0,
-                  above=-1e6, below=1e6),
-        Parameter("slip2", "start", "1", "start slip along the ground, at heading zero along y, in sqrt(g c)", 0.0,
-                  above=-1e6, below=1e6),
-    )
-}  # fmt: skip
+    name: Parameter(name, section, long_name=meaning, default=default, **{"units": "1", **bounds})
+    for section, rows in _SECTIONS.items()
+    for name, meaning, default, bounds in rows
+}
 
 PAPER_PARAMETERS: dict[str, Parameter] = {
     name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")
