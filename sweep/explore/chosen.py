@@ -73,7 +73,7 @@ class CellControls:
         for k, curve in enumerate(curves):
             if curve:
                 status = labels.flag_words(curve.dataset, "status")[int(curve.dataset["status"])]
-                end = f"{status} at t = {float(curve.dataset['t_stop']):.6g}"
+                end = f"{status}, followed to t = {float(curve.dataset['t_stop']):.6g}"
                 told.append(f"{k + 1}: {escape(end)}, run in {curve.seconds:.2g} s")
         self._end.text = "<br>".join(told)
 
