@@ -96,21 +96,22 @@ def critical(
     reporter: Reporter | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
-    """Critical spins over all axes of `config` except n0: by the paper's formulas, by eigenvalues, and by simulation.
+    """Critical spins over all axes of `config` except n0: by formulas, and n_c1 by eigenvalues, n_c2 by simulation.
 
-    n_c1 is the first spin, outwards from zero, at which a tiny rattle grows.  n_c2 is the first spin, outwards from
-    the simulated n_c1, from which the trajectory from the configuration's start point reverses before t_end.
+    n_c1 is the first spin, outwards from zero, at which a tiny rattle grows, by the eigenvalues.  n_c2 is the first
+    spin, outwards from that, from which the trajectory from the configuration's start point reverses before t_end: it
+    is bracketed by simulation.
 
     Parameters
     ----------
     config, output, fresh, progress, reporter, overrides : as for `run`
-    width : of the brackets from simulation, relative to the spin
+    width : of the brackets of n_c2, relative to the spin
 
     Returns
     -------
-    Dataset over the axes without n0.  With each `*_simulated` come the ends of its bracket, `*_inner` and `*_outer`,
-    and its `*_reason`, which says why it is NaN, or that it disagrees with the eigenvalues.  `critical_reason` is the
-    first of the four reasons that is not `exists`.
+    Dataset over the axes without n0.  With each `n_c2_*_simulated` come the ends of its bracket, `*_inner` and
+    `*_outer`.  A `*_reason` says why n_c1 or n_c2 is NaN; `critical_reason` is the first of the four that is not
+    `exists`.
 
     Raises
     ------

@@ -127,7 +127,7 @@ def trajectory(
 @click.command()
 @CONFIG
 @click.option("--width", type=click.FloatRange(1e-12, 0.5), default=1e-3, show_default=True,
-              help="Relative width of the brackets from simulation.")  # fmt: skip
+              help="Relative width of the brackets of n_c2.")  # fmt: skip
 @OUTPUT
 @SETTINGS
 @click.option("--dry-run", is_flag=True, help="Print bodies, simulations and estimated time; compute nothing.")
@@ -138,7 +138,7 @@ def critical(
 ) -> None:
     """Find the critical spins over all axes of CONFIG but n0.
 
-    They come from the paper's formulas, from the model's linear stability, and from simulation.
+    They come from the paper's formulas, n_c1 also from the model's eigenvalues, and n_c2 from simulation.
     Writes NAME_critical.nc and .png.  If it is interrupted, finished simulations are kept, and the
     same command resumes the search.
     """

@@ -28,7 +28,7 @@ _SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
 
 def draw(dataset: xr.Dataset) -> Figure:
     """Critical spins by formula, eigenvalues and simulation, over the longest axis."""
-    dims = sorted(map(str, dataset["n_c1_plus_simulated"].dims), key=lambda d: -dataset.sizes[d])
+    dims = sorted(map(str, dataset["critical_reason"].dims), key=lambda d: -dataset.sizes[d])
     x = dims[0] if dims else ""
     figure, frames = framed(dataset, list(indices(dataset, dims[1:]))[:MAX_PANELS], x, 8.0, 2.0, 3.2)
     styles = {
@@ -42,9 +42,9 @@ def draw(dataset: xr.Dataset) -> Figure:
         for variable in filter(chosen.__contains__, styles):
             axes.plot(at, np.atleast_1d(chosen[variable].values), gid=variable, **styles[variable])
         axes.axhline(0, color="black", linewidth=0.5)
-        axes.set_ylabel(f"spin n ({labels.unit(dataset, 'n_c1_plus_simulated')})", fontsize=9)
+        axes.set_ylabel(f"spin n ({labels.unit(dataset, 'n_c2_plus_simulated')})", fontsize=9)
     names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()}
-    sources = [source for suffix, source in _SOURCES.items() if f"n_c1_plus{suffix}" in dataset]
+    sources = [drawn for suffix, drawn in _SOURCES.items() if {f"n_c1_plus{suffix}", f"n_c2_plus{suffix}"} & {*dataset}]
     figure.explain([
         *(Line2D([], [], color=colour, linewidth=4, label=in_maths(words)) for words, colour in names.items()),
         *(Line2D([], [], color="0.3", linewidth=1, label=words, **style) for words, style in sources),

@@ -32,20 +32,19 @@ STATUSES = {
     status.IMPOSSIBLE: "impossible",
 }
 
-EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, DISAGREES, REVERSES_AT_N_C1, UNDECIDED, FAILED, NO_BODY = range(9)
+# 4 was a simulated n_c1 that disagreed with the eigenvalues.
+EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, REVERSES_AT_N_C1, UNDECIDED, FAILED, NO_BODY = 0, 1, 2, 3, 5, 6, 7, 8
 REASONS = {
     EXISTS: "exists",
     NO_FRICTION: "no_friction",
     NO_COUPLING: "no_coupling",
     NOT_FOUND: "not_found",
-    DISAGREES: "disagrees",
     REVERSES_AT_N_C1: "reverses_at_n_c1",
     UNDECIDED: "undecided",
     FAILED: "failed",
     NO_BODY: "impossible",
 }
-"""Whether simulation found a critical spin, and why not.  Where it `disagrees` with the eigenvalues there is a number
-all the same."""
+"""Whether there is a critical spin, n_c1 by the eigenvalues and n_c2 by simulation, and why not."""
 
 
 def _critical(sign: str, event: str, source: str) -> Variable:
@@ -81,16 +80,15 @@ VARIABLES: dict[str, Variable] = {
     "n_c1_minus_linear": _critical("-", "a tiny rattle grows", _EIGENVALUES),
     "form_factor": Variable("float64", "1", "form factor L(f) of Takano (2011)", per_body=True),
     **{
-        f"n_{n}_{side}_simulated{suffix}": _critical({"plus": "+", "minus": "-"}[side], event, f"simulation: {words}")
-        for n, event in (("c1", "a tiny rattle grows"), ("c2", "the spin reverses"))
-        for side in ("plus", "minus")
+        f"n_c2_{side}_simulated{suffix}": _critical(sign, "the spin reverses", f"simulation: {words}")
+        for side, sign in (("plus", "+"), ("minus", "-"))
         for suffix, words in (("", "middle of the bracket"), ("_inner", "end nearer zero"), ("_outer", "far end"))
     },
     **{
         f"n_{n}_{side}_reason": Variable(
-            "int8", "1", f"whether simulation found n_{n}_{side}, and why not", REASONS, per_body=True
+            "int8", "1", f"whether {source} find n_{n}_{side}, and why not", REASONS, per_body=True
         )
-        for n in ("c1", "c2")
+        for n, source in (("c1", "eigenvalues"), ("c2", "simulations"))
         for side in ("plus", "minus")
     },
     "critical_reason": Variable("int8", "1", "first of the four reasons that is not exists", REASONS, per_body=True),

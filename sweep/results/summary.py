@@ -65,7 +65,8 @@ def _critical(dataset: xr.Dataset) -> Iterator[str]:
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
     for name in ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus"):
-        codes, spins = dataset[f"{name}_reason"].values, dataset[f"{name}_simulated"].values
+        source = "linear" if name.startswith("n_c1") else "simulated"
+        codes, spins = dataset[f"{name}_reason"].values, dataset[f"{name}_{source}"].values
         counts = {words: int((codes == code).sum()) for code, words in REASONS.items()}
         counts["found"] = counts.pop(REASONS[EXISTS])
         ends = ", ".join(f"{count} {words.replace('_', ' ')}" for words, count in counts.items() if count)

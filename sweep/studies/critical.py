@@ -1,9 +1,9 @@
-"""Critical spins in three ways: the paper's formulas, the model's eigenvalues, and simulation."""
+"""Critical spins: by the paper's formulas, by the model's eigenvalues, and n_c2 by simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ import xarray as xr
 from sweep.config import Config, ConfigError, Values
 from sweep.config.bodies import described_impossible
 from sweep.config.user_models import explained
-from sweep.engine.reporter import Reporter
+from sweep.engine.reporter import Progress, Reporter
 from sweep.grid import Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import fingerprint
@@ -20,38 +20,33 @@ from sweep.parameters import START
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset, netcdf
 from sweep.results.checkpoint import Checkpoint
-from sweep.results.dataset import DISAGREES, EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
+from sweep.results.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity
 from sweep.results.memory import Memory
 from sweep.results.provenance import identify, provenance
 from sweep.results.store import Store
 from sweep.studies import bracket
-from sweep.studies.bracket import Bracket
-from sweep.studies.growth import find_n_c1
 from sweep.studies.reversing import USUAL, body_seconds, find_n_c2
 from sweep.studies.rounds import Rounds
-from sweep.studies.settled import Settled
-from sweep.studies.stepwise import stepwise
+from sweep.studies.trajectory import require_simulated
 
 WIDTH = 1e-3
-"""Relative width down to which simulation brackets a critical spin."""
+"""Relative width down to which simulation brackets n_c2."""
 
-# Eigenvalues and simulation disagree where they are farther apart than the bracket is wide, or than this: simulated
-# growth rates are off by up to 1.2e-5 of the decay rate at rest (`sweep.studies.growth`).
-_ERROR = 1e-4
-
-# Bodies searched together (about 100 MB of images).
-_GROUP = 4096
+# Searches for n_c2 that run together (about 100 MB of images).
+_GROUP = 8192
 
 # Bodies by which the time for all others is judged.
 _SAMPLE = 256
+
+# Of what is left of a search, the share that a round of simulations brings, as a guess while the round goes on.
+_ROUND = 0.5
 
 _REMARKS = {
     NO_FRICTION: "without friction",
     NO_COUPLING: "without coupling",
     NOT_FOUND: "not found",
-    DISAGREES: "disagree with the eigenvalues",
     dataset.REVERSES_AT_N_C1: "reverse at n_c1 already",
     dataset.UNDECIDED: "undecided at t_end",
     dataset.FAILED: "failed",
@@ -140,7 +135,7 @@ def remarks(result: xr.Dataset) -> list[str]:
 
 def _searchable(config: Config) -> Config:
     """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
-    stepwise(config)  # raises if there is nothing to simulate
+    require_simulated(config)
     if not config.of_rattlebacks:
         raise ConfigError([config.fault(("model",), "no rattleback; critical spins are asked of: slip, noslip")])
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
@@ -166,95 +161,76 @@ def _identify(config: Config, width: float) -> Identity:
 
 
 def _search(config: Config, width: float, store: Store, reporter: Reporter) -> xr.Dataset:
-    """Search the critical spins of all bodies; rounds that `store` has are not simulated again."""
+    """Search n_c2 of all bodies; rounds that `store` has are not simulated again."""
     if store.done or store.load_running():
         reporter.note(f"resuming an earlier search, which finished {len(store.done)} rounds of simulations")
     grid = Grid.of(config)
     prediction = predict(config.equations, grid)
+    assert prediction.stability is not None  # it is a model
+    # Both signs one after the other: each is a search of its own.
+    n_c1, sign = np.concatenate(prediction.stability.n_c1), np.repeat([1.0, -1.0], grid.size)
+    bodies = {name: np.tile(values, 2) for name, values in grid.columns().items()}
+    stable = np.tile(prediction.stability.ranges, 2)
+    first = _reasons_of_n_c1(config, grid, prediction)
+    second, inner, outer = first.copy(), *np.full((2, len(n_c1)), np.nan)
+    searched = np.flatnonzero(first == EXISTS)
+    settled = _Settled(reporter, grid.size, grid.size - len(searched) / 2)
+    rounds = Rounds(store, settled.advance)
+    for begin in range(0, len(searched), _GROUP):
+        at = searched[begin : begin + _GROUP]
+        theirs = {name: values[at] for name, values in bodies.items()}
+        found = find_n_c2(config, theirs, n_c1[at], stable[:, at], width, rounds, settled.share)
+        inner[at], outer[at] = sign[at] * found.inner, sign[at] * found.outer
+        second[at] = [_REASON_OF[outcome] for outcome in found.outcome.tolist()]
+        settled.finish(len(at) / 2)
     arrays: dict[str, Array] = dict(dataset.predicted(prediction))
     arrays.pop("reversals_predicted", None)
-    reasons = np.full((2, 2, grid.size), NO_FRICTION)
-    ends = np.full((2, 2, 2, grid.size), np.nan)
-    reasons[:, :, config.equations.impossible(grid.columns())] = dataset.NO_BODY
-    searched = np.flatnonzero(_decays_at_rest(prediction, grid))
-    settled = Settled(reporter, grid.size, len(searched))
-    rounds = Rounds(store, settled.advanced)
-    for begin in range(0, len(searched), _GROUP):
-        cells = searched[begin : begin + _GROUP]
-        group = _Group(config, grid, prediction, cells, width, rounds, settled, reporter)
-        for event, found in enumerate(group.search()):
-            ends[event][:, :, cells], reasons[event][:, cells] = found
-        settled.group(len(cells))
-    for event, name in enumerate(("n_c1", "n_c2")):
-        for side, inner, outer, reason in zip(("plus", "minus"), *ends[event], reasons[event], strict=True):
-            arrays[f"{name}_{side}_simulated"] = (inner + outer) / 2
-            arrays[f"{name}_{side}_simulated_inner"] = inner
-            arrays[f"{name}_{side}_simulated_outer"] = outer
-            arrays[f"{name}_{side}_reason"] = reason
-    four = reasons.reshape(4, -1)
+    for side, half in (("plus", slice(grid.size)), ("minus", slice(grid.size, None))):
+        arrays[f"n_c2_{side}_simulated"] = (inner[half] + outer[half]) / 2
+        arrays[f"n_c2_{side}_simulated_inner"], arrays[f"n_c2_{side}_simulated_outer"] = inner[half], outer[half]
+        arrays[f"n_c1_{side}_reason"], arrays[f"n_c2_{side}_reason"] = first[half], second[half]
+    four = np.concatenate([first, second]).reshape(4, -1)
     arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(grid.size)]
     origin = provenance(config, rounds.seconds, grid.size) | _identify(config, width).__dict__
     attributes = {"relative_width": width, **origin, **described_impossible(config)}
     return dataset.label(config, grid, arrays, attributes).drop_vars("n0")
 
 
-def _decays_at_rest(prediction: Prediction, grid: Grid) -> Array:
-    """Whether friction makes the rattle of each body decay, so that there may be critical spins."""
-    assert prediction.stability is not None  # it is a model
-    resisted = grid.columns()["mu"] > 0 if prediction.formulas else True
-    return np.asarray(resisted & ~np.isnan(prediction.stability.n_c1[0]))
+def _reasons_of_n_c1(config: Config, grid: Grid, prediction: Prediction) -> Array:
+    """Why the eigenvalues have no n_c1, or that it exists: n_c1+ of all bodies, and then n_c1-."""
+    assert prediction.stability is not None
+    columns, formulas, linear = grid.columns(), prediction.formulas, np.array(prediction.stability.n_c1)
+    unresisted = np.isnan(linear) | (columns["mu"] <= 0 if formulas else False)
+    never = np.isinf(linear)
+    uncoupled = never & (np.isnan(formulas.n_c1[0]) if formulas else False)
+    impossible = np.broadcast_to(config.equations.impossible(columns), linear.shape)
+    reasons = [dataset.NO_BODY, NO_FRICTION, NO_COUPLING, NOT_FOUND]
+    return np.select([impossible, unresisted, uncoupled, never], reasons, EXISTS).ravel()
 
 
-@dataclass(frozen=True)
-class _Group:
-    """Bodies whose spins of both signs are searched together, so that their simulations share the threads."""
+class _Settled:
+    """Adds up the bodies that are settled, with parts of those that are being searched, for a reporter."""
 
-    config: Config
-    grid: Grid
-    prediction: Prediction
-    cells: Array
-    """Indices of the bodies in the grid."""
-    width: float
-    rounds: Rounds
-    settled: Settled
-    reporter: Reporter
+    def __init__(self, reporter: Reporter, bodies: int, finished: float) -> None:
+        """Count `bodies`, of which `finished` are settled from the start."""
+        self._reporter, self._bodies, self._finished, self._began = reporter, bodies, finished, time.perf_counter()
+        self._group = self._left = self._told = 0.0
+        self._before: float | None = None
 
-    def search(self) -> Iterator[tuple[Array, Array]]:
-        """For n_c1 and for n_c2: the ends of the brackets, shape (2, 2, cells), and the reasons, shape (2, cells).
+    def share(self, share: Array) -> None:
+        """Such a share of each search of a group is done; each is half a body."""
+        self._group, self._left = float(share.sum()) / 2, float((1 - share).sum()) / 2
+        self.advance(0.0)
 
-        The axes are inner and outer end, positive and negative side, cells.
-        """
-        assert self.prediction.stability is not None
-        cells, width = self.cells, self.width
-        bodies = {name: np.tile(values[cells], 2) for name, values in self.grid.columns().items()}
-        sign = np.repeat([1.0, -1.0], len(cells))
-        formulas = self.prediction.formulas
-        uncoupled = np.isnan(formulas.n_c1[0][np.tile(cells, 2)]) if formulas else np.zeros(2 * len(cells), bool)
-        linear = np.abs(np.concatenate([n_c1[cells] for n_c1 in self.prediction.stability.n_c1]))
-        stable = np.tile(self.prediction.stability.ranges[:, cells], 2)
+    def advance(self, share: float) -> None:
+        """Such a share of a round of simulations is done."""
+        # A round may bring less than was guessed.
+        self._told = max(self._told, self._finished + self._group + _ROUND * self._left * share)
+        self._before = self._told if self._before is None else self._before
+        seconds = max(time.perf_counter() - self._began, np.finfo(float).tiny)
+        self._reporter.chunk(Progress(self._bodies, self._told, 0, self._before, seconds))
 
-        settled = self.settled.first
-        first = find_n_c1(self.config, bodies, sign, linear, width, self.rounds, settled)
-        reason = _reasons(first)
-        reason[(reason == NOT_FOUND) & uncoupled] = NO_COUPLING
-        reason[(first.outcome != bracket.FAILED) & ~_agrees(first, linear, width)] = DISAGREES
-        yield (sign * [first.inner, first.outer]).reshape(2, 2, -1), reason.reshape(2, -1)
-
-        at = np.flatnonzero(first.outcome == bracket.HAPPENS)
-        ends, reason = np.full((2, len(sign)), np.nan), reason.copy()
-        theirs, begin = {name: values[at] for name, values in bodies.items()}, (sign * first.outer)[at]
-        settled = self.settled.second
-        second = find_n_c2(self.config, theirs, begin, stable[:, at], width, self.rounds, settled)
-        ends[:, at], reason[at] = sign[at] * [second.inner, second.outer], _reasons(second)
-        yield ends.reshape(2, 2, -1), reason.reshape(2, -1)
-
-
-def _reasons(found: Bracket) -> Array:
-    return np.array([_REASON_OF[outcome] for outcome in found.outcome.tolist()], int)
-
-
-def _agrees(found: Bracket, linear: Array, width: float) -> Array:
-    """Whether the eigenvalues' |n_c1| lies within the bracket, or there is none by both."""
-    slack = 1 + max(width, _ERROR)
-    within = (found.inner / slack <= linear) & (linear <= found.outer * slack)
-    return np.asarray(np.where(found.outcome == bracket.NOT_YET, np.isinf(linear), within))
+    def finish(self, bodies: float) -> None:
+        """A group of so many bodies is finished."""
+        self._finished += bodies
+        self.share(np.zeros(0))

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from sweep.config import Config
 from sweep.engine.executor import STEP_SECONDS
-from sweep.engine.plan import plan
-from sweep.grid import Array, Grid
+from sweep.engine.plan import kernel_of
+from sweep.grid import Array
 from sweep.jit import threads
 from sweep.kernels import methods
-from sweep.kernels.kernel import Kernel
+from sweep.kernels.build import build
 from sweep.kernels.methods import AUTO, METHODS, allowed
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.model import Columns
@@ -27,9 +27,6 @@ from sweep.studies.rounds import Batch, Rounds, Simulations
 # μ = 0.1 … 5000) it was found at up to 7.7 n_c1, with a median of 2.01.  Beyond, fast spins take long to simulate, and
 # the body topples or leaves the plane instead: of 40 bodies searched up to a spin of 10, none reversed there.
 _FARTHEST = 8.0
-
-# The way outwards is simulated at first up to just beyond this multiple of n_c1.
-_EXPECTED = 2.2
 
 # Spins of the way outwards are simulated with this error in spin at t = 400, relative to the start spin, or with the
 # tolerance of the configuration if that is larger, and with the cheapest method.  Most of them are far from n_c2, and
@@ -71,28 +68,56 @@ def find_n_c2(
     settled : as of `bracket.search`
     """
 
-    def trajectories(question: Question, spins: Array) -> _Trajectories:
-        at, asked = question.search, config.integrator.tolerance
-        columns = {name: values[at] for name, values in bodies.items()} | {"n0": spins}
-        tolerance = np.where(question.exact, asked, np.maximum(asked, _COARSE * question.size))
-        return _Trajectories(config, question.exact, columns, stable[:, at], tolerance)
-
     def ask(question: Question) -> tuple[Array, Array]:
-        sign = np.sign(n_c1[question.search])
-        asked = trajectories(question, sign * question.size)
+        at, sign = question.search, np.sign(n_c1[question.search])
+        columns = {name: values[at] for name, values in bodies.items()} | {"n0": sign * question.size}
+        finest = config.integrator.tolerance
+        tolerance = np.where(question.exact, finest, np.maximum(finest, _COARSE * question.size))
+        share = _shared_out(config, columns, question.exact, tolerance)
+
+        def start() -> Batch:
+            batch = {}
+            for method, cells in share.items():
+                theirs = {name: values[cells] for name, values in columns.items()}
+                batch[method] = _start(config, method, theirs, stable[:, at[cells]], tolerance[cells])
+            return batch
 
         def read(batch: Batch) -> dict[str, Array]:
             outcomes, ends = np.empty(len(sign), int), np.empty(len(sign))
-            for method, cells in asked.cells().items():
+            for method, cells in share.items():
                 outcomes[cells], ends[cells] = _outcomes(batch[method])
             return {"outcomes": outcomes, "margins": np.where(outcomes == NOT_YET, sign * ends, np.nan)}
 
-        answers = rounds.answer(asked.start, read, stop_when_settled=True, end_early=_end_reversed)
+        answers = rounds.answer(start, read, _end_reversed)
         return answers["outcomes"], answers["margins"]
 
     size = np.abs(n_c1)
-    limit = np.minimum(_FARTHEST * size, SPIN_LIMIT)
-    return search(ask, size, limit, width, _EXPECTED * size, settled=settled)
+    return search(ask, size, np.minimum(_FARTHEST * size, SPIN_LIMIT), width, settled)
+
+
+def _shared_out(config: Config, columns: Columns, exact: Array, tolerance: Any) -> dict[str, Array]:
+    """Indices of the simulations that each method runs: the cheapest, or where `exact` that of the configuration."""
+    integrator = config.integrator
+    chosen, *_ = methods.cheapest(config.equations, columns, tolerance, integrator.t_end)
+    if integrator.method != AUTO:
+        chosen = np.where(exact | (integrator.step != "auto"), integrator.method, chosen)
+    return {method: np.flatnonzero(chosen == method) for method in METHODS if method in chosen}
+
+
+def _start(config: Config, method: str, columns: Columns, stable: Array, tolerance: Array) -> Simulations:
+    """Trajectories at t = 0."""
+    # With the measurements of the configuration, so that a kernel compiled for its run serves here too.
+    kernel = kernel_of(method, config if "reversals" in config.measure else replace(config, measure=("reversals",)))
+    build([kernel])
+    step = _steps(config, method, columns, tolerance)
+    return Simulations(kernel, kernel.images(columns, step, config.integrator.t_end, stable))
+
+
+def _steps(config: Config, method: str, columns: Columns, tolerance: Any) -> Array:
+    """The step of each simulation; one tolerance for all, or one for each."""
+    if config.integrator.step != "auto":
+        return np.full(len(columns["n0"]), config.integrator.step)
+    return methods.automatic_step(method, config.equations, columns, tolerance)[0]
 
 
 def body_seconds(config: Config, bodies: Columns) -> tuple[float, float]:
@@ -108,9 +133,7 @@ def body_seconds(config: Config, bodies: Columns) -> tuple[float, float]:
     def seconds(spin: Array, time: Array | float, simulations: int) -> float:
         columns, costs = bodies | {"n0": spin}, list[Array]()
         for method in allowed(model) if integrator.method == AUTO else (integrator.method,):
-            step: Any = integrator.step
-            if step == "auto":
-                step, _ = methods.automatic_step(method, model, columns, integrator.tolerance)
+            step = _steps(config, method, columns, integrator.tolerance)
             costs.append(METHODS[method].step_cost * (time / step + METHODS[method].start_up_cost))
         a_step = STEP_SECONDS / threads()
         return float(2 * simulations * np.min(costs, axis=0).mean()) * a_step
@@ -118,55 +141,6 @@ def body_seconds(config: Config, bodies: Columns) -> tuple[float, float]:
     # n_c1 is about the decay rate at rest.
     usual = seconds(2 * decay, np.minimum(_USUAL_TIME / decay, integrator.t_end), USUAL)
     return usual, seconds(_FARTHEST * decay, integrator.t_end, _MOST)
-
-
-@dataclass(frozen=True)
-class _Trajectories:
-    """Trajectories that answer a question, with the method and step that the configuration asks for."""
-
-    config: Config
-    exact: Array
-    """Whether to use the method that the configuration names, or else the cheapest, shape (simulations,)."""
-    columns: Columns
-    """Physical parameters by name, each of shape (simulations,)."""
-    stable: Array
-    """Shape (6, simulations)."""
-    tolerance: Any
-    """Shape (simulations,); the rules for steps take one tolerance for all cells, or one for each."""
-
-    def cells(self) -> dict[str, Array]:
-        """Indices of the simulations that each method runs."""
-        model, integrator = self.config.equations, self.config.integrator
-        chosen, *_ = methods.cheapest(model, self.columns, self.tolerance, integrator.t_end)
-        if integrator.method != AUTO:
-            named = self.exact | (integrator.step != "auto")
-            chosen = np.where(named, integrator.method, chosen)
-        return {method: np.flatnonzero(chosen == method) for method in METHODS if method in chosen}
-
-    def start(self) -> Batch:
-        """The trajectories at t = 0."""
-        model, integrator, batch = self.config.equations, self.config.integrator, {}
-        for method, cells in self.cells().items():
-            theirs = {name: values[cells] for name, values in self.columns.items()}
-            if integrator.step == "auto":
-                step, _ = methods.automatic_step(method, model, theirs, self.tolerance[cells])
-            else:
-                step = np.full(len(cells), integrator.step)
-            kernel = self._kernel(method)
-            batch[method] = Simulations(kernel, kernel.images(theirs, step, integrator.t_end, self.stable[:, cells]))
-        return batch
-
-    def _kernel(self, method: str) -> Kernel:
-        integrator = self.config.integrator.model_copy(update={"method": method})
-        config = replace(self.config, integrator=integrator, measure=_measure(self.config))
-        first = {name: values[:1] for name, values in self.columns.items()}
-        (part,) = plan(config, Grid({}, {}, first)).parts
-        return part.kernel
-
-
-def _measure(config: Config) -> tuple[str, ...]:
-    """The measurements of `config`, so that a kernel compiled for its run serves here too, if reversals are counted."""
-    return config.measure if "reversals" in config.measure else ("reversals",)
 
 
 def _outcomes(ended: Simulations) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
-"""Rounds of simulations that a study asks for one after the other, each round depending on the answers to the last.
+"""Rounds of simulations that a search asks for one after the other, each round depending on the answers to the last.
 
-A round is a tile of the store: its answers are kept when it ends, and its images while it runs.  A study that is
+A round is a tile of the store: its answers are kept when it ends, and its images while it runs.  A search that is
 started again asks the same questions, is given the answers that the store has, and goes on where it was stopped.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +29,7 @@ def advanced(kernel: Kernel, images: Array) -> Array:
     return np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0)
 
 
-@dataclass(frozen=True)
-class Simulations:
+class Simulations(NamedTuple):
     """Trajectories of one method."""
 
     kernel: Kernel
@@ -41,28 +41,22 @@ Batch = Mapping[str, Simulations]
 """Simulations by method."""
 
 
+@dataclass
 class Rounds:
-    """Answers the rounds of a study, from its store or by simulation."""
+    """Answers the rounds of a search, from its store or by simulation."""
 
-    def __init__(self, store: Store, advanced: Callable[[float], None] = lambda share: None) -> None:  # noqa: ARG005
-        """Begin with the first round.
-
-        Parameters
-        ----------
-        advanced : called after each chunk of a round with the share of it that is done
-        """
-        self.store, self.advanced = store, advanced
-        self.seconds = 0.0
-        """What all rounds so far took, also in an earlier process."""
-        self._next = 0
+    store: Store
+    advanced: Callable[[float], None] = lambda share: None  # noqa: ARG005
+    """Called after each chunk of a round with the share of it that is done."""
+    seconds: float = 0.0
+    """What all rounds so far took, also in an earlier process."""
+    _next: int = 0
 
     def answer(
         self,
         start: Callable[[], Batch],
         read: Callable[[Batch], Mapping[str, Array]],
-        *,
-        stop_when_settled: bool,
-        end_early: Callable[[Simulations], None] = lambda running: None,  # noqa: ARG005
+        end_early: Callable[[Simulations], None],
     ) -> Mapping[str, Array]:
         """The answers to the next round.
 
@@ -74,15 +68,13 @@ class Rounds:
         """
         number, self._next = self._next, self._next + 1
         if number not in self.store.done:
-            batch, seconds = self._simulate(number, start(), stop_when_settled, end_early)
+            batch, seconds = self._simulate(number, start(), end_early)
             self.store.save(number, {**read(batch), "seconds": np.array(seconds)})
         answers = dict(self.store.load(number))
         self.seconds += float(answers.pop("seconds"))
         return answers
 
-    def _simulate(
-        self, number: int, batch: Batch, stop_when_settled: bool, end_early: Callable[[Simulations], None]
-    ) -> tuple[Batch, float]:
+    def _simulate(self, number: int, batch: Batch, end_early: Callable[[Simulations], None]) -> tuple[Batch, float]:
         tables = {method: each.images for method, each in batch.items()}
         began = time.perf_counter()
         left = self.store.load_running()
@@ -98,16 +90,11 @@ class Rounds:
             if (now := time.perf_counter()) - saved > executor.CHUNK_SECONDS:
                 self.store.save_running(Running([number], tables, now - began))
                 saved = now
-            self.advanced(float(np.concatenate([advanced(some.kernel, some.images) for some in batch.values()]).mean()))
+            self.advanced(float(np.concatenate([advanced(*some) for some in batch.values()]).mean()))
 
         for each in batch.values():
-            executor.execute(
-                each.kernel,
-                each.images,
-                stop_when_settled=stop_when_settled,
-                after_chunk=after_chunk,
-                chunk_seconds=min(_CHUNK_SECONDS, executor.CHUNK_SECONDS),
-            )
+            seconds = min(_CHUNK_SECONDS, executor.CHUNK_SECONDS)
+            executor.execute(*each, stop_when_settled=True, after_chunk=after_chunk, chunk_seconds=seconds)
         return batch, time.perf_counter() - began
 
 

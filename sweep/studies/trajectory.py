@@ -14,7 +14,7 @@ import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
 from sweep.config.bodies import misplaced, unfit
-from sweep.config.faults import suggestion
+from sweep.config.faults import either, suggestion
 from sweep.config.schema import FOREVER
 from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
@@ -28,14 +28,14 @@ from sweep.interrupt import deferred
 from sweep.jit import threads
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
-from sweep.kernels.methods import automatic_step
+from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.kernels.status import RUNNING, TIME_LIMIT
+from sweep.models import MODELS
 from sweep.models.model import Columns, Model
 from sweep.models.theory.linear import fastest_motion
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.rounds import advanced
-from sweep.studies.stepwise import stepwise
 from sweep.variables import Variable
 
 SAMPLES_A_RADIAN = 3
@@ -180,7 +180,13 @@ def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
 
 def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
-    config = stepwise(load_config(config))
+    config = load_config(config)
+    require_simulated(config)
+    method = METHODS.get(config.integrator.method)
+    if not (method and method.stops_anywhere):
+        # A step that was fixed for another method may be unstable with this one.
+        plain = config.integrator.model_copy(update={"method": PLAIN, "step": "auto"})
+        config = replace(config, integrator=plain)
     dataset.check_names(config, SERIES)
     wanted = _numbers(config, at)
     if (count := prod(map(len, wanted.values()))) > MAX_TRAJECTORIES:
@@ -196,6 +202,13 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     if beyond := unfit(chosen) or misplaced(chosen):
         raise ConfigError([Fault("", None, None, (), beyond)])
     return chosen
+
+
+def require_simulated(config: Config) -> None:
+    """Raise a `ConfigError` if the model is a formula, which takes no steps."""
+    if not config.simulated:
+        message = f"the {config.model} model is a formula and cannot be simulated; choose {either(MODELS)}"
+        raise ConfigError([config.fault(("model",), message)])
 
 
 def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:

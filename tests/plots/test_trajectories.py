@@ -134,7 +134,7 @@ def test_plot_and_info_know_the_file_of_critical_spins(write: Write, tmp_path: P
     assert "n_c1_plus: 1 no friction, 1 found; 0.0024" in told.stdout
     assert invoke("plot", tmp_path / "small_critical.nc", "--var", "n_c2_plus_simulated").exit_code == 0
     figure = picture.plot(tmp_path / "small_critical.nc")
-    assert sum(line.get_gid() in VARIABLES for line in figure.axes[0].lines if line.get_gid()) == 10
+    assert sum(line.get_gid() in VARIABLES for line in figure.axes[0].lines if line.get_gid()) == 8
     assert not figure.axes[0].get_legend()
     assert "simulation" in entries(figure)
 

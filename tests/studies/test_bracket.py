@@ -16,8 +16,6 @@ def find(
     begin: float = 0.01,
     limit: float = 10.0,
     width: float = 1e-3,
-    expected: float = 1.0,
-    precisely: bool = False,
     margin: Callable[[float], float] = lambda _: np.nan,
     coarse: Callable[[float], float] = lambda spin: spin,
     asked: list[tuple[int, float, bool]] | None = None,
@@ -37,9 +35,7 @@ def find(
         ]
         return np.array(outcomes), np.array([margin(spin) for i, spin, _ in each])
 
-    return search(
-        ask, np.full(len(searches), begin), limit, width, np.full(len(searches), expected), precisely=precisely
-    )
+    return search(ask, np.full(len(searches), begin), np.full(len(searches), limit), width)
 
 
 def test_brackets_hold_the_first_change_and_are_narrow() -> None:
@@ -84,26 +80,9 @@ def test_a_time_limit_at_the_inner_end_is_told() -> None:
     assert np.isnan(found.outer[2])
 
 
-@pytest.mark.parametrize("expected", [0.001, 0.03, 0.8, 5.0, np.inf, np.nan])
-@pytest.mark.parametrize("precisely", [False, True])
-def test_what_is_expected_does_not_change_what_is_found(expected: float, precisely: bool) -> None:
-    starts = [0.011, 0.3, 0.8001, 4.9]
-    found = find(*([(start, HAPPENS)] for start in starts), [], expected=expected, precisely=precisely)
-    assert list(found.outcome) == [HAPPENS] * 4 + [NOT_YET]
-    assert (found.inner[:4] < starts).all()
-    assert (starts <= found.outer[:4]).all()
-    assert (found.outer - found.inner <= 1e-3 * found.outer)[:4].all()
-
-
-def test_an_expected_spin_does_not_hide_an_event_before_it() -> None:
-    found = find([(0.2, HAPPENS), (0.29, NOT_YET), (0.8, HAPPENS)], expected=0.8, precisely=True)
-    assert found.inner[0] < 0.2 <= found.outer[0]
-
-
 @pytest.mark.parametrize(
     ("margin", "most"),
     [
-        (lambda spin: 0.8 - spin, 4),
         (lambda spin: 0.8 - spin if spin < 0.8 else np.nan, 4),
         (lambda spin: 0.9 * (0.8 - spin) + (0.8 - spin) ** 2 if spin < 0.8 else np.nan, 7),
         (lambda spin: 100 * (0.8 - spin) if spin < 0.8 else np.nan, 16),

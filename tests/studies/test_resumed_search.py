@@ -143,12 +143,12 @@ def test_rounds_that_are_done_are_not_simulated_again(
         execute(kernel, images, **options)
 
     monkeypatch.setattr("sweep.studies.rounds.executor.execute", noted)
-    for number in (2, 3):  # on the way to n_c2, and inside a bracket
+    for number in (0, 1):  # on the way outwards, and inside a bracket
         with pytest.raises(KeyboardInterrupt):
             critical(sweep.load_config(config), output=tmp_path, reporter=Within(checkpoint, number))
         simulated.clear()
     same_numbers(critical(sweep.load_config(config), output=tmp_path), undisturbed)
-    assert simulated[0][0] == 3
+    assert simulated[0][0] == 1
     assert simulated[0][1] > 0
 
 
@@ -158,13 +158,13 @@ def test_answers_that_were_damaged_are_simulated_again(
     monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.004)
     with pytest.raises(KeyboardInterrupt):
         critical(
-            sweep.load_config(config), output=tmp_path, reporter=Within(tmp_path / "standard_critical.checkpoint", 3)
+            sweep.load_config(config), output=tmp_path, reporter=Within(tmp_path / "standard_critical.checkpoint", 1)
         )
-    answers = tmp_path / "standard_critical.checkpoint" / "000001.npz"
+    answers = tmp_path / "standard_critical.checkpoint" / "000000.npz"
     answers.write_bytes(answers.read_bytes()[:-100])
     again = Stop(10**9)
     same_numbers(critical(sweep.load_config(config), output=tmp_path, reporter=again), undisturbed)
-    assert "000001.npz: damaged" in again.notes[0]
+    assert "000000.npz: damaged" in again.notes[0]
 
 
 def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_path: Path) -> None:
