@@ -93,7 +93,12 @@ class Grid:
 
     def take(self, cells: Array) -> Grid:
         """The cells with these indices, as a list of cases."""
-        return Grid({}, {}, {name: values[cells] for name, values in self.columns().items()})
+        if self.cases is not None:
+            return Grid({}, self.constants, {name: values[cells] for name, values in self.cases.items()})
+        if not self.axes:
+            return Grid({}, {}, {name: np.full(len(cells), value) for name, value in self.constants.items()})
+        places = np.unravel_index(cells, self.shape)
+        return Grid({}, self.constants, {n: v[at] for (n, v), at in zip(self.axes.items(), places, strict=True)})
 
     def sample(self, cells: int) -> Grid:
         """About `cells` of the cells, spread evenly over each axis with both its ends; all if there are no more."""

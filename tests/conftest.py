@@ -50,7 +50,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         return
     writer = config.get_terminal_writer()
     with showing(lambda: nullcontext(writer.line("compiling kernels", flush=True))):
-        build(kernel(*each) for each in KERNELS)
+        build([kernel(*each) for each in KERNELS])
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

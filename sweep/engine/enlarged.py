@@ -1,71 +1,186 @@
-"""A run that simulates only those cells that an earlier, smaller one has not computed."""
+"""A run that takes over what an earlier one has computed, from the dataset that it has left, and simulates the rest."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from sweep.config import Config
-from sweep.engine import verification
-from sweep.engine.earlier import Earlier
-from sweep.engine.whole import attributes, gather
-from sweep.grid import Array, Grid, Tile
-from sweep.results import dataset, netcdf
+from sweep.config.document import parse_value
+from sweep.engine.checks import verify
+from sweep.engine.plan import choose
+from sweep.engine.whole import Some
+from sweep.grid import Array, Grid
+from sweep.kernels.kernel import steps_to
+from sweep.kernels.measures.sensitivity import Sensitivity
+from sweep.kernels.methods import METHODS
+from sweep.kernels.status import FAILURES, TIME_LIMIT
+from sweep.models.model import Model
+from sweep.parameters import Parameter, sections
+from sweep.results import dataset
+from sweep.results.identity import Identity
 from sweep.results.provenance import identify
 from sweep.results.store import Store
 
+RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
+"""Names of the cells that a run can be asked to compute again, with their statuses."""
 
-class Enlarged:
-    """A table of cases, the cells that have to be simulated, and the dataset of these and of the earlier run's."""
+# What may differ between a run and the one that it enlarges; one that computes cells again may change the integrator.
+_FREE = {"name", "max_failed_fraction", "verify", "measure", "integrator.t_end"}
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """The dataset of an earlier run, and which cells of this one it has."""
+
+    dataset: xr.Dataset
+    cells: Array
+    """For each cell of this run its index in the earlier one, or -1 if it has to be simulated, shape (cells,)."""
+    rerun: str | None = None
+    """Which cells are computed again, if others are taken over although the settings differ."""
+
+    @property
+    def words(self) -> str:
+        """How many cells are taken over, and from which run."""
+        taken, created = int((self.cells >= 0).sum()), self.dataset.attrs.get("created", "an unknown date")
+        return f"{taken} of {len(self.cells)} cells are taken over from the run of {created}"
+
+    def taken(self) -> tuple[Array, dict[str, Array]]:
+        """The cells of this run that are taken over, and the earlier variables of these, by name."""
+        cells, grid = np.flatnonzero(self.cells >= 0), _grid(self.dataset)
+        _, body = grid.bodies()
+        arrays = {}
+        for name, (_, spec) in dataset.layout(grid, set(map(str, self.dataset.data_vars))).items():
+            tail = (self.dataset.sizes[spec.along],) if spec.along else ()
+            at = self.cells[cells]
+            arrays[name] = self.dataset[name].values.reshape(-1, *tail)[body[at] if spec.per_body else at]
+        return cells, arrays
+
+
+def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.Dataset, rerun: str | None) -> str:
+    """Why a run of `config` may not replace the dataset `there`, of the run `found`; "" if it may.
+
+    It may if no result is lost: the same run of more cells, to a later time, or with more measurements; or, to
+    `rerun` cells, one of the same cells.
+    """
+    same_program = (found.source_hash, found.versions) == (wanted.source_hash, wanted.versions)
+    if rerun is None and not (same_program and found.of_one_run):
+        return found.difference(wanted)
+    old, new = (_settings(parse_value(each.config, "dataset"), config.table) for each in (found, wanted))
+    # Of a user's model, `model_sha256` tells what `model` only names.
+    free = _FREE | ({"model"} if config.origin else set())
+    changed = {key for key in {**old, **new} if old.get(key) != new.get(key)} - free
+    less = set(old["measure"]) - set(new["measure"]) or (
+        new["integrator.t_end"] < old["integrator.t_end"] and not rerun
+    )
+    if rerun:
+        changed = {key for key in changed if not key.startswith("integrator.")}
+    grown = _match(Grid.of(config), _grid(there))
+    same_cells = len(grown) == there["status"].size
+    if changed or less or config.refine or (grown >= 0).sum() < there["status"].size or (rerun and not same_cells):
+        return found.difference(wanted)
+    return ""
+
+
+def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
+    """The cells of `config` whose results, bit for bit, are those in the dataset `there`; all but some to `rerun`."""
+    cells = _match(Grid.of(config), _grid(there))
+    status = there["status"].values.ravel()
+    if rerun:
+        return Earlier(there, np.where(np.isin(status, RERUN[rerun])[cells], -1, cells), rerun)
+    old = parse_value(str(there.attrs["config"]), "dataset")
+    if old["measure"] != config.document()["measure"] or not isinstance(config.tier, Model):
+        return Earlier(there, np.full(len(cells), -1))
+    if old["integrator"]["t_end"] != config.integrator.t_end:
+        taken = np.flatnonzero(cells >= 0)
+        depends = _depends_on_limit(
+            config, Grid.of(config).take(taken), there, cells[taken], old["integrator"]["t_end"]
+        )
+        cells[taken[depends]] = -1
+    return Earlier(there, cells)
+
+
+def _settings(document: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
+    """Everything that a configuration says, but for the values of `known` parameters, by which cells are matched."""
+    found = {key: value for key, value in document.items() if key not in (*sections(known), *known, "cases")}
+    for section in (*sections(known), "integrator"):
+        found |= {f"{section}.{key}": v for key, v in document.get(section, {}).items() if key not in known}
+    return {key: value for key, value in found.items() if key != "integrator"}
+
+
+def _depends_on_limit(config: Config, grid: Grid, there: xr.Dataset, cells: Array, t_end: float) -> Array:
+    """Which of the cells of `grid`, with the indices `cells` in the earlier dataset, could end otherwise than before.
+
+    These are the cells that had not ended at the earlier limit `t_end`, or so late that the method had taken it into
+    account, and those that now take other steps.
+    """
+    if any(spec.partition("=")[0] == Sensitivity.name for spec in config.measure):
+        return np.ones(len(cells), bool)  # its further runs may have met the limit
+
+    def before(name: str) -> Array:
+        return np.asarray(there[name].values.ravel()[cells])
+
+    depends: Array = before("status") == TIME_LIMIT
+    for choice in choose(config, grid):
+        at = choice.cells
+        left = (t_end - before("t_stop")[at]) / before("step")[at]
+        step = config.integrator.t_end / steps_to(config.integrator.t_end, choice.step)
+        depends[at] |= (left < METHODS[choice.method].foresight) | (step != before("step")[at])
+        if "method" in there:
+            depends[at] |= before("method")[at] != METHODS[choice.method].code
+    return depends
+
+
+def _grid(there: xr.Dataset) -> Grid:
+    """The grid of a dataset."""
+    values = {str(name): coordinate.values for name, coordinate in there.coords.items()}
+    constants = {name: float(value) for name, value in values.items() if value.ndim == 0}
+    dims = [str(d) for d in there["status"].dims]
+    if dims == ["case"]:
+        cases = {n: v for n, v in values.items() if there[n].dims == ("case",) and n != "case"}
+        return Grid({}, constants, cases)
+    return Grid({name: values[name] for name in dims}, constants)
+
+
+def _match(grid: Grid, there: Grid) -> Array:
+    """For each cell of `grid` its index in the grid `there`, or -1, shape (cells,)."""
+    columns, old = grid.columns(), there.columns()
+    if set(columns) != set(old):
+        return np.full(grid.size, -1)
+    known, rows = (np.stack([some[name] + 0.0 for name in sorted(columns)], axis=1) for some in (old, columns))
+    both = np.concatenate([known, rows]).view(f"V{8 * len(columns)}").ravel()
+    _, which = np.unique(both, return_inverse=True)
+    at: Array = np.full(len(both), -1)
+    at[which[: len(known)]] = np.arange(len(known))
+    return np.asarray(at[which[len(known) :]])
+
+
+class Enlarged(Some):
+    """The cells that an earlier run lacks, and the dataset of these and of the earlier run's."""
 
     def __init__(self, config: Config, store: Store, earlier: Earlier) -> None:
-        self.config, self.store, self.earlier = config, store, earlier
-        self.grid = Grid.of(config)
-        self.tiles: list[Tile] = []
-        self._missing = np.flatnonzero(earlier.cells < 0)
+        super().__init__(config, store)
+        self.earlier = earlier
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
         """Add the tiles to simulate: all of them, once.  False if there are no more.
 
         `tile_size` as for `Whole.grow`.
         """
-        if self.tiles or not len(self._missing):
-            return False
-        self.tiles = Grid.of(self.simulated()).tiles(tile_size(len(self._missing)))
-        return True
-
-    def simulated(self) -> Config:
-        """The configuration whose cases are the missing cells, which `tiles` cover; they are not verified."""
-        constants = {name: value for name, value in self.config.parameters.items() if not value.is_axis}
-        columns = self.grid.columns()
-        cases = {name: tuple(columns[name][self._missing].tolist()) for name in columns.keys() - constants.keys()}
-        return replace(self.config, verify=0.0, parameters=constants, cases=cases)
+        return not self.tiles and self._add(np.flatnonzero(self.earlier.cells < 0), tile_size)
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all cells, in memory."""
-        arrays = self.earlier.arrays(self.grid)
-        found, apart = gather(Grid.of(self.simulated()), self.tiles, self.store)
-        _, body = self.grid.bodies()
-        for name, (over, spec) in dataset.layout(self.grid, found).items():
-            if name not in arrays:
-                arrays[name] = np.zeros((over.size, *found[name].shape[1:]), spec.dtype)
-            arrays[name][body[self._missing] if spec.per_body else self._missing] = found[name]
-        words = attributes(self.config, len(self._missing), apart) | {"taken_over": self.earlier.words}
+        arrays, (found, apart) = dict[str, Array](), self._gather()
+        self._place(*self.earlier.taken(), arrays)
+        self._place(self.cells, found, arrays)
+        words = self._attributes(len(self.cells), apart) | {"taken_over": self.earlier.words}
         words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash
         labelled = dataset.label(self.config, self.grid, arrays, words)
-        return dataset.beside(self.config, labelled, self._verified(arrays)) if self.config.verify else labelled
-
-    def save(self, path: Path) -> None:
-        """Write the labelled dataset."""
-        netcdf.write(path, self.dataset())
-
-    def _verified(self, arrays: dict[str, Array]) -> dict[str, Array]:
-        """Those cells run again that a run of all of them at once runs again."""
-        cells = verification.sound(verification.draw(self.grid.size, self.config.verify), arrays)
-        first = {name: values[cells] for name, values in arrays.items() if name in verification.COMPARED}
-        columns = {name: values[cells] for name, values in self.grid.columns().items()}
-        return {"verified_cell": cells} | verification.verify(self.config, columns, first)
+        if not self.config.verify:
+            return labelled
+        return dataset.beside(self.config, labelled, verify(self.config, np.arange(self.grid.size), arrays))

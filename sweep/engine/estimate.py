@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+
 import numpy as np
 
 from sweep.config import Config
 from sweep.config.user_models import explained
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import BATCH
-from sweep.engine.plan import choose
-from sweep.grid import Grid
+from sweep.engine.plan import Choice, choose, kernels
+from sweep.grid import Array, Grid
+from sweep.kernels.build import compile_seconds, missing
+from sweep.kernels.methods import METHODS, PLAIN, automatic_step
+from sweep.models import MODELS
 
 _SAMPLE = 4096
 """Cells whose steps are chosen to judge all the others by."""
 
 _BYTES_A_CELL = 130
 """What the results of a cell take on disk."""
+
+_AROUND = 2.6
+"""Time in s to import what a run needs, to write its dataset and to draw its maps."""
+
+_GENERAL = 1.4
+"""Time of a step of a model that is not the paper's, relative to one that is (docs/reference/performance.md)."""
 
 
 def estimate(config: Config) -> str:
@@ -26,18 +38,37 @@ def estimate(config: Config) -> str:
     if not config.simulated:
         return cells
     sample = grid.sample(_SAMPLE)
+    share = grid.size / sample.size
     with explained(config.origin):
-        chosen, share = choose(config, sample), grid.size / sample.size
-    steps = [np.ceil(config.integrator.t_end / each.step) for each in chosen if len(each.cells)]
-    total, seconds = sum(each.sum() for each in steps) * share, sum(map(nominal_seconds, steps)) * share
+        chosen = [each for each in choose(config, sample) if len(each.cells)]
+        steps = [np.ceil(config.integrator.t_end / each.step) for each in chosen]
+        seconds = sum(map(nominal_seconds, _works(config, chosen, steps, share)))
+        compiling = compile_seconds(missing(kernels(config)))
+    total = sum(each.sum() for each in steps) * share
     numbers = sum(len(each.cells) * len(each.kernel.layout.names) for each in chosen)
     bytes_a_cell = np.dtype(float).itemsize * numbers / sample.size
     memory, disk = min(grid.size, BATCH) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
+    all_seconds = f"{compiling + seconds + _AROUND:.2g} s: {compiling:.2g} to compile, {seconds:.2g} to compute"
     return "\n".join(
         [
             cells,
-            f"steps:  at most {total:.3g}, {total / grid.size:.3g} per cell",
+            f"steps:  {total:.3g} if every cell runs to t_end, {total / grid.size:.3g} per cell",
             f"memory: {memory:.3g} MiB for running trajectories; on disk as much again, and {disk:.3g} MiB of results",
-            f"time:   at most about {seconds:.3g} s, if every cell runs to t_end; cells that settle stop earlier",
+            f"time:   about {all_seconds}, {_AROUND} to start and draw; less if cells settle, more if some run again",
         ]
     )
+
+
+def _works(config: Config, chosen: list[Choice], steps: list[Array], share: float) -> Iterator[Array]:
+    """For each method, and for the cells run again to verify it: the work for each cell, in steps of dopri5 alone."""
+    relative = 1.0 if config.equations.name in MODELS else _GENERAL
+    relative *= math.prod(each.cost for each in chosen[0].kernel.measurements)
+    for each, theirs in zip(chosen, steps, strict=True):
+        method = METHODS[each.method]
+        work = method.step_cost * relative * (theirs + method.start_up_cost)
+        yield np.resize(work, round(len(work) * share))
+    if config.verify:
+        again = chosen[0]
+        number = math.ceil(config.verify * share * sum(len(each.cells) for each in chosen))
+        step, _ = automatic_step(PLAIN, config.equations, again.columns, config.integrator.tolerance)
+        yield np.resize(2 * config.integrator.t_end / step, number) * relative

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine import executor, verification
-from sweep.engine.plan import plan, pool
+from sweep.engine import executor
+from sweep.engine.checks import sensitivity, verify
+from sweep.engine.plan import plan
 from sweep.engine.repeats import repeat_all
-from sweep.engine.sensitivity import runs_asked_for, sensitivity
 from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
 from sweep.kernels.status import FAILURES, RUNNING, SETTLED
@@ -34,26 +34,6 @@ class Done:
     """Results by name, each of shape (cells,)."""
     seconds: float
     cpu: str
-
-
-def run(
-    config: Config,
-    tiles: Sequence[Tile],
-    todo: Sequence[int],
-    store: Store,
-    *,
-    after_chunk: Callable[[Array], None],
-) -> Iterator[Done]:
-    """Run the tiles `todo`, batch by batch, and yield them as they are finished.
-
-    Parameters
-    ----------
-    store : keeps the images between chunks; those it has of an earlier run are continued first
-    after_chunk : called with the statuses of the cells at work
-    """
-    grid = Grid.of(config)
-    for batch, left in _batches(grid, tiles, todo, store):
-        yield from run_batch(config, tiles, batch, store=store, left=left, after_chunk=after_chunk)
 
 
 def run_batch(
@@ -79,53 +59,59 @@ def run_batch(
             point()
             yield Done(i, _evaluate(config, grid.part(tiles[i])), 0.0, cpu)
         return
-    plans, tables = pool(plan(config, grid.part(tiles[i])) for i in batch)
-    for kernel, _ in tables.values():
-        kernel.compile()
-    images, began = {method: table for method, (_, table) in tables.items()}, time.perf_counter()
+    job = plan(config, *(grid.part(tiles[i]) for i in batch))
+    for part in job.parts:
+        part.kernel.compile()
+    images, began = {part.method: part.images for part in job.parts}, time.perf_counter()
     if left and {m: t.shape for m, t in left.tables.items()} == {m: t.shape for m, t in images.items()}:
         for method, table in left.tables.items():
             images[method][:] = table
         began -= left.seconds
 
-    def statuses() -> Array:
-        return np.concatenate([kernel.table(table)["status"] for kernel, table in tables.values()])
+    def report() -> None:
+        after_chunk(np.concatenate([part.status for part in job.parts]))
 
     def chunk() -> None:
         # Images are saved only here, between two chunks: anywhere else an interrupt may find half of them advanced.
         if store:
             store.save_running(Running(list(batch), images, time.perf_counter() - began))
         # What looks like a failure is decided only after all cells have ended.
-        status = statuses()
+        status = np.concatenate([part.status for part in job.parts])
         after_chunk(np.where(np.isin(status, FAILURES), RUNNING, status))
 
-    for kernel, table in tables.values():
+    for part in job.parts:
         settle = config.integrator.stop_when_settled
-        executor.execute(kernel, table, stop_when_settled=settle, after_chunk=chunk)
+        executor.execute(part.kernel, part.images, stop_when_settled=settle, after_chunk=chunk)
     # Not saved: a run that is killed here goes on from the ends of the first runs.
-    repeat_all(plans, tables, lambda: after_chunk(statuses()))
+    repeat_all(job, report)
+    found = job.results() | sensitivity(job, report)
+    numbers = np.concatenate([grid.first_cell(tiles[i]) + np.arange(grid.part(tiles[i]).size) for i in batch])
+    again = verify(config, numbers, found, report) if config.verify else {}
     seconds = (time.perf_counter() - began) / len(batch)
-    results = [job.results() for job in plans]
-    again = _verified(config, grid, [tiles[i] for i in batch], results, lambda: after_chunk(statuses()))
-    for i, job, first, second in zip(batch, plans, results, again, strict=True):
-        arrays = first | second
-        if runs_asked_for(job):
-            arrays |= sensitivity(job, lambda: after_chunk(statuses()))
-        yield Done(i, arrays, seconds, cpu)
+    for i, arrays in zip(batch, job.by_grid(found), strict=True):
+        yield Done(i, arrays | _inside(grid, tiles[i], again), seconds, cpu)
 
 
-def _batches(
+def _inside(grid: Grid, tile: Tile, again: Mapping[str, Array]) -> dict[str, Array]:
+    """Of the cells that were run again, those of a tile."""
+    if not again:
+        return {}
+    number = again["verified_cell"] - grid.first_cell(tile)
+    inside = (number >= 0) & (number < grid.part(tile).size)
+    return {name: values[inside] for name, values in again.items()}
+
+
+def batches(
     grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], store: Store
 ) -> Iterator[tuple[list[int], Running | None]]:
-    """The tiles to run together: first those whose images the store has, along with these."""
-    waiting = list(todo)
+    """The tiles to run together, out of `todo`: first those whose images `store` has, along with these."""
     left = store.load_running()
-    if left and set(left.tiles) <= set(waiting):
+    if left and set(left.tiles) <= set(todo):
         yield left.tiles, left
-        waiting = [i for i in waiting if i not in left.tiles]
+        todo = [i for i in todo if i not in left.tiles]
     batch: list[int] = []
     cells = 0
-    for i in waiting:
+    for i in todo:
         size = grid.part(tiles[i]).size
         if batch and cells + size > BATCH:
             yield batch, None
@@ -143,32 +129,3 @@ def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
     if "reversals" in config.measure:
         arrays["reversals"] = arrays["reversals_predicted"]
     return arrays
-
-
-def _verified(
-    config: Config,
-    grid: Grid,
-    tiles: Sequence[Tile],
-    results: Sequence[Mapping[str, Array]],
-    after_chunk: Callable[[], None],
-) -> list[dict[str, Array]]:
-    """For each tile, whose first run has these `results`, what those of its cells give that are run again."""
-    if not config.verify:
-        return [{} for _ in tiles]
-    drawn, inside = verification.draw(grid.size, config.verify), []
-    for tile, first in zip(tiles, results, strict=True):
-        cells = drawn - grid.first_cell(tile)
-        inside.append(verification.sound(cells[(cells >= 0) & (cells < len(first["status"]))], first))
-
-    def pooled(arrays: Sequence[Mapping[str, Array]], names: Iterable[str]) -> dict[str, Array]:
-        return {n: np.concatenate([a[n][cells] for a, cells in zip(arrays, inside, strict=True)]) for n in names}
-
-    columns = [grid.part(tile).columns() for tile in tiles]
-    compared = [name for name in verification.COMPARED if name in results[0]]
-    again = verification.verify(config, pooled(columns, columns[0]), pooled(results, compared), after_chunk)
-    ends = np.cumsum([len(cells) for cells in inside])
-    return [
-        {"verified_cell": cells + grid.first_cell(tile)}
-        | {name: values[end - len(cells) : end] for name, values in again.items()}
-        for tile, cells, end in zip(tiles, inside, ends, strict=True)
-    ]

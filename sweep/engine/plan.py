@@ -1,8 +1,7 @@
-"""Turns the cells of a grid into images: the method, step, limits and start of each, before any step is taken."""
+"""Turns the cells of grids into images: the method, step, limits and start of each, before any step is taken."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -15,7 +14,7 @@ from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.methods import AUTO, METHODS
-from sweep.kernels.status import IMPOSSIBLE
+from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.models.model import Columns
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
@@ -28,10 +27,9 @@ _kernel = cache(methods.make_kernel)
 class Choice:
     """The cells that one method runs, and the steps that it takes."""
 
-    method: str
-    cells: Array
-    """Indices of the cells in the grid, shape (cells,)."""
     kernel: Kernel
+    cells: Array
+    """Their indices among all cells, shape (cells,)."""
     columns: Columns
     """Physical parameters by name, each of shape (cells,)."""
     step: Array
@@ -39,11 +37,18 @@ class Choice:
     step_rule: Array
     """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
 
+    @property
+    def method(self) -> str:
+        return self.kernel.method
+
 
 @dataclass(frozen=True)
 class Part(Choice):
     """The cells that one method runs, with their images."""
 
+    config: Config
+    stable: Array
+    """The ranges of spin in which the rattle decays, as `Kernel.images` takes them, shape (6, cells)."""
     images: Array
     """Shape (cells, rows)."""
 
@@ -51,20 +56,44 @@ class Part(Choice):
     def status(self) -> Array:
         return np.asarray(self.kernel.table(self.images)["status"])
 
+    @property
+    def failed(self) -> Array:
+        """Whether each run failed."""
+        return np.isin(self.status, FAILURES)
+
+    def take(self, rows: Array) -> Part:
+        """Some of these cells, with a copy of their images."""
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        return replace(
+            self, cells=self.cells[rows], columns=columns, step=self.step[rows], step_rule=self.step_rule[rows],
+            stable=self.stable[:, rows], images=self.images[rows],
+        )  # fmt: skip
+
+    def start(self, halvings: int | Array = 0) -> Array:
+        """Images at t = 0, with steps that are halved so many times."""
+        step, t_end = self.step / 2.0**halvings, self.config.integrator.t_end
+        if not len(step):
+            return np.empty((0, len(self.kernel.layout.names)))
+        images = self.kernel.images(self.columns, step, t_end, self.stable)
+        self.kernel.table(images)["halvings"] = halvings
+        return images
+
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything a simulation needs, before the first step is taken."""
+    """Everything that a simulation needs, before the first step is taken."""
 
     config: Config
-    grid: Grid
-    prediction: Prediction
+    grids: tuple[Grid, ...]
+    """The cells are those of the first grid, followed by those of the next, and so on."""
+    predictions: tuple[Prediction, ...]
     parts: tuple[Part, ...]
     """One part, unless the configuration has the method chosen for each cell (`method: auto`).  Cells of impossible
     bodies are in none."""
 
     def results(self) -> dict[str, Array]:
-        """The variables of the dataset, over the cells and over their bodies, once all trajectories have ended."""
+        """What was simulated, by name, each over all cells, once all trajectories have ended."""
+        size = sum(grid.size for grid in self.grids)
         arrays: dict[str, Array] = {}
         for part in self.parts:
             found = dataset.measured(part.kernel, part.images, self.config.integrator.t_end)
@@ -75,21 +104,29 @@ class Plan:
                 found["method"] = np.full(len(part.cells), METHODS[part.method].code)
             for name, values in found.items():
                 nothing = np.nan if dataset.VARIABLES[name].dtype.startswith("float") else 0
-                blank = np.full((self.grid.size, *values.shape[1:]), nothing)
+                blank = np.full((size, *values.shape[1:]), nothing)
                 arrays.setdefault(name, blank)[part.cells] = values
         simulated = np.concatenate([part.cells for part in self.parts])
-        arrays["status"][np.delete(np.arange(self.grid.size), simulated)] = IMPOSSIBLE
-        return arrays | dataset.predicted(self.prediction)
+        arrays["status"][np.delete(np.arange(size), simulated)] = IMPOSSIBLE
+        return arrays
+
+    def by_grid(self, arrays: dict[str, Array]) -> list[dict[str, Array]]:
+        """`arrays` over all cells cut into those of each grid, with the predictions for its cells and bodies."""
+        ends = np.cumsum([grid.size for grid in self.grids])
+        return [
+            {name: values[end - grid.size : end] for name, values in arrays.items()} | dataset.predicted(prediction)
+            for grid, prediction, end in zip(self.grids, self.predictions, ends, strict=True)
+        ]
 
 
-def plan(config: Config, grid: Grid | None = None) -> Plan:
-    """Give each cell of `grid`, by default all cells of `config`, its method, step, limits and start.
+def plan(config: Config, *grids: Grid) -> Plan:
+    """Give each cell of `grids`, by default all cells of `config`, its method, step, limits and start.
 
     Kernels that no cache holds are compiled first.
     """
-    grid = grid or Grid.of(config)
+    grids = grids or (Grid.of(config),)
     build(kernels(config))
-    return fill(config, grid, choose(config, grid))
+    return fill(config, grids, choose(config, *grids))
 
 
 def kernels(config: Config) -> list[Kernel]:
@@ -105,19 +142,20 @@ def kernel_of(method: str, config: Config) -> Kernel:
     return _kernel(method, config.equations, config.measure, config.integrator.tolerance)
 
 
-def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
-    """Give each cell of `grid` that has a possible body its method and step; no kernel is compiled for it.
+def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
+    """Give each cell of `grids` that has a possible body its method and step; no kernel is compiled for it.
 
     Without any there is one choice, of no cells.
     """
     model, integrator = config.equations, config.integrator
-    columns = grid.columns()
-    possible = np.flatnonzero(~model.impossible(columns))
-    if len(possible) < grid.size:
+    each = [grid.columns() for grid in grids]
+    columns = {name: np.concatenate([some[name] for some in each]) for name in each[0]}
+    impossible = model.impossible(columns)
+    possible = np.flatnonzero(~impossible)
+    if impossible.any():
         columns = {name: values[possible] for name, values in columns.items()}
     if not len(possible):
-        nothing, kernel = np.empty(0), kernel_of(kernels(config)[0].method, config)
-        return (Choice(kernel.method, possible, kernel, columns, nothing, nothing),)
+        return (Choice(kernels(config)[0], possible, columns, np.empty(0), np.empty(0)),)
     if integrator.method == AUTO:
         chosen, steps, rules = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:
@@ -131,39 +169,13 @@ def choose(config: Config, grid: Grid) -> tuple[Choice, ...]:
         if not len(cells := np.flatnonzero(chosen == method)):
             continue
         theirs = {name: values[cells] for name, values in columns.items()}
-        choices.append(Choice(method, possible[cells], kernel_of(method, config), theirs, steps[cells], rules[cells]))
+        choices.append(Choice(kernel_of(method, config), possible[cells], theirs, steps[cells], rules[cells]))
     return tuple(choices)
 
 
-def fill(config: Config, grid: Grid, chosen: Sequence[Choice]) -> Plan:
-    """Give each cell of `grid` its limits and start as well, in images of the kernels in `chosen`."""
-    prediction = predict(config.equations, grid, config.measure)
-    assert prediction.stability is not None  # it is a model
-    stable = prediction.stability.ranges
-    parts = []
-    for each in chosen:
-        images = np.empty((0, len(each.kernel.layout.names)))
-        if len(each.cells):
-            images = each.kernel.images(each.columns, each.step, config.integrator.t_end, stable[:, each.cells])
-        parts.append(Part(**vars(each), images=images))
-    return Plan(config, grid, prediction, tuple(parts))
-
-
-def pool(plans: Iterable[Plan]) -> tuple[list[Plan], dict[str, tuple[Kernel, Array]]]:
-    """The same plans, with their images as views into one table per method; and the tables, with their kernels."""
-    plans = list(plans)
-    tables: dict[str, tuple[Kernel, Array]] = {}
-    for method in METHODS:
-        found = [part for each in plans for part in each.parts if part.method == method]
-        if found:
-            tables[method] = found[0].kernel, np.concatenate([part.images for part in found])
-    reached = dict.fromkeys(tables, 0)
-    pooled = []
-    for each in plans:
-        parts = []
-        for part in each.parts:
-            begin = reached[part.method]
-            reached[part.method] = end = begin + len(part.cells)
-            parts.append(replace(part, images=tables[part.method][1][begin:end]))
-        pooled.append(replace(each, parts=tuple(parts)))
-    return pooled, tables
+def fill(config: Config, grids: tuple[Grid, ...], chosen: tuple[Choice, ...]) -> Plan:
+    """Give each cell of `grids` its limits and start as well."""
+    predictions = tuple(predict(config.equations, grid, config.measure) for grid in grids)
+    stable = np.concatenate([each.stability.ranges for each in predictions if each.stability], axis=1)
+    parts = [Part(**vars(each), config=config, stable=stable[:, each.cells], images=np.empty(0)) for each in chosen]
+    return Plan(config, grids, predictions, tuple(replace(part, images=part.start()) for part in parts))

@@ -20,28 +20,26 @@ from sweep.config import Config, ConfigLike, load_config
 from sweep.config.user_models import explained
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
-from sweep.engine.earlier import RERUN, Earlier, reason_against, taken_over
-from sweep.engine.enlarged import Enlarged
+from sweep.engine.enlarged import RERUN, Earlier, Enlarged, reason_against, taken_over
 from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
 from sweep.interrupt import deferred, point
 from sweep.results import dataset
-from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity, not_resumed
-from sweep.results.memory import Memory
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
 from sweep.results.store import Running, Store, StoreError
+from sweep.results.stores import STORES
 
 LARGE = 2_000_000
 """Cells of the largest dataset that is loaded into memory unasked."""
 
 
 def tile_size(cells: int) -> int:
-    """Cells per tile, of which a worker that dies loses one, and the dataset has one per chunk."""
+    """Cells per tile, of which a worker that dies loses one, and the file stores one in a piece."""
     return int(np.clip(cells // 32, 1024, 8192))
 
 
@@ -61,10 +59,11 @@ def run(
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun must be {' or '.join(RERUN)}, not {rerun!r}")
     dataset.check_names(config)
-    reporter = reporter or Reporter()
+    reporter, identity = reporter or Reporter(), identify(config).again(rerun)
     if output is None:
-        return _compute(config, Memory(), reporter, cluster).dataset()
-    files, identity = RunFiles(Path(output), config.name), identify(config).again(rerun)
+        memory = STORES["memory"](Path(), identity, reporter.note)
+        return _compute(config, memory, reporter, cluster).dataset()
+    files = RunFiles(Path(output), config.name)
     with files.locked():
         if fresh:
             files.discard()
@@ -74,7 +73,7 @@ def run(
         else:
             earlier = _earlier(config, found, identity, files, rerun)
             files.picture.unlink(missing_ok=True)  # of a dataset that is gone
-            store = Checkpoint(files.checkpoint, identity, reporter.note)
+            store = STORES["checkpoint"](files.checkpoint, identity, reporter.note)
             _compute(config, store, reporter, cluster, earlier).save(files.dataset)
         files.discard_checkpoint()
         point()
@@ -111,12 +110,11 @@ def _earlier(
 
 def _compute(
     config: Config, store: Store, reporter: Reporter, cluster: Cluster | None, earlier: Earlier | None = None
-) -> Whole | Refined | Enlarged:
+) -> Whole:
     running = store.load_running()
-    result: Whole | Refined | Enlarged
     if earlier:
         reporter.note(earlier.words)
-        result = Enlarged(config, store, earlier)
+        result: Whole = Enlarged(config, store, earlier)
     else:
         # A single cell has no neighbours from which it could be inferred.
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
@@ -129,7 +127,7 @@ def _compute(
     return result
 
 
-def _kept(result: Whole | Refined | Enlarged, store: Store, running: Running | None) -> str:
+def _kept(result: Whole, store: Store, running: Running | None) -> str:
     """What an earlier run left."""
     grid = Grid.of(result.simulated())
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
@@ -142,11 +140,12 @@ def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count
     grid = Grid.of(config)
     todo = [i for i in range(len(tiles)) if i not in store.done]
     count.expect(grid.size, sum(grid.part(tiles[i]).size for i in todo))
-    if cluster:
-        finished = cluster.run(config, tiles, todo)
-    else:
-        finished = local.run(config, tiles, todo, store, after_chunk=count.chunk)
-    for done in finished:
+    here = (
+        done
+        for batch, left in local.batches(grid, tiles, todo, store)
+        for done in local.run_batch(config, tiles, batch, store=store, left=left, after_chunk=count.chunk)
+    )
+    for done in cluster.run(config, tiles, todo) if cluster else here:
         store.save(done.tile, done.arrays | {"seconds": np.array(done.seconds), "cpu": np.array(done.cpu)})
         count.tile(done.arrays["status"])
 

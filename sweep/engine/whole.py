@@ -1,8 +1,9 @@
-"""A run that simulates every cell, and the dataset its finished tiles make."""
+"""A run of all cells or of some of them, and the dataset that its finished tiles make."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,32 +19,6 @@ from sweep.results.store import Store
 
 Apart = dict[str, Array]
 """What a tile holds apart from the results of its cells: its cost, and the cells that were run again."""
-
-
-def gather(grid: Grid, tiles: Sequence[Tile], store: Store) -> tuple[dict[str, Array], list[Apart]]:
-    """Arrays over all cells (or bodies) of `grid`, and what the tiles hold apart from them."""
-    apart: list[Apart] = []
-
-    def read() -> Iterator[tuple[Tile, dict[str, Array]]]:
-        for i, tile in enumerate(tiles):
-            arrays = store.load(i)
-            apart.append(_apart(arrays))
-            yield tile, arrays
-
-    return dataset.assemble(grid, read()), apart
-
-
-def attributes(config: Config, cells: int, apart: Iterable[Apart]) -> dict[str, Any]:
-    """Where the numbers of a finished run come from, and what its `cells` have cost."""
-    seconds, cpus = 0.0, set[str]()
-    for tile in apart:
-        seconds += float(tile["seconds"])
-        cpus.add(str(tile["cpu"]))
-    return provenance(config, seconds, cells, cpus) | described_impossible(config)
-
-
-def _apart(arrays: Mapping[str, Array]) -> Apart:
-    return {n: values for n, values in arrays.items() if n in ("seconds", "cpu") or n.startswith("verified_")}
 
 
 class Whole:
@@ -72,10 +47,10 @@ class Whole:
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset, in memory."""
-        return self._frame(*gather(self.grid, self.tiles, self.store))
+        return self._frame(*self._gather())
 
     def save(self, path: Path) -> None:
-        """Write the labelled dataset, each tile as one chunk; it need not fit into memory.
+        """Write the labelled dataset, tile by tile; it need not fit into memory.
 
         Every tile is read twice: the file begins with what the tiles hold apart from their cells.
         """
@@ -84,22 +59,82 @@ class Whole:
             arrays = self.store.load(i)
             tails |= {name: values.shape[1:] for name, values in arrays.items()}
             apart.append(_apart(arrays))
-        variables = {}
         first = dict(zip(self.grid.dims, self.tiles[0], strict=True))
+        empty, sizes = dict[str, Array](), dict[str, tuple[int, ...]]()
         for name, (over, spec) in dataset.layout(self.grid, tails).items():
-            empty = np.broadcast_to(np.zeros((), spec.dtype), over.shape + tails[name])
-            chunks = tuple(first[dim].stop for dim in over.dims) + tails[name]
-            words = dataset.described(spec, self.config.units)
-            variables[name] = xr.Variable(dataset.dims(over, spec), empty, words), chunks
-        blocks = (
-            block for i, tile in enumerate(self.tiles) for block in dataset.blocks(self.grid, tile, self.store.load(i))
-        )
-        frame = self._frame({}, apart).assign_coords(dataset.numbers_along(tails))
-        netcdf.write(path, frame, variables, blocks)
+            empty[name] = np.broadcast_to(np.zeros((), spec.dtype), over.shape + tails[name])
+            sizes[name] = tuple(first[dim].stop for dim in over.dims) + tails[name]
+        loaded = ((tile, self.store.load(i)) for i, tile in enumerate(self.tiles))
+        pieces = (piece for tile, arrays in loaded for piece in dataset.pieces(self.grid, tile, arrays))
+        netcdf.write(path, self._frame(empty, apart), sizes, pieces)
+
+    def _gather(self) -> tuple[dict[str, Array], list[Apart]]:
+        """Arrays over all simulated cells (or bodies), and what the tiles hold apart from them."""
+        apart: list[Apart] = []
+
+        def read() -> Iterator[tuple[Tile, dict[str, Array]]]:
+            for i, tile in enumerate(self.tiles):
+                arrays = self.store.load(i)
+                apart.append(_apart(arrays))
+                yield tile, arrays
+
+        return dataset.assemble(Grid.of(self.simulated()), read()), apart
 
     def _frame(self, arrays: Mapping[str, Array], apart: Sequence[Apart]) -> xr.Dataset:
         """A dataset of `arrays` with coordinates, attributes, and the cells that were run again."""
-        framed = dataset.label(self.config, self.grid, arrays, attributes(self.config, self.grid.size, apart))
+        framed = dataset.label(self.config, self.grid, arrays, self._attributes(self.grid.size, apart))
         names = dict.fromkeys(name for tile in apart for name in tile if name.startswith("verified_"))
         again = {name: np.concatenate([tile[name] for tile in apart if name in tile]) for name in names}
         return dataset.beside(self.config, framed, again) if again else framed
+
+    def _attributes(self, cells: int, apart: Iterable[Apart]) -> dict[str, Any]:
+        """Where the numbers of a finished run come from, and what its `cells` have cost."""
+        seconds, cpus = 0.0, set[str]()
+        for tile in apart:
+            seconds += float(tile["seconds"])
+            cpus.add(str(tile["cpu"]))
+        return provenance(self.config, seconds, cells, cpus) | described_impossible(self.config)
+
+
+class Some(Whole):
+    """Cells of a configuration that are simulated as a table of cases, which may grow; the others are known otherwise.
+
+    A table of cases has no neighbours, so that it is neither refined nor verified.
+    """
+
+    def __init__(self, config: Config, store: Store) -> None:
+        super().__init__(config, store)
+        self.cells: Array = np.empty(0, np.intp)
+        """Indices of the simulated cells, in the order of the table."""
+
+    def simulated(self) -> Config:
+        """The configuration whose cases are the simulated cells, which `tiles` cover."""
+        table = self.grid.take(self.cells)
+        constants = {name: self.config.parameters[name] for name in table.constants}
+        cases = {name: tuple(values.tolist()) for name, values in (table.cases or {}).items()}
+        return replace(self.config, refine=0, verify=0.0, parameters=constants, cases=cases)
+
+    def save(self, path: Path) -> None:
+        """Write the labelled dataset, which has to fit into memory."""
+        netcdf.write(path, self.dataset())
+
+    def _add(self, cells: Array, tile_size: Callable[[int], int]) -> bool:
+        """Simulate these cells too, in tiles of their own; False if there are none."""
+        first, step = len(self.cells), tile_size(len(cells))
+        self.cells = np.concatenate([self.cells, cells])
+        last = len(self.cells)
+        self.tiles += [(slice(i, min(i + step, last)),) for i in range(first, last, step)]
+        return last > first
+
+    def _place(self, cells: Array, found: Mapping[str, Array], arrays: dict[str, Array]) -> None:
+        """Write what was `found` for `cells`, as cases, into `arrays` over all cells or bodies, undefined elsewhere."""
+        _, body = self.grid.bodies()
+        for name, (over, spec) in dataset.layout(self.grid, found).items():
+            if name not in arrays:
+                nothing = np.nan if spec.dtype.startswith("float") else 0
+                arrays[name] = np.full((over.size, *found[name].shape[1:]), nothing, spec.dtype)
+            arrays[name][body[cells] if spec.per_body else cells] = found[name]
+
+
+def _apart(arrays: Mapping[str, Array]) -> Apart:
+    return {n: values for n, values in arrays.items() if n in ("seconds", "cpu") or n.startswith("verified_")}

@@ -19,7 +19,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
 
 import numpy as np
@@ -28,7 +28,7 @@ from sweep.interrupt import point
 from sweep.jit import compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compile_approach, compiled_approach
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.methods import PLAIN, make_kernel
+from sweep.kernels.methods import METHODS, PLAIN, make_kernel
 from sweep.kernels.quartic import has_fast_slip
 from sweep.kernels.stability import compile_search, compiled_search
 from sweep.models import find
@@ -41,11 +41,14 @@ from sweep.parameters import PAPER_PARAMETERS
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and where the model comes from."""
 
+_SECONDS = {"images": 4.0, "approach": 4.0, "theory": 4.0}
+"""Time to compile a piece that is no kernel (`scripts/run_costs.py`)."""
+
 _POLL = 0.05
 """Time in seconds between two looks at the processes."""
 
 
-def build(kernels: Iterable[Kernel]) -> None:
+def build(kernels: Sequence[Kernel]) -> None:
     """Compile what the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
 
     What is missing after that, because a process failed or there is no folder for a cache, is compiled where it is
@@ -56,14 +59,23 @@ def build(kernels: Iterable[Kernel]) -> None:
     ModelError
         if a model that a user brings cannot be compiled.
     """
-    kernels = list(kernels)
     if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.is_compiled()]:
         with compiling():
             try_compiling(users[0])
-    jobs = dict.fromkeys((job, kernel.model.origin) for kernel in kernels for job in _missing(kernel))
-    if jobs:
+    if jobs := missing(kernels):
         with compiling():
-            _compile(list(jobs))
+            _compile(jobs)
+
+
+def missing(kernels: Sequence[Kernel]) -> list[Job]:
+    """What the cache lacks to run `kernels`."""
+    return list(dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel)))
+
+
+def compile_seconds(jobs: Sequence[Job]) -> float:
+    """Roughly how long it takes to compile `jobs` side by side."""
+    each = [METHODS[piece[1]].compile_seconds if piece[0] == "kernel" else _SECONDS[piece[0]] for piece, _ in jobs]
+    return max(max(each, default=0.0), sum(each) / threads())
 
 
 def try_compiling(model: Model) -> None:

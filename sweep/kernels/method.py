@@ -66,6 +66,8 @@ class Method:
     """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""
     start_up_cost: float = 0.0
     """Time of the start-up of one trajectory, in steps of this method."""
+    compile_seconds: float = 6.0
+    """Time to compile its kernel, for the estimate of a run (`scripts/run_costs.py`)."""
     balance: float = 1.0
     """The factor by which the error of its energy balance tends to exceed that in spin, both as
     `sweep.engine.repeats` compares them."""

@@ -140,11 +140,16 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     The cells may lie along one dimension, in C order, or along those of the grid.
     """
     variables = {
-        name: xr.Variable(dims(over, spec), shaped(over, spec, arrays[name]), described(spec, config.units))
+        name: xr.Variable(
+            (*over.dims, *filter(None, [spec.along])), shaped(over, spec, arrays[name]), described(spec, config.units)
+        )
         for name, (over, spec) in layout(grid, arrays).items()
     }
     coordinates = {name: xr.Variable((name,), values, config.described(name)) for name, values in grid.axes.items()}
-    coordinates |= numbers_along({name: np.shape(values) for name, values in arrays.items()})
+    for name, variable in variables.items():
+        if along := VARIABLES[name].along:
+            words = {"long_name": f"number of the {along}", "units": "1"}
+            coordinates[along] = xr.Variable((along,), np.arange(1, variable.shape[-1] + 1), words)
     for name, column in (grid.cases or {}).items():
         coordinates[name] = xr.Variable(("case",), column, config.described(name))
     if grid.cases is not None:
@@ -172,28 +177,13 @@ def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]
     return {name: (bodies if spec.per_body else grid, spec) for name, spec in VARIABLES.items() if name in names}
 
 
-def numbers_along(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, xr.Variable]:
-    """Coordinates 1, 2, … of the dimensions that variables of these `shapes` have in addition to those of the cells."""
-    found = {}
-    for name, shape in shapes.items():
-        if (spec := VARIABLES.get(name)) and spec.along:
-            words = {"long_name": f"number of the {spec.along}", "units": "1"}
-            found[spec.along] = xr.Variable((spec.along,), np.arange(1, shape[-1] + 1), words)
-    return found
-
-
-def dims(over: Grid, spec: Variable) -> tuple[str, ...]:
-    """Names of the dimensions of a variable over the cells of `over`."""
-    return (*over.dims, spec.along) if spec.along else over.dims
-
-
 def shaped(over: Grid, spec: Variable, values: Array) -> Array:
     """`values` over the cells of `over`, converted to the dimensions and the type of the variable."""
     values = np.asarray(values).astype(spec.dtype, copy=False)
     return values.reshape(over.shape + (values.shape[-1:] if spec.along else ()))
 
 
-def blocks(grid: Grid, tile: tuple[slice, ...], arrays: Mapping[str, Array]) -> Iterator[tuple[str, Any, Array]]:
+def pieces(grid: Grid, tile: tuple[slice, ...], arrays: Mapping[str, Array]) -> Iterator[tuple[str, Any, Array]]:
     """For each variable in a tile's flat `arrays`: its name, its place in the whole array, and its values."""
     at = dict(zip(grid.dims, tile, strict=True))
     for name, (over, spec) in layout(grid.part(tile), arrays).items():
@@ -206,7 +196,7 @@ def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, A
     for tile, arrays in tiles:
         for name, (over, spec) in layout(grid, set(arrays) - set(whole)).items():
             whole[name] = np.empty(over.shape + np.shape(arrays[name])[1:], spec.dtype)
-        for name, place, values in blocks(grid, tile, arrays):
+        for name, place, values in pieces(grid, tile, arrays):
             whole[name][place] = values
     return whole
 

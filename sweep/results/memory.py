@@ -11,6 +11,8 @@ from sweep.results.store import Running
 class Memory:
     """Keeps finished tiles in memory; nothing outlives the process."""
 
+    lasting = False
+
     def __init__(self) -> None:
         self._tiles: dict[int, dict[str, Array]] = {}
 

@@ -1,6 +1,6 @@
-"""Datasets as netCDF4 files: written in blocks, read whole or when asked for.
+"""Datasets as netCDF4 files: written piece by piece, read whole or when asked for.
 
-A dataset is one file that opens without this program, with one chunk per tile.  It is written at the
+A dataset is one file that opens without this program, stored tile by tile.  It is written at the
 end of a run, from the tiles in the store: an HDF5 file that a killed process was writing can be lost
 as a whole, and a zarr folder written in place opens before it is complete.
 """
@@ -21,39 +21,31 @@ from sweep.interrupt import deferred
 from sweep.results.store import StoreError
 from sweep.results.writing import probe, replacing
 
-Chunked = tuple[xr.Variable, tuple[int, ...]]
-"""An empty variable with its attributes, and the shape of the chunks in which it is stored."""
-
 
 def write(
     path: Path,
-    frame: xr.Dataset,
-    variables: Mapping[str, Chunked] | None = None,
-    blocks: Iterable[tuple[str, Any, Array]] = (),
+    dataset: xr.Dataset,
+    sizes: Mapping[str, tuple[int, ...]] | None = None,
+    pieces: Iterable[tuple[str, Any, Array]] = (),
 ) -> None:
-    """Write a dataset of which only `frame` has to fit into memory.
+    """Write a dataset, of which some variables need not fit into memory.
 
     Parameters
     ----------
-    frame : coordinates, attributes and the variables written at once
-    variables : the variables filled from `blocks`, by name
-    blocks : name, place in the array, values
+    sizes : shapes of the pieces in which variables are stored that are filled from `pieces`, by name
+    pieces : name, place in the array, values
     """
     with replacing(path) as temporary:
         try:
-            _write_frame(frame, temporary)
+            _write_frame(dataset.drop_vars(sizes or ()), temporary)
             with netCDF4.Dataset(temporary, "a") as file:
-                for name, (variable, chunks) in (variables or {}).items():
+                for name, size in (sizes or {}).items():
+                    variable = dataset[name]
                     fill = np.nan if variable.dtype.kind == "f" else None
-                    target = file.createVariable(
-                        name,
-                        variable.dtype,
-                        tuple(map(str, variable.dims)),
-                        fill_value=fill,
-                        chunksizes=chunks or None,
-                    )
+                    dims = tuple(map(str, variable.dims))
+                    target = file.createVariable(name, variable.dtype, dims, fill_value=fill, chunksizes=size or None)
                     target.setncatts(variable.attrs)
-                for name, place, values in blocks:
+                for name, place, values in pieces:
                     file[name][place] = values
         except RuntimeError as error:  # netCDF's own, which does not say what the system said
             probe(temporary)

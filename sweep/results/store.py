@@ -3,9 +3,8 @@
 A run is computed in tiles, which have numbers.  A store keeps the results of finished tiles and,
 between two chunks of work, the images of the tiles at work, so that a stopped run can be resumed.
 
-To add a store, write a class with these members in a file of its own, and construct it in
-`sweep.engine.run.run`.  Nothing else knows which store it is given.  `tests/results/test_stores.py` checks
-the promises made here.
+To add a store, write a class with these members in a file of its own, and enter it in `sweep.results.stores`.  Nothing
+else knows which store it is given.  `tests/results/test_stores.py` checks the promises made here for each.
 """
 
 from __future__ import annotations
@@ -34,6 +33,9 @@ class Running(NamedTuple):
 class Store(Protocol):
     """Keeps the results of finished tiles, and the images of unfinished ones."""
 
+    lasting: bool
+    """Whether what it keeps outlives the process."""
+
     @property
     def done(self) -> Collection[int]:
         """Numbers of the tiles that are finished: those saved, also by an earlier run."""
@@ -50,5 +52,5 @@ class Store(Protocol):
     def load_running(self) -> Running | None:
         """What the last `save_running` kept; None if there is nothing, or one of its tiles is `done`.
 
-        A store that does not outlive the process may always return None.
+        A store that is not `lasting` may always return None.
         """

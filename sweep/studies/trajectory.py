@@ -21,7 +21,7 @@ from sweep.config.values import numbers_of
 from sweep.engine import executor
 from sweep.engine.executor import STEP_SECONDS
 from sweep.engine.plan import plan
-from sweep.engine.repeats import cells_of, repeat_all
+from sweep.engine.repeats import repeat_all
 from sweep.engine.reporter import Progress, Reporter
 from sweep.grid import Array, Grid
 from sweep.interrupt import deferred
@@ -126,8 +126,8 @@ def trajectory(
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
     """`trajectory` of all cells of `chosen`."""
     job = plan(chosen)
-    (part,) = job.parts
-    kernel, images, columns = part.kernel, part.images, job.grid.columns()
+    (part,), (grid,) = job.parts, job.grids
+    kernel, images, columns = part.kernel, part.images, grid.columns()
     t_end, settles, began = chosen.integrator.t_end, chosen.integrator.stop_when_settled, time.perf_counter()
 
     def report() -> None:
@@ -135,16 +135,17 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
         reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, time.perf_counter() - began))
 
     marks = _run(kernel, images, settles, report)
-    repeat_all([job], {part.method: (kernel, images)}, report)
+    repeat_all(job, report)
     halvings = kernel.table(images)["halvings"]
     if halvings.any():
-        marks = _run(kernel, cells_of([job], part.method, kernel, images).start(halvings), settles)
+        marks = _run(kernel, part.start(halvings), settles)
     _judge(kernel, images)
     times = _times(kernel, images, every or _intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
-    labelled = dataset.label(job.config, job.grid, job.results(), provenance(job.config, 0.0, job.grid.size))
+    (found,) = job.by_grid(job.results())
+    labelled = dataset.label(chosen, grid, found, provenance(chosen, 0.0, grid.size))
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
-    index = ("trajectory", np.arange(job.grid.size), {"units": "1", "long_name": "number of the trajectory"})
+    index = ("trajectory", np.arange(grid.size), {"units": "1", "long_name": "number of the trajectory"})
     return flat.assign_coords(trajectory=index).assign(_described(times, series, kernel.model, chosen.units))
 
 

@@ -15,7 +15,7 @@ from support.runs import Stop, same_numbers
 
 import sweep
 from sweep import StoreError
-from sweep.engine.earlier import reason_against, taken_over
+from sweep.engine.enlarged import reason_against, taken_over
 from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
 from sweep.results.provenance import identify
 
@@ -52,6 +52,14 @@ def test_a_grown_run_is_the_run_of_all_at_once(write: Write, tmp_path: Path, tex
     assert 3 <= taken <= 12
     assert found.attrs["taken_over"] in note
     same_numbers(found, sweep.run(write(text)))
+
+
+def test_a_single_cell_runs_on(write: Write, tmp_path: Path) -> None:
+    short = "name: small\nfriction: {mu: 60}\nintegrator: {method: dopri5, t_end: 100}\n"
+    long = short.replace("100", "300")
+    found, (note,) = grown(write, tmp_path / "out", short, long)
+    assert note.startswith("0 of 1 cells are taken over")
+    same_numbers(found, sweep.run(write(long)))
 
 
 def test_a_finer_range(write: Write, tmp_path: Path) -> None:

@@ -62,6 +62,12 @@ class Runs:
         process.join(120)
         return process.exitcode, process.log.read_text(encoding="utf-8")
 
+    def complete(self, **settings: Any) -> dict[str, bytes]:
+        """The files after a process that succeeds."""
+        code, said = self.finish(**settings)
+        assert code == 0, said
+        return contents(self.out)
+
 
 @pytest.fixture
 def runs(config: Path, tmp_path: Path) -> Iterator[Runs]:
@@ -77,8 +83,7 @@ def runs(config: Path, tmp_path: Path) -> Iterator[Runs]:
 def first(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run that nothing happened to."""
     runs = Runs(config, tmp_path_factory.mktemp("undisturbed") / "out")
-    code, said = runs.finish()
-    assert code == 0, said
+    runs.complete()
     return runs.out
 
 
@@ -212,10 +217,33 @@ MANY = Counter(start=4, kernel=14, checkpoint=14, tile=6, dataset=12, files=5, p
 """How often to strike at each moment, sixty times in all."""
 
 
-@pytest.mark.parametrize("wanted", [SOME, pytest.param(MANY, marks=pytest.mark.campaign)], ids=["some", "many"])
-def test_killed_at_any_moment(
-    config: Path, tmp_path: Path, undisturbed: dict[str, bytes], wanted: Counter[str]
-) -> None:
+VARIANT = """\
+name: small
+units: SI
+gravity: 9.81
+body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
+friction: {law: coulomb, mu: [0.2, 0.5], regularisation: tanh, speed: 0.02, sigma: [5.0e-5, 1.0e-4]}
+start: {roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 4, 5], slip1: 0.05}
+integrator: {t_end: 12}
+verify: 0.3
+"""
+"""Any body and any law of friction."""
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        (TEXT, SOME),
+        (VARIANT, Counter(kernel=1, dataset=1)),
+        pytest.param(TEXT, MANY, marks=pytest.mark.campaign),
+        pytest.param(VARIANT, Counter(kernel=4, checkpoint=4, tile=4), marks=pytest.mark.campaign),
+    ],
+    ids=["some", "some-variant", "many", "many-variant"],
+)
+def test_killed_at_any_moment(tmp_path: Path, text: str, wanted: Counter[str]) -> None:
+    config = tmp_path / "small.yaml"
+    config.write_text(text, encoding="utf-8")
+    undisturbed = Runs(config, tmp_path / "calm").complete()
     rng = random.Random(1)
     survived: Counter[str] = Counter()
     for lane in range(40):
@@ -230,9 +258,7 @@ def test_killed_at_any_moment(
             if process.exitcode == -signal.SIGKILL:
                 survived[moment] += 1
                 assert ".small.lock" in os.listdir(runs.out)
-        code, said = runs.finish()
-        assert code == 0, said
-        assert contents(runs.out) == undisturbed
+        assert runs.complete() == undisturbed
         if survived >= wanted:
             break
     print(f"killed: {dict(survived)}, {survived.total()} times; {lane + 1} runs")
@@ -256,9 +282,7 @@ def test_interrupted(runs: Runs, undisturbed: dict[str, bytes], moments: tuple[s
         assert (process.exitcode, "Traceback" in said) == (130, False), said
         assert "finished and kept; the same command resumes the run" in said
         assert not [name for name in os.listdir(runs.out) if name.startswith(".")]
-    code, said = runs.finish()
-    assert code == 0, said
-    assert contents(runs.out) == undisturbed
+    assert runs.complete() == undisturbed
 
 
 @pytest.mark.campaign
@@ -293,24 +317,12 @@ def refused(result: tuple[int, str], *words: str) -> None:
     assert len(said.splitlines()) == 1, said
 
 
-# Bytes a file may have: less than the images of a group, than the dataset, than the picture.
-ROOM = {"running.npz": 2_000, "small.nc": 30_000, "small.png": 40_000}
-
-
-@pytest.mark.parametrize(
-    "file",
-    ["small.nc", *(pytest.param(name, marks=pytest.mark.campaign) for name in ("running.npz", "small.png"))],
-)
-def test_a_file_that_finds_no_room_is_reported(runs: Runs, undisturbed: dict[str, bytes], file: str) -> None:
-    if file == "small.png":  # which is smaller than the dataset: that has to be there
-        assert runs.finish()[0] == 0
-        (runs.out / file).unlink()
-    refused(runs.finish("--quiet", room=ROOM[file]), file, "cannot be written: File too large")
+def test_a_file_that_finds_no_room_is_reported(runs: Runs, undisturbed: dict[str, bytes]) -> None:
+    """The dataset; a disk that is full for any other file is below."""
+    refused(runs.finish("--quiet", room=30_000), "small.nc", "cannot be written: File too large")
     Watch(runs.out, undisturbed).look()
     assert not list(runs.out.rglob(".*"))
-    code, said = runs.finish()
-    assert code == 0, said
-    assert contents(runs.out) == undisturbed
+    assert runs.complete() == undisturbed
 
 
 @pytest.mark.campaign
@@ -360,12 +372,9 @@ def test_a_read_only_folder_is_reported(runs: Runs, undisturbed: dict[str, bytes
         runs.out = folder / "out"
     refused(runs.finish("--quiet", unprivileged=True), str(folder), "Permission denied")
     folder.chmod(0o755)
-    code, said = runs.finish(unprivileged=True)
-    assert code == 0, said
-    assert contents(runs.out) == undisturbed
+    assert runs.complete(unprivileged=True) == undisturbed
 
 
-@pytest.mark.campaign
 def test_two_processes_at_once(runs: Runs, undisturbed: dict[str, bytes]) -> None:
     watch = Watch(runs.out, undisturbed)
     now = Moments(watch).kernel
@@ -374,47 +383,12 @@ def test_two_processes_at_once(runs: Runs, undisturbed: dict[str, bytes]) -> Non
         assert first.is_alive()
         watch.look()
     os.kill(first.pid, signal.SIGSTOP)  # at work for as long as it takes
-    refused(runs.finish("--quiet"), f"{runs.out / 'small'}: another run is at work there")
-    refused(runs.finish("--quiet", "--fresh"), "another run is at work there")
+    for arguments in ((), ("--fresh",)):
+        refused(runs.finish("--quiet", *arguments), f"{runs.out / 'small'}: another run is at work there")
+    assert runs.finish("--quiet", "--set", "name=other", "--set", "t_end=5") == (0, "")
+    for left in runs.out.glob("other*"):
+        left.unlink()
     os.kill(first.pid, signal.SIGCONT)
     first.join(60)
     assert first.exitcode == 0, first.log.read_text()
     assert contents(runs.out) == undisturbed
-
-
-VARIANT = """\
-name: small
-units: SI
-gravity: 9.81
-body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
-friction: {law: coulomb, mu: [0.2, 0.5], regularisation: tanh, speed: 0.02, sigma: [5.0e-5, 1.0e-4]}
-start: {roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 4, 5], slip1: 0.05}
-integrator: {t_end: 12}
-verify: 0.3
-"""
-
-
-@pytest.mark.parametrize(
-    "moments",
-    [("kernel", "dataset"), pytest.param(("kernel", "checkpoint", "tile") * 4, marks=pytest.mark.campaign)],
-    ids=["some", "many"],
-)
-def test_a_variant_killed_and_resumed(tmp_path: Path, moments: tuple[str, ...]) -> None:
-    """Any body and any law of friction, bit for bit as in a run that nothing happened to."""
-    config = tmp_path / "small.yaml"
-    config.write_text(VARIANT, encoding="utf-8")
-    calm, runs = Runs(config, tmp_path / "calm"), Runs(config, tmp_path / "out")
-    code, said = calm.finish()
-    assert code == 0, said
-    undisturbed = contents(calm.out)
-    killed = 0
-    for moment in moments:
-        process = strike(runs, undisturbed, moment, 0.0, signal.SIGKILL)
-        killed += process is not None and process.exitcode == -signal.SIGKILL
-    assert killed >= len(moments) / 2
-    code, said = runs.finish()
-    assert code == 0, said
-    assert contents(runs.out) == undisturbed
-    values = xr.load_dataset(runs.out / "small.nc")
-    assert "coulomb" in values.attrs["config"]
-    assert (values["reversals"].values > 0).any()

@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.runs import Stop, same_numbers
+from support.cli import invoke
+from support.runs import in_sittings, same_numbers
 
 import sweep
 from sweep import ConfigError
-from sweep.cli import main
 from sweep.engine import local
 from sweep.engine.cluster import connected
 from sweep.engine.local import Done
 from sweep.engine.refinement import UNKNOWN, missing, sources
-from sweep.results.dataset import STATUSES, VARIABLES
+from sweep.results.dataset import STATUSES
 
 Write = Callable[..., Path]
 
@@ -57,44 +56,35 @@ def maps(draw: Any, axes: int, most: int) -> tuple[tuple[int, ...], int, np.ndar
 directions = st.floats(-1, 1).filter(lambda x: abs(x) > 1e-3)
 
 
-@settings(max_examples=80)
-@given(maps(2, 60), directions, directions)
-def test_half_planes(case: tuple[tuple[int, ...], int, np.ndarray], x: float, y: float) -> None:
-    shape, depth, through = case
-    full = (np.tensordot([x, y], lattice(shape) - through[:, None, None], 1) > 0).astype(np.int32)
-    inferred, _ = refine(full, depth)
-    np.testing.assert_array_equal(inferred, full)
+@settings(max_examples=60)
+@pytest.mark.parametrize(("axes", "most"), [(2, 60), (3, 17)])
+@given(st.data(), st.lists(directions, min_size=3, max_size=3))
+def test_half_spaces(axes: int, most: int, data: Any, normal: list[float]) -> None:
+    shape, depth, through = data.draw(maps(axes, most))
+    away = lattice(shape) - np.expand_dims(through, tuple(range(1, axes + 1)))
+    full = (np.tensordot(normal[:axes], away, 1) > 0).astype(np.int32)
+    np.testing.assert_array_equal(refine(full, depth)[0], full)
 
 
-@given(maps(2, 60), st.floats(1.01, 3))
-def test_discs_wider_than_the_largest_blocks(case: tuple[tuple[int, ...], int, np.ndarray], radius: float) -> None:
-    shape, depth, centre = case
-    distance = np.linalg.norm(lattice(shape) - centre[:, None, None], axis=0) - radius * 2**depth
+@settings(max_examples=60)
+@pytest.mark.parametrize(("axes", "most", "off"), [(2, 60, 0.5), (3, 17, 0.75)])
+@given(st.data(), st.floats(1.01, 2))
+def test_balls_wider_than_the_largest_patches(axes: int, most: int, off: float, data: Any, radius: float) -> None:
+    shape, depth, centre = data.draw(maps(axes, most))
+    away = lattice(shape) - np.expand_dims(centre, tuple(range(1, axes + 1)))
+    distance = np.linalg.norm(away, axis=0) - radius * 2**depth
     full = np.where(distance < 0, 7, 3)
-    inferred, _ = refine(full, depth)
     # Between two nodes outside the line may come in by 1/8 of its curvature times their distance squared.
-    assert (abs(distance[inferred != full]) < 0.5).all()
+    assert (abs(distance[refine(full, depth)[0] != full]) < off).all()
 
 
 @given(st.integers(1, 4), st.lists(st.integers(1, 40), min_size=1, max_size=5))
-def test_stretches_longer_than_the_largest_blocks(depth: int, lengths: list[int]) -> None:
+def test_stretches_longer_than_the_largest_patches(depth: int, lengths: list[int]) -> None:
     full = np.repeat(np.arange(len(lengths)), [2**depth + n for n in lengths])
     inferred, simulated = refine(full, depth)
     np.testing.assert_array_equal(inferred, full)
     # Each change is found by halving: a node a level.
     assert simulated.sum() <= len(full) / 2**depth + 2 + (len(lengths) - 1) * (2 * depth + 1)
-
-
-@settings(max_examples=30)
-@given(maps(3, 17), directions, directions, st.floats(1.01, 2))
-def test_three_axes(case: tuple[tuple[int, ...], int, np.ndarray], x: float, y: float, radius: float) -> None:
-    shape, depth, place = case
-    away = lattice(shape) - place[:, None, None, None]
-    half = (np.tensordot([x, y, 1.0], away, 1) > 0).astype(np.int32)
-    np.testing.assert_array_equal(refine(half, depth)[0], half)
-    distance = np.linalg.norm(away, axis=0) - radius * 2**depth
-    ball = (distance < 0).astype(np.int32)
-    assert (abs(distance[refine(ball, depth)[0] != ball]) < 0.75).all()
 
 
 @settings(max_examples=30)
@@ -130,7 +120,7 @@ def test_one_outcome_is_known_from_the_coarse_nodes() -> None:
     assert simulated[-1, ::16].all()
 
 
-def test_a_change_that_shows_late_halves_the_blocks_it_reaches() -> None:
+def test_a_change_that_shows_late_halves_the_patches_it_reaches() -> None:
     # A finger that no coarse node sees but where it starts.
     full = np.zeros((65, 65), np.int32)
     full[16:19, 5:] = 1
@@ -176,9 +166,27 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def counted(patch: pytest.MonkeyPatch) -> Counter[int]:
+    """How often each tile is simulated from now on."""
+    ran, run_batch = Counter[int](), local.run_batch
+
+    def count(*arguments: Any, **options: Any) -> Iterator[Done]:
+        for done in run_batch(*arguments, **options):
+            ran[done.tile] += 1
+            yield done
+
+    patch.setattr(local, "run_batch", count)
+    return ran
+
+
 @pytest.fixture(scope="module")
 def refined(file: Path) -> xr.Dataset:
-    return sweep.run(file)
+    with pytest.MonkeyPatch.context() as patch:
+        ran = counted(patch)
+        found = sweep.run(file)
+    assert len(ran) > 1
+    assert set(ran.values()) == {1}
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -225,24 +233,10 @@ def test_lists_and_short_ranges_are_simulated_as_they_are(write: Write) -> None:
 def test_resumes_and_recomputes_nothing(
     file: Path, refined: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ran = Counter[int]()
-    run_batch = local.run_batch
-
-    def counted(*arguments: Any, **options: Any) -> Iterator[Done]:
-        for done in run_batch(*arguments, **options):
-            ran[done.tile] += 1
-            yield done
-
-    monkeypatch.setattr(local, "run_batch", counted)
+    ran = counted(monkeypatch)
     monkeypatch.setattr(local, "BATCH", 20)
     monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: 20)  # noqa: ARG005
-    interruptions = 0
-    while True:
-        try:
-            result = sweep.run(file, tmp_path / "out", reporter=(last := Stop(3)))
-            break
-        except KeyboardInterrupt:
-            interruptions += 1
+    result, interruptions, last = in_sittings(3, file, tmp_path / "out")
     assert interruptions > 3
     assert len(ran) > 5
     assert set(ran.values()) == {1}
@@ -253,12 +247,11 @@ def test_resumes_and_recomputes_nothing(
 
 
 def test_command_tells_the_share(file: Path, refined: xr.Dataset, tmp_path: Path) -> None:
-    result = CliRunner().invoke(main, ["run", str(file), "--output", str(tmp_path / "out")], catch_exceptions=False)
+    result = invoke("run", file, "--output", tmp_path / "out")
     assert result.exit_code == 0
     assert f"simulated: {refined.attrs['simulated_share']:.1%} of the cells" in result.stdout
     same_numbers(xr.load_dataset(tmp_path / "out" / "map.nc"), refined)
-    status = ["plot", str(tmp_path / "out" / "map.nc"), "--var", "inferred"]
-    assert CliRunner().invoke(main, status, catch_exceptions=False).exit_code == 0
+    assert invoke("plot", tmp_path / "out" / "map.nc", "--var", "inferred").exit_code == 0
 
 
 def test_in_other_processes(file: Path, refined: xr.Dataset) -> None:
@@ -289,10 +282,3 @@ def test_what_cannot_be_refined(text: str, place: str, said: str, write: Write, 
         sweep.load_config(write(text))
     assert f"small.yaml:{place}: " in str(error.value)
     assert said in str(error.value)
-
-
-def test_the_refinement_is_part_of_the_fingerprint(file: Path) -> None:
-    configs = [sweep.load_config(file, {"refine": depth}) for depth in (0, 1, 2)]
-    assert len({config.fingerprint() for config in configs}) == 3
-    assert sweep.load_config(file).refine == 2
-    assert "inferred" in VARIABLES

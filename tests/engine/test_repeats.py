@@ -22,6 +22,7 @@ from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, TIME_LIMIT, TOPPLED
 
 Write = Callable[..., Path]
+Cells = Callable[..., xr.Dataset]
 
 THIN = {"a": 50.0, "b": 1.01, "c": 1.0, "delta": 0.5, "mu": 200.0, "n0": 0.05}
 """A body whose normal force rises to hundreds for a moment; with too long a step it seems to be a paradox."""
@@ -43,7 +44,7 @@ MIXED = (*ENDS.values(), MISSES, THIN, {}, {"n0": 0.02}, ENDS[TOPPLED] | {"n0": 
 
 
 @pytest.fixture
-def cells(tmp_path: Path) -> Callable[..., xr.Dataset]:
+def cells(tmp_path: Path) -> Cells:
     """Runs cells given by their parameters, along the dimension `case`."""
 
     def run(bodies: Iterable[Mapping[str, float]], output: Path | None = None, **settings: Any) -> xr.Dataset:
@@ -57,7 +58,7 @@ def cells(tmp_path: Path) -> Callable[..., xr.Dataset]:
 
 
 @pytest.mark.parametrize("method", ["adams", "dopri5"])
-def test_true_failures_have_their_time(cells: Callable[..., xr.Dataset], method: str) -> None:
+def test_true_failures_have_their_time(cells: Cells, method: str) -> None:
     found = cells(ENDS.values(), method=method, t_end=50.0)
     expected = [newton.end(**end, t_end=50.0)[0] for end in ENDS.values()]
     assert found.status.values.tolist() == list(ENDS)
@@ -65,7 +66,7 @@ def test_true_failures_have_their_time(cells: Callable[..., xr.Dataset], method:
 
 
 @pytest.mark.parametrize("method", ["adams", "dopri5"])
-def test_a_false_paradox_is_gone_on_from(cells: Callable[..., xr.Dataset], method: str) -> None:
+def test_a_false_paradox_is_gone_on_from(cells: Cells, method: str) -> None:
     found = cells([THIN], method=method, t_end=2.5)
     expected = adaptive.spin(columns(**THIN), 2.5)
     assert (int(found.status[0]), float(found.t_stop[0])) == (TIME_LIMIT, 2.5)
@@ -73,7 +74,7 @@ def test_a_false_paradox_is_gone_on_from(cells: Callable[..., xr.Dataset], metho
     assert float(found.energy_error[0]) < 1e-4
 
 
-def test_a_false_paradox_at_strong_friction(cells: Callable[..., xr.Dataset]) -> None:
+def test_a_false_paradox_at_strong_friction(cells: Cells) -> None:
     found = cells([STIFF], method="adams", t_end=14.5)
     assert (int(found.status[0]), float(found.t_stop[0])) == (TIME_LIMIT, 14.5)
     assert float(found.spin_final[0]) == pytest.approx(adaptive.spin(columns(**STIFF), 14.5, "Radau"), abs=1e-7)
@@ -84,16 +85,12 @@ VIOLENT = {"b": 3.0, "mu": 200.0, "n0": 3.0, "x0": 5.0, "y0": 0.01}
 
 
 @pytest.mark.parametrize("method", ["adams", "dopri5"])
-def test_a_failure_is_confirmed_however_long_the_whole_run_would_be(
-    cells: Callable[..., xr.Dataset], method: str
-) -> None:
+def test_a_failure_is_confirmed_however_long_the_whole_run_would_be(cells: Cells, method: str) -> None:
     found = cells([VIOLENT], method=method, t_end=400.0)
     assert (int(found.status[0]), float(found.t_stop[0])) == (LIFT_OFF, 0.0)
 
 
-def test_failures_on_the_way_of_a_run_that_is_too_long(
-    cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_failures_on_the_way_of_a_run_that_is_too_long(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is repeated to where it failed; a false one is not called a failure of the body."""
     expected = cells(ENDS.values(), method="dopri5", t_end=50.0)
     monkeypatch.setattr(repeats, "MOST_STEPS", 2 * 50.0 / float(expected.step.max()))
@@ -107,9 +104,7 @@ def test_failures_on_the_way_of_a_run_that_is_too_long(
     assert float(false.t_stop[0]) < 100.0
 
 
-def test_without_a_second_look_both_would_be_paradoxes(
-    cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_second_look_both_would_be_paradoxes(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local, "repeat_all", lambda *_: None)
     found = cells([THIN, STIFF], method="adams", t_end=14.5)
     assert found.status.values.tolist() == [PARADOX, PARADOX]
@@ -126,7 +121,7 @@ def lengthen(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
     monkeypatch.setattr("sweep.engine.plan.methods.automatic_step", long_step)
 
 
-def test_one_run_is_not_believed(cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_run_is_not_believed(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a run has met, the next one has to meet the same."""
     claims = iter([PARADOX, LIFT_OFF, TOPPLED] * 3)
 
@@ -140,7 +135,7 @@ def test_one_run_is_not_believed(cells: Callable[..., xr.Dataset], monkeypatch: 
     assert len(list(claims)) < 8  # more than one was made
 
 
-def test_a_fixed_step_stays(cells: Callable[..., xr.Dataset]) -> None:
+def test_a_fixed_step_stays(cells: Cells) -> None:
     found = cells([MISSES, THIN, ENDS[TOPPLED]], method="adams", step=0.2, t_end=100.0)
     np.testing.assert_allclose(found.step, 0.2, rtol=2e-3)
     assert set(found.step_rule.values.tolist()) == {FIXED}
@@ -148,7 +143,7 @@ def test_a_fixed_step_stays(cells: Callable[..., xr.Dataset]) -> None:
     assert float(found.t_stop[2]) == pytest.approx(1.9815107, abs=1e-3)  # as near as its step allows
 
 
-def test_a_true_failure_at_a_fixed_step(cells: Callable[..., xr.Dataset]) -> None:
+def test_a_true_failure_at_a_fixed_step(cells: Cells) -> None:
     found = cells(ENDS.values(), method="dopri5", step=5e-5, t_end=50.0)
     automatic = cells(ENDS.values(), method="dopri5", t_end=50.0)
     assert found.status.values.tolist() == list(ENDS)
@@ -159,15 +154,13 @@ def test_a_true_failure_at_a_fixed_step(cells: Callable[..., xr.Dataset]) -> Non
 @pytest.mark.parametrize(
     ("body", "step"), [({"b": 2.8, "mu": 100.0, "n0": 0.02}, 0.4), ({"b": 2.0, "mu": 100.0, "n0": 0.1}, 0.2)]
 )
-def test_no_energy_error_above_a_hundredth_without_a_failure(
-    cells: Callable[..., xr.Dataset], body: dict[str, float], step: float
-) -> None:
+def test_no_energy_error_above_a_hundredth_without_a_failure(cells: Cells, body: dict[str, float], step: float) -> None:
     found = cells([body], method="adams", step=step, t_end=400.0)
     assert float(found.energy_error[0]) > 0.01
     assert (int(found.status[0]), float(found.t_stop[0])) == (DIVERGED, 400.0)
 
 
-def test_a_missed_tolerance_is_repeated(cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missed_tolerance_is_repeated(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = {"method": "adams", "t_end": 400.0, "stop_when_settled": False}
     lengthen(monkeypatch, 4)
     repeated = cells([MISSES], **settings)
@@ -182,9 +175,7 @@ def test_a_missed_tolerance_is_repeated(cells: Callable[..., xr.Dataset], monkey
     assert unmeasured.spin_final == once.spin_final  # nothing says that it missed
 
 
-def test_a_tolerance_that_no_repeat_keeps_is_told(
-    cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_tolerance_that_no_repeat_keeps_is_told(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(repeats, "ROUNDS", 1)
     lengthen(monkeypatch, 4)
     found = cells([MISSES], method="adams", t_end=400.0, tolerance=1e-13)
@@ -194,7 +185,7 @@ def test_a_tolerance_that_no_repeat_keeps_is_told(
 @pytest.mark.parametrize("method", ["adams", "auto"])
 @pytest.mark.parametrize("size", [1, 3])
 def test_tiles_and_threads_do_not_touch_the_numbers(
-    cells: Callable[..., xr.Dataset], monkeypatch: pytest.MonkeyPatch, size: int, method: str
+    cells: Cells, monkeypatch: pytest.MonkeyPatch, size: int, method: str
 ) -> None:
     settings = {"method": method, "t_end": 30.0, "tolerance": 1e-9}
     whole = cells(MIXED, **settings)
@@ -222,9 +213,7 @@ class Stops(Reporter):
 
 
 @pytest.mark.usefixtures("short_chunks")
-def test_an_interrupt_while_cells_are_repeated(
-    cells: Callable[..., xr.Dataset], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupt_while_cells_are_repeated(cells: Cells, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = {"method": "adams", "t_end": 30.0}
     whole, stops, repeat_all = cells(MIXED, **settings), Stops(), repeats.repeat_all
 
@@ -245,7 +234,7 @@ def test_an_interrupt_while_cells_are_repeated(
     assert max(failed) == failed[-1] == int(np.isin(whole.status, list(ENDS)).sum())
 
 
-def test_a_trajectory_is_that_of_the_run(cells: Callable[..., xr.Dataset], write: Write) -> None:
+def test_a_trajectory_is_that_of_the_run(cells: Cells, write: Write) -> None:
     for body in (ENDS[PARADOX], THIN):
         found = cells([body], method="dopri5", t_end=3.0)
         series = sweep.trajectory(sweep.load_config(write("integrator: {t_end: 3, method: dopri5}\n"), STANDARD | body))
@@ -257,7 +246,7 @@ def test_a_trajectory_is_that_of_the_run(cells: Callable[..., xr.Dataset], write
 
 
 @pytest.mark.parametrize("method", ["adams", pytest.param("dopri5", marks=pytest.mark.campaign)])
-def test_300_wide_cells_end_as_they_truly_do(cells: Callable[..., xr.Dataset], method: str) -> None:
+def test_300_wide_cells_end_as_they_truly_do(cells: Cells, method: str) -> None:
     with (ROOT / "data" / "reference_wide.csv").open(encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
     bodies = [{name: float(row[name]) for name in STANDARD} for row in rows]

@@ -1,28 +1,18 @@
-"""What every store promises; a new store is one more line in `STORES`."""
+"""What every store promises."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import multiprocessing
+import os
+import signal
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-import sweep
-from sweep.engine import local
-from sweep.engine.local import Done
-from sweep.results.checkpoint import Checkpoint
 from sweep.results.identity import Identity
-from sweep.results.memory import Memory
 from sweep.results.store import Running, Store
-
-IDENTITY = Identity("name: x", "0" * 16, "1" * 16, "sweep 0")
-
-STORES: dict[str, Callable[[Path], Store]] = {
-    "checkpoint": lambda folder: Checkpoint(folder / "x.checkpoint", IDENTITY, pytest.fail),
-    "memory": lambda folder: Memory(),  # noqa: ARG005
-}
+from sweep.results.stores import STORES
 
 TILE = {
     "status": np.array([1, 2], np.int8),
@@ -33,68 +23,61 @@ TILE = {
 RUNNING = Running([4, 2], {"dopri5": np.arange(6.0).reshape(2, 3)}, 1.5)
 
 
+def opened(name: str, folder: Path) -> Store:
+    return STORES[name](folder / "x", Identity("name: x", "0" * 16, "1" * 16, "sweep 0"), pytest.fail)
+
+
 @pytest.fixture(params=STORES)
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
-    return STORES[request.param](tmp_path)
+    return opened(request.param, tmp_path)
 
 
-def test_a_new_store_is_empty(store: Store) -> None:
+def same(found: dict[str, np.ndarray], saved: dict[str, np.ndarray]) -> None:
+    """Bit for bit."""
+    assert {n: (v.dtype, v.shape, v.tobytes()) for n, v in found.items()} == {
+        n: (v.dtype, v.shape, v.tobytes()) for n, v in saved.items()
+    }
+
+
+def same_running(found: Running | None, seconds: float) -> None:
+    assert found is not None
+    assert (found.tiles, found.seconds) == (RUNNING.tiles, seconds)
+    same(found.tables, RUNNING.tables)
+
+
+def test_a_tile_comes_back_as_it_was_saved_last(store: Store) -> None:
     assert not store.done
-    assert store.load_running() is None
-
-
-def test_a_saved_tile_is_done_and_comes_back_bit_for_bit(store: Store) -> None:
+    store.save(7, {"seconds": np.array(2.0)})
     store.save(7, TILE)
     assert set(store.done) == {7}
-    found = store.load(7)
-    assert found.keys() == TILE.keys()
-    for name, values in TILE.items():
-        assert (found[name].dtype, found[name].shape) == (values.dtype, values.shape)
-        assert found[name].tobytes() == values.tobytes()
+    same(store.load(7), TILE)
 
 
-def test_a_tile_saved_again_is_replaced(store: Store) -> None:
-    store.save(0, TILE)
-    store.save(0, {"seconds": np.array(2.0)})
-    assert store.load(0) == {"seconds": 2.0}
-
-
-def test_running_tiles_come_back_or_are_forgotten(store: Store) -> None:
+def test_running_tiles_come_back_until_one_is_done(store: Store) -> None:
+    assert store.load_running() is None
     store.save_running(RUNNING)
     store.save_running(RUNNING._replace(seconds=2.5))
-    found = store.load_running()
-    if found is not None:
-        assert (found.tiles, found.seconds) == ([4, 2], 2.5)
-        assert found.tables["dopri5"].tobytes() == RUNNING.tables["dopri5"].tobytes()
+    if store.lasting:
+        same_running(store.load_running(), 2.5)
     store.save(2, TILE)
     assert store.load_running() is None
 
 
-def test_a_checkpoint_outlives_its_process(tmp_path: Path) -> None:
-    first = STORES["checkpoint"](tmp_path)
-    first.save(7, TILE)
-    first.save_running(RUNNING)
-    again = STORES["checkpoint"](tmp_path)
-    assert set(again.done) == {7}
-    assert again.load(7)["spin_final"].tobytes() == TILE["spin_final"].tobytes()
-    assert again.load_running() is not None
+def save_and_die(name: str, folder: Path) -> None:
+    store = opened(name, folder)
+    store.save(7, TILE)
+    store.save_running(RUNNING)
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_refined_run_in_memory_simulates_no_tile_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "map.yaml"
-    path.write_text(
-        "body: {b: {start: 1.5, stop: 8, num: 14}}\nfriction: {mu: {start: 20, stop: 120, num: 11}}\n"
-        "integrator: {t_end: 1000}\nrefine: 2\n",
-        encoding="utf-8",
-    )
-    run_batch, ran = local.run_batch, list[int]()
-
-    def counted(*arguments: Any, **options: Any) -> Iterator[Done]:
-        for done in run_batch(*arguments, **options):
-            ran.append(done.tile)
-            yield done
-
-    monkeypatch.setattr(local, "run_batch", counted)
-    sweep.run(path)
-    assert len(ran) > 1
-    assert sorted(ran) == list(range(len(ran)))
+@pytest.mark.parametrize("name", STORES)
+def test_a_lasting_store_outlives_its_process(name: str, tmp_path: Path) -> None:
+    process = multiprocessing.get_context("spawn").Process(target=save_and_die, args=(name, tmp_path))
+    process.start()
+    process.join(60)
+    assert process.exitcode == -signal.SIGKILL
+    again = opened(name, tmp_path)
+    assert set(again.done) == ({7} if again.lasting else set())
+    if again.lasting:
+        same(again.load(7), TILE)
+        same_running(again.load_running(), 1.5)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import xarray as xr
 
+import sweep
 from sweep.engine.reporter import Progress, Reporter
 
 
@@ -21,6 +24,17 @@ class Stop(Reporter):
 
     def note(self, message: str) -> None:
         self.notes.append(message)
+
+
+def in_sittings(chunks: int, config: Path, output: Path) -> tuple[xr.Dataset, int, Stop]:
+    """A run that is interrupted after so many chunks and resumed, until it ends: how often, and what was said last."""
+    interruptions = 0
+    while True:
+        reporter = Stop(chunks)
+        try:
+            return sweep.run(config, output, reporter=reporter), interruptions, reporter
+        except KeyboardInterrupt:
+            interruptions += 1
 
 
 def same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:

@@ -46,6 +46,10 @@ class Lyapunov(Measurement):
     }  # fmt: skip
 
     @property
+    def cost(self) -> float:
+        return 3.0
+
+    @property
     def quantities(self) -> tuple[str, ...]:
         return ("bin_width", "bin_looks", "bin_growth", "full_bins", *self._bins)
 

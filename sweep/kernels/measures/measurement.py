@@ -102,6 +102,11 @@ class Measurement:
         return "=".join([self.name, *map(str, vars(self).values())])
 
     @property
+    def cost(self) -> float:
+        """Time of a run with it, relative to one without (measured by `scripts/run_costs.py`); 1 if it hardly shows."""
+        return 1.0
+
+    @property
     def in_kernel(self) -> bool:
         """True if a kernel with it differs from one without: it has a quantity, or a hook in the loop."""
         hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_look")

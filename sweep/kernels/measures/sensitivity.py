@@ -4,7 +4,7 @@ Where the motion is chaotic, or a spin comes close to a critical one, difference
 reverses, and no integration knows the count.  The second run costs as much as the first.  Following the linearised flow
 instead would cost more: every right-hand side once again, and its derivative.
 
-The kernel has nothing to do for it; the engine makes the runs (`sweep.engine.sensitivity`).
+The kernel has nothing to do for it; the engine makes the runs (`sweep.engine.checks`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from dataclasses import dataclass
 
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import COUNT
+
+SHORTER = 0.8
+"""Ratio of the steps of further runs to those of the first, so that a count that depends on the step shows too."""
 
 
 @dataclass(frozen=True)
@@ -31,3 +34,7 @@ class Sensitivity(Measurement):
     bounds = (1, 100)
     count: int = 1
     """K, the number of runs beside the first."""
+
+    @property
+    def cost(self) -> float:
+        return 1 + self.count / SHORTER

@@ -1,0 +1,54 @@
+"""What a dry run promises: every run of every cell is counted, and compiling."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+from support import STANDARD
+
+import sweep
+from sweep.engine.estimate import estimate
+from sweep.jit import Cached
+from sweep.kernels.measures import MEASURES
+
+
+def told(what: str, **settings: Any) -> float:
+    """Seconds that are told for `what`."""
+    cells = {"body": {"b": [2.0, 3.0]}, "friction": {"mu": STANDARD["mu"]}, "start": {"n0": 0.05}}
+    said = estimate(sweep.load_config(cells | {"integrator": {"t_end": 3e6, "method": "dopri5"}, **settings}))
+    found = re.search(rf"([\d.e+]+) to {what}", said)
+    assert found
+    return float(found[1])
+
+
+@pytest.mark.parametrize("name", MEASURES)
+def test_every_measurement_is_counted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    measure = [*MEASURES[name].needs, name]
+    for each in measure:
+        monkeypatch.setattr(MEASURES[each], "cost", 1.0)
+    alone = told("compute", measure=measure)
+    monkeypatch.setattr(MEASURES[name], "cost", 10.0)
+    assert told("compute", measure=measure) == pytest.approx(10 * alone, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "runs"),
+    [
+        ({"measure": ["reversals", {"sensitivity": 2}]}, 1 + 2 / 0.8),
+        ({"verify": 1}, 1 + 2),
+        ({"measure": ["reversals", "lyapunov"]}, 3),
+        ({"body": {"b": [2.0, 3.0], "offset": 0.1}}, 1.4),
+    ],
+    ids=["sensitivity", "verify", "lyapunov", "general"],
+)
+def test_what_runs_again_or_longer_is_counted(settings: dict[str, Any], runs: float) -> None:
+    assert told("compute", **settings) == pytest.approx(runs * told("compute", measure=["reversals"]), rel=0.1)
+
+
+def test_compiling_is_counted_where_the_cache_lacks_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Cached, "is_missing", lambda self: True)  # noqa: ARG005
+    assert told("compile") > 5
+    monkeypatch.setattr(Cached, "is_missing", lambda self: False)  # noqa: ARG005
+    assert told("compile") == 0
