@@ -6,7 +6,6 @@ one friction and one start, from t = 0 to T.  Compared are
 * `sweep.run` with dopri5 and with the method chosen for each cell, with all default measurements and with counts alone,
 * heyoka.py: Taylor series in batches of the machine's SIMD width, in its ensemble mode and shared out to two threads,
   with the equations as a user would write them; with events that count crossings of zero; and with our algebra,
-* numbalsoda: compiled LSODA and DOP853 on the compiled right-hand side, in two threads,
 * diffrax: jitted and vmapped, adaptive, on XLA's own threads,
 * SciPy: DOP853 and LSODA on the compiled right-hand side, in one process.
 
@@ -21,7 +20,6 @@ A reversal in `sweep` is a change of sign of the ripple-free spin averaged over 
 see the spin itself, which may cross zero several times in one reversal: the table tells how many counts agree.
 
     pip install -e .[peers]
-    pip install numbalsoda        # optional: from source, needs cmake, a C++ and a Fortran compiler
     python scripts/peers.py [--mu 60 200 1000] [--bodies 1024] [--repeats 5]
 """
 
@@ -32,7 +30,6 @@ import copy
 import math
 import os
 import statistics
-import sys
 import tempfile
 import threading
 import time
@@ -375,49 +372,6 @@ def scipy_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
         yield "SciPy, 1 process", f"{method} rtol={rtol:g}", partial(scipy_run, method, rtol, rtol * RTOL_TO_ATOL)
 
 
-# --- numbalsoda -------------------------------------------------------------------------------
-
-
-def numbalsoda_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
-    import numbalsoda
-
-    for method, rtol in ((numbalsoda.dop853, DOP853_TOLERANCE), (numbalsoda.lsoda, LSODA_TOLERANCE)):
-        yield f"numbalsoda {method.__name__}", f"rtol={rtol:g}", numbalsoda_run(method, rtol)
-
-
-@cache
-def numbalsoda_rhs() -> Any:
-    import numbalsoda
-
-    rhs, constants_of, n_states, n_constants = MODEL.rhs, MODEL.constants, len(MODEL.states), count_constants()
-
-    @numba.cfunc(numbalsoda.lsoda_sig, error_model="numpy")
-    def callback(_t: float, y: Any, dy: Any, p: Any) -> None:
-        states, constants = numba.carray(y, (n_states,)), numba.carray(p, (n_constants,))
-        slopes, _ = rhs(to_fixed_tuple(states, n_states), constants_of(*to_fixed_tuple(constants, n_constants)))
-        for i in range(n_states):
-            dy[i] = slopes[i]
-
-    return callback
-
-
-def numbalsoda_run(method: Any, rtol: float) -> Callable[[Problem], Answer]:
-    times, address = np.array([0.0, T_END]), numbalsoda_rhs().address
-
-    @numba.njit(nogil=True)
-    def solve(y: Array, p: Array) -> Array:
-        result, success = method(address, y, times, p, rtol, rtol * RTOL_TO_ATOL, 10**8)
-        return result[-1] if success else np.full_like(y, np.nan)
-
-    def run(problem: Problem) -> Answer:
-        states, constants = problem.start()
-        begins, fixed = states.T.copy(), constants.T.copy()
-        ends = in_threads(lambda i: solve(begins[i], fixed[i]), range(problem.size))
-        return spin(np.array(ends).T, constants), None
-
-    return run
-
-
 # --- diffrax ----------------------------------------------------------------------------------
 
 
@@ -461,7 +415,6 @@ Tool = Callable[[], Iterator[tuple[str, str, Callable[[Problem], Answer]]]]
 TOOLS: dict[str, tuple[Tool, float]] = {
     "sweep": (our_entries, math.inf),
     "heyoka": (heyoka_entries, 1024),
-    "numbalsoda": (numbalsoda_entries, 128),
     "diffrax": (diffrax_entries, 128),
     "scipy": (scipy_entries, 2),
 }
@@ -544,14 +497,6 @@ def agreement(entry: Entry, counted: Entry) -> str:
     return f"{np.count_nonzero(same)}/{len(same)}"
 
 
-def keep_stdout() -> None:
-    """Keep standard output for Python: numbalsoda's Fortran prints there whenever it detects stiffness."""
-    own = os.dup(sys.stdout.fileno())
-    with open(os.devnull, "w") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())
-    sys.stdout = os.fdopen(own, "w", buffering=1)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--mu", type=float, nargs="+", default=[60.0, 200.0, 1000.0])
@@ -566,7 +511,6 @@ def main() -> None:
     if hasattr(os, "sched_setaffinity"):  # XLA cannot be limited to some of the processors otherwise.
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
     numba.set_num_threads(THREADS)
-    keep_stdout()
     for mu in options.mu:
         print(f"\nμ = {mu:g}, T = {T_END:g}, {options.bodies} bodies with b = 2 … 8")
         entries = prepare(Problem(mu, np.linspace(2.0, 8.0, options.bodies)))
