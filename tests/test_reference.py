@@ -1,6 +1,6 @@
-"""Reversal counts against another derivation of the equations and another integrator.
+"""Reversal counts and spins against another derivation of the equations, other integrators and more digits.
 
-`scripts/reference_counts.py` made `data/reference_counts.csv`; `data/README.md` says how.
+`scripts/reference_counts.py` and its neighbours made the tables; `data/README.md` says how.
 """
 
 from __future__ import annotations
@@ -9,19 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import ROOT
+from support import ROOT, kernels
 from support.kernels import default_measures
 
 import sweep
-from sweep.bench.reference import read_counts
+from sweep.bench.reference import Spins, read_counts, read_spins, spin_errors
 from sweep.bench.timing import LONGEST
 from sweep.report.direct import simulate
 
 
 def test_reversal_counts_agree_with_the_reference(tmp_path: Path) -> None:
-    table = ROOT / "data" / "reference_counts.csv"
-    names = table.read_text().splitlines()[0].split(",")
-    rows = dict(zip(names, np.loadtxt(table, delimiter=",", skiprows=1).T, strict=True))
+    rows = np.genfromtxt(ROOT / "data" / "reference_counts.csv", delimiter=",", names=True)
     inputs = ["a", "b", "delta", "mu", "n0", "x0", "y0"]
     cases = np.column_stack([rows[name] for name in inputs])
     np.savetxt(tmp_path / "cells.csv", cases, delimiter=",", header=",".join(inputs), comments="", fmt="%.17g")
@@ -42,10 +40,32 @@ def test_reversal_counts_agree_with_the_reference(tmp_path: Path) -> None:
      pytest.param("dopri5", 5, marks=pytest.mark.campaign)],
 )  # fmt: skip
 def test_firm_counts_of_500_random_cells_agree(method: str, every: int) -> None:
-    """The table of `scripts/reference_counts_500.py`; firm are counts that no round-off decides."""
+    """Firm are counts that no round-off decides."""
     reference = read_counts()
     sample = np.flatnonzero(reference.firm)[::every]
     assert len(sample) > 400 / every
     columns = {name: column[sample] for name, column in reference.columns.items()}
     ends = simulate(columns, LONGEST, method=method, measure=default_measures("slip"), settle=True)
     np.testing.assert_array_equal(ends["reversals"], reference.reversals[sample])
+
+
+@pytest.mark.parametrize(
+    ("model", "step", "choice", "bodies"),
+    [
+        ("slip", 0.004, {"mu": 60.0}, 1),
+        ("slip", 0.004, {"x0": 2.0}, 1),
+        ("slip", 0.0005, {"mu": 1000.0}, 1),
+        ("noslip", 0.01, {}, 4),
+        ("effective", 0.005, {}, 8),
+        ("averaged", 0.05, {}, 8),
+    ],
+)
+def test_spins_at_400_agree_with_the_reference(model: str, step: float, choice: dict[str, float], bodies: int) -> None:
+    spins = read_spins()[model]
+    which = np.full(len(spins.spins), True)
+    for name, value in choice.items():
+        which &= spins.columns[name] == value
+    last = spins.select(which)
+    last = Spins(last.columns, last.times[-1:], last.spins[:, -1:])
+    assert (list(last.times), len(last.spins)) == ([400.0], bodies)
+    assert (spin_errors(kernels.kernel(model=model), last, np.full(bodies, step))[0] < 1e-10).all()
