@@ -94,7 +94,7 @@ import numpy as np
 
 from sweep.kernels.methods import METHODS
 
-METHODS["twin"] = replace(METHODS["dopri5"], name="twin")  # another method, before anybody has read the registry
+METHODS["twin"] = replace(METHODS["dopri5"], name="twin", code=9)  # before anybody has read the registry
 
 from sweep.bench import counts, hard, reference, report
 from sweep.bench.timing import Effort
@@ -244,6 +244,6 @@ def test_hard_cases_hold_and_a_planted_bug_fails_each(monkeypatch: pytest.Monkey
 
 
 def test_a_method_of_the_registry_runs_the_hard_cases(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, "twin", replace(METHODS["dopri5"], name="twin"))
+    monkeypatch.setitem(METHODS, "twin", replace(METHODS["dopri5"], name="twin", code=9))
     rows = list(hard.rows(hard.Case(["short"], standard(), 20.0)))
     assert [(row.source, row.holds) for row in rows] == [("dopri5", True), ("adams", True), ("twin", True)]
