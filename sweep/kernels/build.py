@@ -19,7 +19,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 
 import numpy as np
@@ -48,7 +48,7 @@ _POLL = 0.05
 """Time in seconds between two looks at the processes."""
 
 
-def build(kernels: Sequence[Kernel]) -> None:
+def build(kernels: Iterable[Kernel]) -> None:
     """Compile what the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
 
     What is missing after that, because a process failed or there is no folder for a cache, is compiled where it is
@@ -59,6 +59,7 @@ def build(kernels: Sequence[Kernel]) -> None:
     ModelError
         if a model that a user brings cannot be compiled.
     """
+    kernels = list(kernels)
     if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.is_compiled()]:
         with compiling():
             try_compiling(users[0])
