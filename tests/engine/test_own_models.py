@@ -178,10 +178,10 @@ def test_the_process_that_compiles_gets_the_text_of_the_file(folder: Path) -> No
     config = load_config(folder / "pendulum.yaml")
     (folder / "pendulum.py").unlink()
     origin, key = config.origin, config.equations.key
-    for piece in (("kernel", "dopri5", key, "reversals"), ("approach", key)):
+    for piece in (("kernel", "dopri5", key, "reversals"), ("approach", "dopri5", key)):
         with builder._start(piece, origin) as process:
             assert process.wait() == 0
-    with builder._start(("approach", key), replace(origin, text="1 / 0")) as process:
+    with builder._start(("approach", "dopri5", key), replace(origin, text="1 / 0")) as process:
         assert process.wait() != 0
 
 
