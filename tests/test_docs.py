@@ -97,7 +97,8 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     for path in (ROOT / "configs").glob("*.yaml"):
         small = _coarsen(yaml.load(path))
         small["integrator"] = {**small.get("integrator", {}), "t_end": 300}
-        small.pop("measure", None)
+        if path.stem != "celtic_stone":  # whose exponents a page draws
+            small.pop("measure", None)
         yaml.dump(small, tmp_path / "configs" / path.name)
     for path in (ROOT / "configs").glob("*.py"):
         shutil.copy(path, tmp_path / "configs")

@@ -50,9 +50,9 @@ def test_a_refusal_says_what_may_be_meant(command: str, write: Write) -> None:
 @pytest.mark.parametrize(
     ("text", "line", "said"),
     [
-        ("mu: 60\n", 1, "mu: unknown key (did you mean friction.mu?); allowed: name"),
+        ("mu: 60\n", 1, "mu: unknown key (did you mean friction.mu?); the keys here are name"),
         ("friction: {mu: 60}\nt_end: 3\n", 2, "t_end: unknown key (did you mean integrator.t_end?)"),
-        ("friction: {mu: 60, b: 3}\n", 1, "friction.b: unknown key (did you mean body.b?); allowed: law"),
+        ("friction: {mu: 60, b: 3}\n", 1, "friction.b: unknown key (did you mean body.b?); the keys here are law"),
         ("friction: {mu: 60}\nBody: {a: 9}\n", 2, "Body: unknown key (did you mean body?)"),
     ],
 )

@@ -18,7 +18,7 @@ import sweep
 from sweep.kernels.status import DIVERGED, SETTLED, TIME_LIMIT
 from sweep.plots import picture, scales
 from sweep.plots.hatches import outline
-from sweep.results.dataset import VARIABLES, described, numbers_along
+from sweep.results.dataset import VARIABLES, described
 from sweep.results.netcdf import write
 
 
@@ -345,7 +345,7 @@ def test_numbers_along_a_further_dimension_get_panels() -> None:
     times = np.random.default_rng(1).random((*dataset["reversals"].shape, 2))
     spec = VARIABLES["reversal_times"]
     more = dataset.assign(reversal_times=(("mu", "b", "n0", "reversal"), times, described(spec)))
-    more = more.assign_coords(numbers_along({"reversal_times": times.shape}))
+    more = more.assign_coords(reversal=[1, 2])
     assert len(maps(picture.plot(more, "reversal_times"))) == 2
 
 
