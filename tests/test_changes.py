@@ -151,9 +151,8 @@ assert found["reversals"].item() > 5
             "sweep/models/general/laws.py": [("LAWS: dict", SQUARE), ('        Law("none",', LAW)],
             "sweep/parameters.py": [
                 (
-                    '        Parameter("mu_static",',
-                    '        Parameter("fading", "friction", "1", "slip velocity of half the force", None, above=0),\n'
-                    '        Parameter("mu_static",',
+                    '        ("mu_static",',
+                    '        ("fading", "slip velocity of half the force", None, _SIZE),\n        ("mu_static",',
                 )
             ],
         },
