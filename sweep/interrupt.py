@@ -1,4 +1,4 @@
-"""What Ctrl-C does: one line and the end while a command starts; later, a stop where results are consistent.
+"""Handles Ctrl-C: one line and the end while a command starts; later, a stop where results are consistent.
 
 Python raises KeyboardInterrupt wherever the program happens to be.  Inside an import it prints a traceback; numpy
 turned one into a TypeError; in a lock of `concurrent.futures` it became "cannot release un-acquired lock", or left

@@ -88,7 +88,7 @@ def read_counts() -> Counts:
 
 
 def at_each(steps: list[Array], run: Callable[[Array, Array], Array]) -> Array:
-    """What `run` (bodies, steps) finds for all bodies at each of several steps, of shape (..., several, bodies).
+    """Tabulate what `run` (bodies, steps) finds for all bodies at several steps, of shape (..., several, bodies).
 
     Equal steps of a body, which occur where stability decides, are run once.
     """

@@ -1,4 +1,4 @@
-"""What a run would take, told from a sample of its cells before anything is computed."""
+"""Estimates what a run would take, from a sample of its cells, before anything is computed."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Part(Choice):
 
     @property
     def failed(self) -> Array:
-        """Whether each run failed."""
+        """Tell which runs failed."""
         return np.isin(self.status, FAILURES)
 
     def take(self, rows: Array) -> Part:
@@ -92,7 +92,7 @@ class Plan:
     bodies are in none."""
 
     def results(self) -> dict[str, Array]:
-        """What was simulated, by name, each over all cells, once all trajectories have ended."""
+        """Collect what was simulated, by name, each over all cells, once all trajectories have ended."""
         size = sum(grid.size for grid in self.grids)
         arrays: dict[str, Array] = {}
         for part in self.parts:

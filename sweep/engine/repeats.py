@@ -53,7 +53,7 @@ _AT_A_TIME = 64
 
 
 def unsound(part: Part) -> Array:
-    """Whether the energy balance is so wrong that no number of the run can be right, shape (cells,)."""
+    """Tell where the energy balance is so wrong that no number of the run can be right, shape (cells,)."""
     if "energy_error" not in part.kernel.measure:
         return np.zeros(len(part.images), bool)
     table = part.kernel.table(part.images)
@@ -104,7 +104,7 @@ def repeat_all(job: Plan, after_chunk: Callable[[], None] = lambda: None) -> Non
 
 
 def _fixed(part: Part) -> bool:
-    """Whether the configuration gives the step, which is then never changed: shorter ones only tell true failures."""
+    """Tell whether the configuration gives the step, which is then never changed: shorter ones tell true failures."""
     return part.config.integrator.step != "auto"
 
 
@@ -151,7 +151,7 @@ def _run(part: Part, most: Array, after_chunk: Callable[[], None]) -> None:
 
 @dataclass(frozen=True)
 class Met:
-    """What runs that failed have met, as the approach in short steps tells it."""
+    """Holds what runs that failed have met, as the approach in short steps tells it."""
 
     kind: Array
     """`LIFT_OFF`, `PARADOX`, `TOPPLED`, or `DIVERGED` where no step is short enough; `RUNNING` where a run has met
@@ -167,7 +167,7 @@ class Met:
         return Met(self.kind[rows], self.time[rows])
 
     def agrees(self, other: Met, within: float | Array) -> Array:
-        """Whether both have met the same failure, at times that differ by at most `within`, shape (cells,)."""
+        """Tell where both have met the same failure, at times that differ by at most `within`, shape (cells,)."""
         near = np.abs(self.time - other.time) <= within
         return np.asarray((self.kind != RUNNING) & (self.kind == other.kind) & near)
 
@@ -182,7 +182,7 @@ def _concluded(kernel: Kernel, images: Array, met: Met, true: Array) -> Array:
 
 
 def _meet(part: Part, halvings: int, after_chunk: Callable[[], None]) -> Met:
-    """What the failed cells of `part`, which were run with steps halved so many times, have really met."""
+    """Find what the failed cells of `part`, which were run with steps halved so many times, have really met."""
     met = Met.nothing(len(part.images))
     rows = np.flatnonzero(part.failed)
     if not len(rows):

@@ -1,4 +1,4 @@
-"""What a run tells its user while it goes on."""
+"""Carries what a run tells its user while it goes on."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def run(
 def _earlier(
     config: Config, found: Identity | None, identity: Identity, files: RunFiles, rerun: str | None
 ) -> Earlier | None:
-    """What the dataset that is there, or that was there when an interrupted run began, has of the cells of `config`.
+    """Read what an earlier dataset, there now or when an interrupted run began, has of the cells of `config`.
 
     `found` is the identity of the one that is there.
 
@@ -128,7 +128,7 @@ def _compute(
 
 
 def _kept(result: Whole, store: Store, running: Running | None) -> str:
-    """What an earlier run left."""
+    """Find what an earlier run left."""
     grid = Grid.of(result.simulated())
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
     more = f", {sum(map(len, running.tables.values()))} under way" if running else ""

@@ -1,4 +1,4 @@
-"""What the visitor handles to choose the cells whose trajectories are drawn, and their parameters."""
+"""Lets the visitor choose the cells whose trajectories are drawn, and their parameters."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class CellControls:
 
     @property
     def keeps(self) -> bool:
-        """Whether a click adds a cell rather than replacing those drawn."""
+        """True if a click adds a cell rather than replacing those drawn."""
         return bool(self._keep.active)
 
     def show(self, cells: Sequence[Cell], names: Sequence[str], active: int) -> None:

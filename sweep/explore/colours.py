@@ -19,7 +19,7 @@ _MOST = 4096
 
 
 def mapping(scale: Scale) -> dict[str, Any]:
-    """What a colour mapper of Bokeh has to be told: a colour for each integer of a scale of steps."""
+    """List what a colour mapper of Bokeh has to be told: a colour for each integer of a scale of steps."""
     low, high = float(scale.norm.vmin or 0), float(scale.norm.vmax or 0)
     if isinstance(scale.norm, BoundaryNorm):
         first, last = math.ceil(low), math.floor(high)
@@ -34,7 +34,7 @@ def is_logarithmic(scale: Scale) -> bool:
 
 
 def beyond(part: Map, scale: Scale) -> str:
-    """What lies beyond the scale, in words; empty if nothing does."""
+    """Say in words what lies beyond the scale; empty if nothing does."""
     ends = {"min": f"down to {part.shown.min():.2g}", "max": f"up to {part.shown.max():.2g}"}
     words = " and ".join(said for end, said in ends.items() if scale.arrows in (end, "both"))
     return f"the last colours also stand for values {words}" if words else ""

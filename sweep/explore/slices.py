@@ -56,7 +56,7 @@ class Source:
         dims = () if cells is None else tuple(str(d) for d in cells.dims)
         if not dims or "trajectory" in dims:
             what = "single trajectories" if dims else "no axis"
-            raise StoreError(f"{name}: {what}; allowed: a dataset of run or critical, with an axis or more")
+            raise StoreError(f"{name} has {what}; open a dataset of run or critical that has an axis or more")
         self.name = name
         self.dims = dims
         ascending = {d: np.argsort(dataset[d].values, kind="stable") for d in dims if d in dataset.coords}
@@ -95,7 +95,7 @@ class Source:
         return set(map(str, self.cell[name].dims))
 
     def words(self, name: str) -> str:
-        """What a variable or an axis is."""
+        """Say what a variable or an axis is."""
         if name.startswith("n_c") and name.count("_") > 1:
             _, _, _, *how = name.split("_")
             words = ", ".join([_HOW.get(h, h) for h in how] or ["formula"])

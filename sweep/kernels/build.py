@@ -69,7 +69,7 @@ def build(kernels: Iterable[Kernel]) -> None:
 
 
 def missing(kernels: Sequence[Kernel]) -> list[Job]:
-    """What the cache lacks to run `kernels`."""
+    """List what the cache lacks to run `kernels`."""
     return list(dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel)))
 
 

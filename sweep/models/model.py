@@ -1,4 +1,4 @@
-"""What a model is, and how to add one.
+"""Says what a model is, and how to add one.
 
 A model is a system of autonomous ordinary differential equations y' = f(y) for the motion of a rattleback near upright
 spin.  It lives in one file, which defines one `Model` by the name `MODEL`; enter it in `sweep.models.__init__`.
@@ -227,7 +227,7 @@ class Model(Shown, Settling, Theory, Equations, Tier):
 
     @property
     def key(self) -> str:
-        """What tells its compiled code from that of other models."""
+        """Name its compiled code, apart from that of other models."""
         return f"{self.name}@{self.origin.digest}" if self.origin else self.name
 
     @property

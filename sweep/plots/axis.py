@@ -37,7 +37,7 @@ class Axis:
         return self.bent(np.concatenate([[2 * v[0] - between[0]], between, [2 * v[-1] - between[-1]]]))
 
     def straight(self, values: Array) -> Array:
-        """What is linear along the drawn axis: the values, or their logarithms."""
+        """Return what is linear along the drawn axis: the values, or their logarithms."""
         return np.asarray(np.log(values) if self.spacing == "log" else values)
 
     def bent(self, places: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What a map shows, told from a dataset alone: its values and their colours, the marks of its cells, lines and words.
+"""Describes a map, from a dataset alone: its values and their colours, the marks of its cells, lines and words.
 
 Two draw it: `sweep.plots.maps` by matplotlib and `sweep.explore.figure` by Bokeh.
 """

@@ -99,7 +99,7 @@ def unit(dataset: xr.Dataset, name: str) -> str:
 
 
 def words(dataset: xr.Dataset, name: str) -> str:
-    """What a variable or coordinate is, without its unit."""
+    """Say what a variable or coordinate is, without its unit."""
     of_surface = SURFACES[surface].labels if (surface := dataset.attrs.get("surface")) in SURFACES else {}
     of_parameters = {} if is_of_own_body(dataset) else _PARAMETER_WORDS
     short = {**of_parameters, **_VARIABLE_WORDS, **of_surface}.get(name)
@@ -123,7 +123,7 @@ def flag_words(dataset: xr.Dataset, name: str) -> dict[int, str]:
 
 
 def is_code(flags: xr.DataArray) -> bool:
-    """Whether the values of a variable with flags still are its codes: a mean of codes is none, though it has flags."""
+    """Tell whether the values of a variable with flags still are its codes: a mean of codes is none."""
     return flags.dtype.kind in "iub"
 
 

@@ -90,9 +90,9 @@ def draw_beside(each: list[Panels], limits: Limits | None = None, cmap: str | No
     name = each[0].names[0]
     count = sum(len(panels.each) for panels in each)
     if count > MAX_PANELS:
-        raise ValueError(f"{count} maps side by side; allowed: {MAX_PANELS}, select one value of an axis")
+        raise ValueError(f"{count} maps side by side are more than {MAX_PANELS}; select one value of an axis")
     if short := [_name(panels.dataset) for panels in each if len(panels.across) < 2]:
-        raise ValueError(f"{', '.join(short)} has no two axes; allowed: maps side by side")
+        raise ValueError(f"{', '.join(short)} has no two axes; only maps are drawn side by side")
     rows, columns = arrangement(count, 1)
     figure = Picture(_WIDEST * columns + 1.2, 1.8 + _WIDEST * RATIO * rows)
     common = in_lines(_constants([panels.dataset for panels in each]), figure.get_figwidth())
@@ -170,7 +170,7 @@ def _thinned(shown: Map) -> Map:
 
 
 def _title(panels: Panels, name: str, panel: Panel, *, small: bool) -> str:
-    """What a map shows; a small one beside others leaves the values of its panel to the first of them."""
+    """Name what a map shows; a small one beside others leaves the values of its panel to the first of them."""
     words = labels.words(panels.dataset, name)
     if len(panels.names) > 1:
         words = _TITLES[name][small]
@@ -201,7 +201,7 @@ def _bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
 
 
 def _meanings(each: list[Panels], maps: list[Maps], scales: dict[str, Scale]) -> list[Artist]:
-    """What the colours of flags and the marks of cells mean, and how many cells of each dataset have them."""
+    """Say what the colours of flags and the marks of cells mean, and how many cells of each dataset have them."""
     handles: list[Artist] = []
     names = list(scales)
     if maps[0][0][names[0]].flags:
@@ -220,7 +220,7 @@ def _meanings(each: list[Panels], maps: list[Maps], scales: dict[str, Scale]) ->
 
 
 def _name(dataset: xr.Dataset) -> str:
-    """What the dataset is called."""
+    """Name the dataset."""
     return str(dataset.attrs.get("title", "")).partition(":")[0]
 
 

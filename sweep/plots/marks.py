@@ -1,4 +1,4 @@
-"""What kind of result each cell of a dataset has, so that figures tell settled counts from all others.
+"""Says what kind of result each cell of a dataset has, so that figures tell settled counts from all others.
 
 From the dataset alone, and without any library that draws.
 """
@@ -84,7 +84,7 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
 
 
 def legend(dataset: xr.Dataset, name: str, *others: xr.Dataset) -> dict[str, str]:
-    """What a legend says of each kind that occurs: its words, and how many cells are of it.
+    """Word a legend for each kind that occurs: its words, and how many cells are of it.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def blank(kinds: dict[str, xr.DataArray]) -> xr.DataArray:
 
 
 def meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
-    """What a kind of cell means for a variable, in words."""
+    """Say what a kind of cell means for a variable, in words."""
     if kind == "failed":
         codes, counts = np.unique(dataset["status"], return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]

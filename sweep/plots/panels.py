@@ -1,4 +1,4 @@
-"""What a figure of a dataset shows: which variables over which axes, in a panel for each value of the others.
+"""Says what a figure of a dataset shows: which variables over which axes, in a panel for each value of the others.
 
 Free of any library that draws.
 """
@@ -51,7 +51,7 @@ def choose(
     y: str | None = None,
     sel: Mapping[str, float] | None = None,
 ) -> Panels:
-    """What to draw of a dataset; parameters as of `sweep.plots.picture.plot`.
+    """Choose what to draw of a dataset; parameters as of `sweep.plots.picture.plot`.
 
     Raises
     ------
@@ -63,14 +63,14 @@ def choose(
     dims = [str(d) for d in field(dataset, names[0]).dims]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in dims:
-            raise ValueError(f"{option}: {names[0]} has no axis {name}; allowed: {', '.join(dims) or 'none'}")
+            raise ValueError(f"{option}: {names[0]} has no axis {name}; its axes are {', '.join(dims) or 'none'}")
     if x is not None and x == y:
-        raise ValueError(f"x and y are both {x}; allowed: two axes")
+        raise ValueError(f"x and y are both {x}; choose two axes")
     across = _across(dataset, dims, x, y)
     rest = [d for d in dims if d not in across]
     if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
         shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
-        raise ValueError(f"{count} panels ({shown}); allowed: {MAX_PANELS}, select one value of an axis")
+        raise ValueError(f"{count} panels ({shown}) are more than {MAX_PANELS}; select one value of an axis")
     dataset = dataset.assign({name: field(dataset, name) for name in names})
     dataset = dataset.sortby([d for d in across if d in dataset.coords])
     return Panels(dataset, names, across, list(indices(dataset, rest)))
@@ -87,9 +87,9 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
     for name, wanted in sel.items():
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
-            raise ValueError(f"sel: no axis {name}; allowed: {axes or 'none'}")
+            raise ValueError(f"sel: there is no axis {name}; the axes are {axes or 'none'}")
         if not math.isfinite(wanted):
-            raise ValueError(f"sel: {name} = {wanted}; allowed: a finite number")
+            raise ValueError(f"sel: {name} = {wanted}; give a finite number")
         found[name] = int(np.abs(dataset[name].values - wanted).argmin())
     return found
 
@@ -101,7 +101,7 @@ def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[Panel]:
 
 
 def title(dataset: xr.Dataset, panel: Panel) -> str:
-    """What sets a panel apart from the others."""
+    """Name what sets a panel apart from the others."""
     return ", ".join(labels.measured(dataset, d, float(dataset[d][i])) for d, i in panel.items())
 
 

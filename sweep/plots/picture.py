@@ -68,7 +68,7 @@ def plot(
     if output is not None and suffix(Path(output)) not in PICTURES:
         raise ValueError(f"output: {output}: unknown format; write a {A_PICTURE}")
     if limits is not None and not limits[0] < limits[1]:
-        raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; allowed: a lower and a higher number")
+        raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; give a lower and a higher number")
     if cmap is not None:
         scales.colour_map(cmap)  # raises if there is none
     several = [dataset] if isinstance(dataset, Source) else dataset

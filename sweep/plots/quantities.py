@@ -1,4 +1,4 @@
-"""What can be drawn of a dataset: its variables, what is derived from them, and which of these it is about.
+"""Says what can be drawn of a dataset: its variables, what is derived from them, and which of these it is about.
 
 Pictures and the explorer both ask here.  From the dataset alone, and without any library that draws.
 """
@@ -74,7 +74,7 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
     if name in (possible := derivable(dataset)):
         return DERIVED[name].derive(dataset)
     if name not in dataset.data_vars:
-        raise ValueError(f"no variable {name}; allowed: {', '.join([*map(str, dataset.data_vars), *possible])}")
+        raise ValueError(f"there is no variable {name}; choose {', '.join([*map(str, dataset.data_vars), *possible])}")
     return dataset[name]
 
 

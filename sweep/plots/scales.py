@@ -55,7 +55,7 @@ class Scale:
 def colour_map(name: str) -> Colormap:
     """A colour map of matplotlib; `ValueError` if there is none of that name."""
     if name not in mpl.colormaps:
-        raise ValueError(f"no colour map {name}; allowed: those of matplotlib, such as viridis, cividis, gray, magma")
+        raise ValueError(f"there is no colour map {name}; choose one of matplotlib's, such as viridis or gray")
     return mpl.colormaps[name]
 
 

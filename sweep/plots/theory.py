@@ -1,4 +1,4 @@
-"""What theory says of a picture: the critical spins, which explain edges, and the shape of the largest L(f).
+"""Says what theory says of a picture: the critical spins, which explain edges, and the shape of the largest L(f).
 
 From the dataset alone, and without any library that draws.
 """
@@ -61,7 +61,7 @@ def symbol(name: str) -> str:
 
 
 def words(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> str:
-    """What a legend says of n_c1 or n_c2, in figures over the spin or over other parameters."""
+    """Word a legend for n_c1 or n_c2, in figures over the spin or over other parameters."""
     if over_n0:
         return f"{name} ({source}): {WORDS[name]} where |{spin}| is larger"
     return f"{spin} = {name} ({source}): {WORDS[name]} where that is smaller"

@@ -61,7 +61,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     over_time = set(dataset["time"].dims) - {"trajectory"}
     series = [str(name) for name, v in dataset.data_vars.items() if over_time & set(v.dims)]
     if variable is not None and variable not in series:
-        raise ValueError(f"no series {variable}; allowed: {', '.join(series)}")
+        raise ValueError(f"there is no series {variable}; choose {', '.join(series)}")
     panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and variable is None]
     if is_of_own_body(dataset) and variable is None:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}

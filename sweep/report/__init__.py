@@ -1,1 +1,1 @@
-"""What the reports share: rows with a verdict, tables, figures, and one HTML page that needs no network."""
+"""Says what the reports share: rows with a verdict, tables, figures, and one HTML page that needs no network."""

@@ -89,7 +89,7 @@ class RunFiles:
             return Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
 
     def has_dataset(self, identity: Identity) -> bool:
-        """Whether the finished dataset of `identity` is there.
+        """Tell whether the finished dataset of `identity` is there.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What the numbers of a run depend on, and so which runs may resume each other's files."""
+"""Says what the numbers of a run depend on, and so which runs may resume each other's files."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Identity:
 
     @property
     def of_one_run(self) -> bool:
-        """Whether no cells were computed again with other settings, so that others may be added to them."""
+        """Tell whether no cells were computed again with other settings, so that others may be added to them."""
         return "+" not in self.config_hash
 
     def difference(self, other: Identity) -> str:

@@ -1,4 +1,4 @@
-"""What a dataset is of: a run, single trajectories, or critical spins."""
+"""Says what a dataset is of: a run, single trajectories, or critical spins."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OWN_BODY = "a model"
 
 
 def is_of_own_body(dataset: xr.Dataset) -> bool:
-    """Whether a user's model made it, which may be of anything."""
+    """Tell whether a user's model made it, which may be of anything."""
     return dataset.attrs.get("model_brings") == OWN_BODY
 
 

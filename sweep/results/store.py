@@ -1,4 +1,4 @@
-"""What a run keeps while it goes on: the contract that every store meets.
+"""Says what a run keeps while it goes on: the contract that every store meets.
 
 A run is computed in tiles, which have numbers.  A store keeps the results of finished tiles and,
 between two chunks of work, the images of the tiles at work, so that a stopped run can be resumed.
@@ -50,7 +50,7 @@ class Store(Protocol):
         """Keep the tiles at work, in place of those kept before."""
 
     def load_running(self) -> Running | None:
-        """What the last `save_running` kept; None if there is nothing, or one of its tiles is `done`.
+        """Return what the last `save_running` kept; None if there is nothing, or one of its tiles is `done`.
 
         A store that is not `lasting` may always return None.
         """

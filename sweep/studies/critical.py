@@ -150,7 +150,7 @@ def _searchable(config: Config) -> Config:
 
 
 def _identify(config: Config, width: float) -> Identity:
-    """What a search depends on: what a run does, the width, and the sources of the search."""
+    """Identify a search: what a run does, the width, and the sources of the search."""
     run, search = identify(config), fingerprint(*(str(path) for path in sorted(Path(__file__).parent.glob("*.py"))))
     return replace(
         run,

@@ -1,4 +1,4 @@
-"""What theory says of the cells of a sweep, without running it."""
+"""Says what theory says of the cells of a sweep, without running it."""
 
 from __future__ import annotations
 

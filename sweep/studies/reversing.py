@@ -144,7 +144,7 @@ def body_seconds(config: Config, bodies: Columns) -> tuple[float, float]:
 
 
 def _outcomes(ended: Simulations) -> tuple[Array, Array]:
-    """What simulations say of their start spins, and their last ripple-free spins, both of shape (simulations,)."""
+    """Read what simulations tell of their start spins, and the last ripple-free spins, both of shape (simulations,)."""
     table = ended.kernel.table(ended.images)
     known = [table["reversals"] > 0, table["status"] == SETTLED, table["status"] == TIME_LIMIT]
     with np.errstate(invalid="ignore"):  # the states of a run that failed

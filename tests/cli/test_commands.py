@@ -45,7 +45,7 @@ def test_info_and_plot(write: Write, tmp_path: Path) -> None:
     assert invoke("plot", out / "small.nc", "--var", "status", "--output", out / "s.png").exit_code == 0
     assert all((out / name).read_bytes().startswith(b"\x89PNG") for name in ("small.png", "s.png"))
     result = invoke("plot", out / "small.nc", "--var", "colour")
-    assert (result.exit_code, "no variable colour; allowed: reversals," in result.stderr) == (2, True)
+    assert (result.exit_code, "no variable colour; choose reversals," in result.stderr) == (2, True)
 
 
 @pytest.mark.parametrize("verb", ["info", "plot"])

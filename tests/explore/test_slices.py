@@ -91,5 +91,5 @@ def test_one_axis_is_a_row(opened: xr.Dataset) -> None:
 @pytest.mark.parametrize("dims", [(), ("trajectory", "sample")])
 def test_what_has_no_map_is_refused(dims: tuple[str, ...]) -> None:
     dataset = xr.Dataset({"status": (dims, np.zeros([2] * len(dims), "int8"))})
-    with pytest.raises(StoreError, match="allowed: a dataset of run"):
+    with pytest.raises(StoreError, match="open a dataset of run"):
         Source(dataset, "x.nc")

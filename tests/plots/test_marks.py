@@ -81,7 +81,7 @@ def test_inferred_cells(cells: xr.Dataset) -> None:
 def test_the_difference(cells: xr.Dataset) -> None:
     assert field(cells, "difference").values[[0, 1, 5]].tolist() == [0, -2, -1]
     assert marks(cells, "difference")["failed"].equals(marks(cells, "reversals")["failed"])
-    with pytest.raises(ValueError, match=r"no variable difference; allowed: .*spin_final"):
+    with pytest.raises(ValueError, match=r"no variable difference; choose .*spin_final"):
         field(cells.drop_vars("reversals_predicted"), "difference")
 
 

@@ -254,7 +254,7 @@ def test_the_nearest_value_is_drawn() -> None:
     dataset = made(n0=[0.02, 0.05])
     figure = picture.plot(dataset, sel={"n0": 0.04})
     assert "n₀ = 0.05" in figure.get_suptitle()
-    with pytest.raises(ValueError, match="no axis q; allowed: mu, b, n0"):
+    with pytest.raises(ValueError, match="no axis q; the axes are mu, b, n0"):
         picture.plot(dataset, sel={"q": 1})
 
 
@@ -278,11 +278,11 @@ def test_axes_in_any_order_of_values() -> None:
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"x": "q"}, "x: reversals has no axis q; allowed: mu, b, n0"),
+        ({"x": "q"}, "x: reversals has no axis q; its axes are mu, b, n0"),
         ({"x": "b", "y": "b"}, "x and y are both b"),
-        ({"cmap": "q"}, "no colour map q; allowed"),
-        ({"limits": (2, 1)}, r"limits: 2..1; allowed"),
-        ({"variable": "q"}, "no variable q; allowed: reversals"),
+        ({"cmap": "q"}, "no colour map q; choose"),
+        ({"limits": (2, 1)}, r"limits: 2..1; give"),
+        ({"variable": "q"}, "no variable q; choose reversals"),
         ({"output": "x.jpg"}, "x.jpg: unknown format; write a png, pdf or svg"),
     ],
 )
@@ -328,7 +328,7 @@ def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
         (("--limits", "3"), "--limits 3: must be LOW..HIGH"),
         (("--limits", "3..1"), "--limits 3..1: must be LOW..HIGH"),
         (("--sel", "n0"), "--sel n0: must be NAME=NUMBER"),
-        (("--x", "c"), "no axis c; allowed: mu, b, n0"),
+        (("--x", "c"), "no axis c; its axes are mu, b, n0"),
     ):
         refused(invoke("plot", tmp_path / "made.nc", *options), said)
     assert [path.name for path in tmp_path.iterdir()] == ["made.nc"]

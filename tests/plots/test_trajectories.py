@@ -100,7 +100,7 @@ def test_constants_break_between_them_alone() -> None:
 def test_one_series_is_drawn_alone() -> None:
     (axes,) = picture.plot(made([60, 100]), "energy").axes
     assert {line.get_gid() for line in axes.lines} == {"energy"}
-    with pytest.raises(ValueError, match="no series reversals; allowed: spin, contact_x"):
+    with pytest.raises(ValueError, match="no series reversals; choose spin, contact_x"):
         picture.plot(made([60]), "reversals")
 
 

@@ -1,4 +1,4 @@
-"""What the variants with slip and without share: their constants, what they offer, what a trajectory shows of them."""
+"""Holds what the variants with slip and without share: constants, offers, and what a trajectory shows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What resists the motion in a variant of `general`: its law of friction and its couples, put together."""
+"""Puts together what resists the motion of a general body: its law of friction and its couples."""
 
 from __future__ import annotations
 

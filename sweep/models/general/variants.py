@@ -71,7 +71,7 @@ def variant(name: str, parameters: tuple[str, ...] = (), own: Law | None = None)
 
 
 def parts(name: str) -> tuple[str, str, list[Couple], Surface]:
-    """What the name of a variant, or of another model, says: base, law, couples and surface."""
+    """Read the name of a variant, or of another model: base, law, couples and surface."""
     base, _, rest = name.partition("+")
     law, *more = rest.split("+")
     surface = SURFACES[more.pop()] if more and more[-1] in SURFACES else ELLIPSOID

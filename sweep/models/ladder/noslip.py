@@ -96,7 +96,7 @@ def _ripple(y: Any, p: Any, k: Any) -> Any:
 
 
 def observe(y: Array, p: Constants) -> dict[str, Array]:
-    """What a trajectory shows beside spin and energy: contact point and normal force."""
+    """Compute what a trajectory shows beside spin and energy: contact point and normal force."""
     _, point, _, _ = contact(*y, p)
     _, (_, _, R, _) = rhs(y, p)
     return {"contact_x": point[0], "contact_y": point[1], "normal_force": R}

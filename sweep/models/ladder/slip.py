@@ -118,7 +118,7 @@ def _ripple(y: Any, p: Any, k: Any) -> Any:
 
 
 def observe(y: Array, p: Constants) -> dict[str, Array]:
-    """What a trajectory shows beside spin and energy: contact point, slip v_p, v̇_p, v̇_0 and normal force.
+    """Compute what a trajectory shows beside spin and energy: contact point, slip v_p, v̇_p, v̇_0 and normal force.
 
     v̇_p is the derivative in the body axes; v̇_0 is the derivative in space, (d/dt) v_0 in the paper.
     """

@@ -1,4 +1,4 @@
-"""What the stiff method needs of a model: its equations in variables in which only the slip is stiff.
+"""Says what the stiff method needs of a model: its equations in variables in which only the slip is stiff.
 
 The angular momentum M about the contact point takes the place of ω.  Forces at the contact point have no torque about
 it, so neither friction nor the normal force appears in u' and M'.  See `sweep.models.stiff.slip`.

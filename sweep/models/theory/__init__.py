@@ -1,1 +1,1 @@
-"""What follows from a model without running it: linear theory, rocking, ripple, the paper's coefficients."""
+"""Says what follows from a model without running it: linear theory, rocking, ripple, the paper's coefficients."""
