@@ -38,13 +38,13 @@ def differences(one: Path, other: Path) -> Iterator[str]:
             yield from _attributes(f"{name}:", theirs, ours)
             if (theirs.dtype, theirs.dimensions, theirs.shape) != (ours.dtype, ours.dimensions, ours.shape):
                 yield f"{name} (type or shape)"
-            elif _bits(theirs) != _bits(ours):
-                yield f"{name} ({int((theirs[...] != ours[...]).sum())} of {theirs.size} values)"
+            elif differing := sum(one != other for one, other in zip(_bits(theirs), _bits(ours), strict=True)):
+                yield f"{name} ({differing} of {theirs.size} values)"
 
 
-def _bits(variable: netCDF4.Variable) -> bytes:
-    values = variable[...]
-    return "\n".join(values.ravel()).encode() if variable.dtype is str else values.tobytes()
+def _bits(variable: netCDF4.Variable) -> list[bytes]:
+    values = variable[...].ravel()
+    return [value.encode() if variable.dtype is str else value.tobytes() for value in values]
 
 
 def _attributes(place: str, before: netCDF4.Dataset, after: netCDF4.Dataset) -> Iterator[str]:
