@@ -11,7 +11,7 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.models import Column, ColumnDataSource, CustomJS, Div
 
-from sweep.explore import controls, figure, page, saving
+from sweep.explore import controls, export, figure, page, saving
 from sweep.explore import state as states
 from sweep.explore.chosen import CellControls
 from sweep.explore.colours import CURVES
@@ -72,7 +72,7 @@ class View:
         curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
         path = Column(shown.path, shown.player, sizing_mode="stretch_width", name="path")
         files = {"nc": self._netcdf, "yaml": self._yaml} if self._setup else {"nc": self._netcdf}
-        name = saving.stem(self._source)
+        name = export.stem(self._source)
         save = saving.buttons(name, self._map, [shown.spin, shown.energy, shown.path], files, self._call)
         # It travels with a root: what a callback of the document alone refers to is not kept up to date.
         save.tags = [self._calls]
@@ -223,11 +223,11 @@ class View:
         return states.write(self.state, self._source, self._base)
 
     def _netcdf(self) -> bytes:
-        return saving.netcdf(self._source, self._query(), self.state, [curve for curve in self._drawn.curves if curve])
+        return export.netcdf(self._source, self._query(), self.state, [curve for curve in self._drawn.curves if curve])
 
     def _yaml(self) -> bytes:
         assert self._setup
-        return saving.yaml(self._source, self._setup, self.state).encode()
+        return export.yaml(self._source, self._setup, self.state).encode()
 
 
 def make(source: Source, setup: Setup | None) -> Callable[[Document], None]:

@@ -14,7 +14,7 @@ from support.own import PENDULUM
 
 import sweep
 from sweep.config import ConfigError
-from sweep.explore import runner, saving, state
+from sweep.explore import export, runner, state
 from sweep.explore.setup import Setup, usable, why_still
 from sweep.explore.slices import Source, open_source
 from sweep.explore.state import State
@@ -126,7 +126,7 @@ def test_cells_in_an_address_know_its_parameters(source: Source, setup: Setup) -
 
 def test_its_files_make_what_is_seen(source: Source, setup: Setup, tmp_path: Path) -> None:
     cell = {**setup.base, "torque": 1.2, "damping": 0.5}
-    text = saving.yaml(source, setup, State("torque", "damping", "reversals", {}, (cell,)))
+    text = export.yaml(source, setup, State("torque", "damping", "reversals", {}, (cell,)))
     (tmp_path / "saved.yaml").write_text(text, encoding="utf-8")
     again = sweep.run(tmp_path / "saved.yaml")
     np.testing.assert_array_equal(again["reversals"], source.dataset["reversals"])

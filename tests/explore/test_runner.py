@@ -11,7 +11,7 @@ import xarray as xr
 
 import sweep
 from sweep.engine.reporter import Progress
-from sweep.explore import runner, saving
+from sweep.explore import export, runner
 from sweep.explore.runner import COMPILING, Curve, Job, Runner
 from sweep.explore.setup import Setup, usable
 from sweep.explore.slices import Source, open_source
@@ -133,7 +133,7 @@ def test_the_files_make_what_is_seen(source: Source, setup: Setup, opened: xr.Da
     cell = cell_at(source, setup, mu=3, b=2, n0=1)
     state = State("mu", "b", "reversals", {"n0": 1}, (cell,))
     saved = tmp_path / "saved.nc"
-    saved.write_bytes(saving.netcdf(source, "x=mu", state, [runner.run(setup, cell)]))
+    saved.write_bytes(export.netcdf(source, "x=mu", state, [runner.run(setup, cell)]))
     with xr.open_dataset(saved, decode_times=False) as part:
         xr.testing.assert_equal(part.load(), opened.isel(n0=1))
         assert part.attrs["explored"] == "x=mu"
@@ -141,7 +141,7 @@ def test_the_files_make_what_is_seen(source: Source, setup: Setup, opened: xr.Da
         assert float(dense["spin_final"]) == opened["spin_final"].isel(mu=3, b=2, n0=1)
 
     config = tmp_path / "saved.yaml"
-    config.write_text(saving.yaml(source, setup, state), encoding="utf-8")
+    config.write_text(export.yaml(source, setup, state), encoding="utf-8")
     again = sweep.run(config)
     sound = opened["status"].isel(n0=1) != LIFT_OFF
     assert sound.sum() == 19
