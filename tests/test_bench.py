@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import subprocess
 import sys
 import time
@@ -152,7 +153,7 @@ def test_a_tiny_run_has_every_section_for_every_method(tmp_path: Path) -> None:
     assert all(f"\n{title}\n" in done.stdout for title in titles)
     assert "short [twin]" in done.stdout
     page = (tmp_path / "bench.html").read_text(encoding="utf-8")
-    assert "http" not in page.replace("http-equiv", "")
+    assert not re.search("https?:", page)  # letters alone occur in pictures by chance
     assert page.count("<h2>") == 8
     assert "data:image/png;base64" in page
     assert (tmp_path / "bench.png").read_bytes().startswith(b"\x89PNG")

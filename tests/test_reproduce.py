@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -81,7 +82,7 @@ def test_exit_code_tells_whether_all_rows_hold(tmp_path: Path, monkeypatch: pyte
     page = (tmp_path / "reproduce.html").read_text(encoding="utf-8")
     assert "&lt;two&gt;" in page
     assert "does not hold" in page
-    assert "http" not in page.replace("http-equiv", "")
+    assert not re.search("https?:", page)  # letters alone occur in pictures by chance
 
 
 @pytest.mark.campaign
