@@ -435,9 +435,9 @@ def test_a_click_runs_a_users_model_that_the_user_names(browser: Browser, tmp_pa
             wait_for_curves(page, 1)
             count = run["reversals"].isel(spot).item()
             assert curves(page)[0].endswith(f"torque = 1.2, {count} reversals")
-            assert model(page, "spin", "m.left[0].axis_label") == "spin n"
-            assert model(page, "spin", "m.below[0].axis_label") == "time t"
-            assert not model(page, "contact path", "m.visible")
+            wait(page, "spin", "m.left[0].axis_label === 'spin n'")
+            wait(page, "spin", "m.below[0].axis_label === 'time t'")
+            wait(page, "contact path", "!m.visible")
             assert model(page, "contact path", CLOCK) == "t = 0.0"
             field = control(page, "parameter torque", "input")
             field.fill("1.5")
