@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numba
 import pytest
@@ -18,6 +19,9 @@ from support.kernels import default_measures, kernel
 import sweep
 from sweep.jit import showing
 from sweep.kernels.build import build
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 # Compiling takes longer than any deadline; the same examples on every machine.
 settings.register_profile("sweep", deadline=None, derandomize=True, max_examples=200)
@@ -67,6 +71,19 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     path = tmp_path_factory.mktemp("small") / "small.yaml"
     path.write_text(SMALL, encoding="utf-8")
     return sweep.run(path)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Debian's chromium: playwright's own is downloaded from a place that many machines do not reach."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
+        )  # fmt: skip
+        yield found
+        found.close()
 
 
 @pytest.fixture

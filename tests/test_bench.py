@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import adaptive, columns
 from support.cli import invoke
 
 from sweep.bench import hard, precision, report
@@ -36,15 +35,11 @@ def two() -> Spins:
 
 
 def test_references_are_read_by_model_and_body() -> None:
-    """SciPy tells whether a spin belongs to its body and time."""
     spins = read_spins()
     assert set(spins) == set(MODELS)
     assert list(spins["slip"].times) == list(np.arange(25, 401, 25))
     assert [two().name(i) for i in (0, 1)] == ["μ = 60", "μ = 100, n0 = -0.05"]
     assert [spins["noslip"].name(i) for i in (0, 2)] == ["standard", "b = 2, n0 = -0.05"]
-    for i, time_of in ((0, 50.0), (1, 25.0)):
-        body = columns(**{name: values[i] for name, values in two().columns.items()})
-        assert adaptive.spin(body, time_of) == pytest.approx(two().spins[i, int(time_of / 25) - 1], abs=1e-9)
     counts = read_counts()
     assert (len(counts.firm), counts.firm.sum()) == (500, 499)
     assert (counts.columns["mu"][1], counts.reversals[1]) == (50.8202, 3)

@@ -30,35 +30,18 @@ BODY = {"units": "SI", "body": {"a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, 
         "Izz": 1.7e-3, "Ixy": -2e-5}, "friction": {"mu": 0.5}, "start": {"roll": 0.01, "pitch": 0.01, "omega3": -5.0},
         "integrator": {"t_end": 1.0}, "measure": ["energy_error"]}  # fmt: skip
 
-FASTEST = '''"""The fastest spin."""
+TWIN = '''"""The time of the first reversal by another name."""
 
-from typing import Any
-
-import numpy as np
-
-from sweep.jit import inline
-from sweep.kernels.measures.measurement import Measurement, measured
-from sweep.models.model import SPIN
+from sweep.kernels.measures.first_reversal import FirstReversal
+from sweep.kernels.measures.measurement import measured
 
 
-class FastestSpin(Measurement):
-    name = "fastest_spin"
-    summary = "largest absolute value of the spin"
-    asks = SPIN
-    quantities = ("fastest",)
-    variables = {"fastest_spin": measured("float64", "largest absolute value of the spin, in sqrt(g/c)")}
-
-    def make_step(self, layout, at_reversal):
-        FASTEST = layout.at("fastest")
-
-        @inline
-        def step(group: Any, lane: int, accepted: Any, spin: Any, steady: Any, work: Any, h: Any, now: Any) -> None:
-            group[FASTEST + lane] = max(group[FASTEST + lane], abs(spin)) if accepted else group[FASTEST + lane]
-
-        return step
+class Twin(FirstReversal):
+    name = "twin"
+    variables = {"t_twin": measured("float64", "time of the first reversal once more, in sqrt(c/g)")}
 
     def read(self, table, times):
-        return {"fastest_spin": table["fastest"]}
+        return {"t_twin": table["first_reversal"]}
 '''
 
 RK4 = """RK4 = Tableau(
@@ -97,18 +80,17 @@ class Counting(Memory):
 
 CHANGES = {
     "a measurement": Change(
-        {"sweep/kernels/measures/fastest_spin.py": FASTEST},
+        {"sweep/kernels/measures/twin.py": TWIN},
         {
             "sweep/kernels/measures/__init__.py": [
-                ("import Tier\n", "import Tier\nfrom sweep.kernels.measures.fastest_spin import FastestSpin\n"),
-                ("    Reversals, EnergyError,", "    Reversals, FastestSpin, EnergyError,"),
+                ("import Tier\n", "import Tier\nfrom sweep.kernels.measures.twin import Twin\n"),
+                ("    Reversals, EnergyError,", "    Reversals, Twin, EnergyError,"),
             ]
         },
         f"""
-found = sweep.run({SCENE}, measure=["reversals", "fastest_spin"])
-series = abs(sweep.trajectory({SCENE}, stop_when_settled=False)["spin"]).max().item()
-assert abs(found["fastest_spin"].item() - series) < 1e-3 * series, (found["fastest_spin"].item(), series)
-assert found["fastest_spin"].attrs["long_name"].startswith("largest")
+one, other = (sweep.run({SCENE}, measure=["reversals", name]) for name in ("first_reversal", "twin"))
+assert one["t_first_reversal"].item() == other["t_twin"].item() > 0
+assert other["t_twin"].attrs["long_name"].count("once more")
 """,
     ),
     "an integration method": Change(

@@ -124,7 +124,18 @@ def _check_configuration(block: Block, folder: Path) -> None:
     sweep.load_config(path)
 
 
-def _run_page(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch, *when: str) -> None:
+@pytest.mark.parametrize(
+    ("page", "when"),
+    [
+        *((page, [""]) for page in PAGES if _runs(page, "")),
+        *(pytest.param(page, ["", "campaign"], marks=pytest.mark.campaign)
+          for page in PAGES if _runs(page, "campaign")),
+    ],
+    ids=lambda value: _name(value) if isinstance(value, Path) else "".join(value),
+)  # fmt: skip
+def test_what_a_page_shows_runs(
+    page: Path, when: list[str], checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
     names: dict[str, Any] = {}
     for block in _runs(page, *when):
         if block.kind in ("console", "{console}"):
@@ -140,17 +151,6 @@ def _run_page(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch, *when
             monkeypatch.chdir(checkout / "docs" / "tutorial" if block.kind == "{code-cell}" else checkout)
             code = re.sub(r"\A(:\w.*\n)+", "", block.text)
             exec(compile(code, str(block), "exec"), names)
-
-
-@pytest.mark.parametrize("page", [page for page in PAGES if _runs(page, "")], ids=_name)
-def test_what_a_page_shows_runs(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _run_page(page, checkout, monkeypatch, "")
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("page", [page for page in PAGES if _runs(page, "campaign")], ids=_name)
-def test_what_a_page_shows_runs_though_slow(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _run_page(page, checkout, monkeypatch, "", "campaign")
 
 
 def test_console_blocks_hold_commands_and_no_output() -> None:

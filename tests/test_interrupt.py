@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -23,76 +23,64 @@ def ctrl_c() -> None:
     signal.raise_signal(signal.SIGINT)
 
 
-def test_raised_at_the_next_point_and_once() -> None:
-    reached = []
+def reached(work: Callable[[Callable[[str], None]], None]) -> list[str]:
+    """What a block tells before Ctrl-C is raised from it."""
+    told = list[str]()
+    with pytest.raises(KeyboardInterrupt):
+        deferred()(work)(told.append)
+    return told
 
-    @deferred()
-    def work() -> None:
+
+def test_raised_at_the_next_point_and_once() -> None:
+    def work(tell: Callable[[str], None]) -> None:
         point()
         ctrl_c()
-        reached.append("after Ctrl-C")
+        tell("after Ctrl-C")
         try:
             point()
         finally:
             point()  # cleaning up is not interrupted again
-            reached.append("cleaned up")
+            tell("cleaned up")
 
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert reached == ["after Ctrl-C", "cleaned up"]
+    assert reached(work) == ["after Ctrl-C", "cleaned up"]
 
 
 def test_raised_at_the_end_of_a_block_without_points() -> None:
-    reached = []
-
-    @deferred()
-    def work() -> None:
+    def work(tell: Callable[[str], None]) -> None:
         ctrl_c()
-        reached.append("end")
+        tell("end")
 
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert reached == ["end"]
+    assert reached(work) == ["end"]
     with deferred():
         point()  # it has been heard: nothing is left for a later block
 
 
 @pytest.mark.parametrize("inside", [True, False])
 def test_an_inner_block_leaves_it_to_the_outer_one(inside: bool) -> None:
-    reached = []
-
-    @deferred()
-    def work() -> None:
+    def work(tell: Callable[[str], None]) -> None:
         if not inside:
             ctrl_c()
         with deferred():
             if inside:
                 ctrl_c()
-        reached.append("end")
+        tell("end")
 
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert reached == ["end"]
+    assert reached(work) == ["end"]
 
 
 @pytest.mark.parametrize("answered", [True, False])
 def test_a_second_one_is_raised_at_once(answered: bool) -> None:
-    reached = []
-
-    @deferred()
-    def work() -> None:
+    def work(tell: Callable[[str], None]) -> None:
         ctrl_c()
         try:
             if answered:
                 point()
         finally:
-            reached.append("before the second")
+            tell("before the second")
             ctrl_c()
-            reached.append("after the second")
+            tell("after the second")
 
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert reached == ["before the second"]
+    assert reached(work) == ["before the second"]
 
 
 def test_an_error_in_the_block_is_the_one_raised() -> None:

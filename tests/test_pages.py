@@ -15,7 +15,7 @@ import pytest
 from support import ROOT
 
 if TYPE_CHECKING:
-    from playwright.sync_api import BrowserContext
+    from playwright.sync_api import Browser, BrowserContext
 
 pytestmark = pytest.mark.browser
 
@@ -35,15 +35,10 @@ def pages() -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def offline() -> Iterator[BrowserContext]:
+def offline(browser: Browser) -> Iterator[BrowserContext]:
     """A browser without a network."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
-        context = browser.new_context(offline=True)
+    with browser.new_context(offline=True) as context:
         yield context
-        browser.close()
 
 
 def faults(offline: BrowserContext, path: Path) -> list[str]:

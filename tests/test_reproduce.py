@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
+from support.cli import invoke
 
-from sweep.cli import main
 from sweep.models import MODELS
 from sweep.models.ladder import analytic
 from sweep.models.theory import coefficients
@@ -72,11 +71,10 @@ def test_exit_code_tells_whether_all_rows_hold(tmp_path: Path, monkeypatch: pyte
             "Two", [rows.below("one", "eq", 1.0, 2.0, "why"), rows.states("<two>", "eq", "a", "b", holds)]
         )
 
-    command = ["reproduce", "--output", str(tmp_path)]
     monkeypatch.setattr(report, "SECTIONS", (theory.formulas, two(True)))
-    assert CliRunner().invoke(main, command, catch_exceptions=False).exit_code == 0
+    assert invoke("reproduce", "--output", tmp_path).exit_code == 0
     monkeypatch.setattr(report, "SECTIONS", (theory.formulas, two(False)))
-    result = CliRunner().invoke(main, command, catch_exceptions=False)
+    result = invoke("reproduce", "--output", tmp_path)
     assert result.exit_code == 1
     assert "FAIL <two>" in result.stdout
     page = (tmp_path / "reproduce.html").read_text(encoding="utf-8")
@@ -95,6 +93,6 @@ def test_every_number_of_the_paper_is_in_a_row_that_holds(tmp_path: Path, monkey
 
     for module in (theory, simulations):
         monkeypatch.setattr(module, "against_paper", noted)
-    result = CliRunner().invoke(main, ["reproduce", "--output", str(tmp_path)], catch_exceptions=False)
+    result = invoke("reproduce", "--output", tmp_path)
     assert (result.exit_code, "FAIL" in result.stdout, asked) == (0, False, set(published()))
     assert (tmp_path / "reproduce.html").exists()

@@ -11,6 +11,7 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import accumulate
 from math import inf, nan
 from pathlib import Path as FilePath
 from typing import Any
@@ -26,6 +27,9 @@ _NUMBER = r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
 _FLOAT = re.compile(_NUMBER)
 _RANGE = re.compile(rf"(?P<start>{_NUMBER})\.\.(?P<stop>{_NUMBER}):(?P<num>{_NUMBER})")
 _WORDS = {"true": True, "false": False, "null": None, "~": None, "": None, ".inf": inf, "-.inf": -inf, ".nan": nan}
+
+_DEEPEST = 100
+"""Brackets within one another; more are refused."""
 
 Place = tuple[int, int]
 """Line and column, which count from one."""
@@ -140,6 +144,10 @@ def _read(path: FilePath, error_of: Callable[[str], ConfigError]) -> str:
 
 
 def _compose(text: str, file: str) -> Node | None:
+    # ruamel takes a time that grows with the square of the depth: a minute for some thousand brackets.
+    depths = accumulate((character in "[{") - (character in "]}") for character in text)
+    if max(depths, default=0) > _DEEPEST:
+        raise ConfigError([Fault(file, None, None, (), "not YAML: nested too deeply")])
     try:
         return YAML(pure=True).compose(text)  # type: ignore[no-any-return]
     except Exception as error:  # ruamel lets errors of chr(), of its own recursion and others escape

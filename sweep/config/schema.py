@@ -81,6 +81,11 @@ class Integrator(Strict):
         default=TOLERANCE, ge=1e-14, lt=1,
         description="error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep",
     )  # fmt: skip
+    estimate_errors: bool = Field(
+        default=True,
+        description="whether each cell is run a second time, in longer steps, which tells its error; cells above "
+        "`tolerance` are then repeated in shorter steps, unless `step` is a number",
+    )
     t_end: Annotated[
         float,
         BeforeValidator(lambda raw: FOREVER if raw == inf else raw),

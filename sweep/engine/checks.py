@@ -8,15 +8,16 @@ tells a count that nobody can know from a firm one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine import executor
+from sweep.engine.errors import Errors
 from sweep.engine.plan import Part, Plan, kernel_of
+from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.kernels import methods
 from sweep.kernels.measures.sensitivity import SHORTER, Sensitivity
@@ -35,16 +36,13 @@ def draw(cells: int, share: float) -> Array:
     return np.sort(np.random.default_rng(0).choice(cells, math.ceil(share * cells), replace=False, shuffle=False))
 
 
-def verify(
-    config: Config, cells: Array, first: Mapping[str, Array], after_chunk: Callable[[], None] | None = None
-) -> dict[str, Array]:
+def verify(config: Config, cells: Array, first: Mapping[str, Array], work: Work) -> dict[str, Array]:
     """Run those of `cells` that were drawn and ended soundly a second time, up to the times at which they ended.
 
     Parameters
     ----------
     cells : their indices in the grid, ascending
     first : results of the first run by name, those that are compared of shape (cells,)
-    after_chunk : called after each chunk of work
 
     Returns
     -------
@@ -62,7 +60,7 @@ def verify(
     else:
         step = np.full(len(t_stop), config.integrator.step)
     images = kernel.images(columns, step / 2, t_stop)
-    executor.execute(kernel, images, stop_when_settled=False, after_chunk=after_chunk)
+    work.run("verified", kernel, images)
     again = dataset.measured(kernel, images, t_stop)
     again["spin_difference"] = np.abs(again["spin_final"] - first["spin_final"])
     if "reversals" in again:
@@ -71,23 +69,40 @@ def verify(
     return {"verified_cell": cells[rows]} | found
 
 
-def sensitivity(job: Plan, after_chunk: Callable[[], None]) -> dict[str, Array]:
-    """Fewest and most reversals of each cell among all its runs, and whether they differ, each over all cells of `job`.
+def results(job: Plan, errors: Errors | None, work: Work) -> dict[str, Array]:
+    """Collect what was simulated, and what further runs tell of it, by name, each over all cells of `job`."""
+    if errors is None:
+        return job.results() | _counted(job, None, work)
+    return job.results() | {"spin_error": errors.spin} | _counted(job, errors.reversals, work)
 
-    Nothing if the configuration does not measure `sensitivity`.
+
+def _counted(job: Plan, companions: Array | None, work: Work) -> dict[str, Array]:
+    """Tell which counts other runs of the same cells do not give, over all cells of `job`.
+
+    Where `sensitivity` is measured, the cells are run again for it, and the fewest and most reversals are told as well.
+    Nothing if reversals are not counted, or no cell has been run twice.
+
+    Parameters
+    ----------
+    companions : counts of the runs that tell errors, NaN where there is none, shape (cells,); None without these runs
     """
-    asked = [each.count for each in job.parts[0].kernel.measurements if isinstance(each, Sensitivity)]
-    if not asked:
+    measurements = job.parts[0].kernel.measurements
+    asked = next((each.count for each in measurements if isinstance(each, Sensitivity)), 0)
+    if "reversals" not in job.parts[0].kernel.measure or (companions is None and not asked):
         return {}
-    low, high = (np.zeros(sum(grid.size for grid in job.grids)) for _ in range(2))
+    low = np.zeros(sum(grid.size for grid in job.grids))
+    high, sensitive = low.copy(), np.zeros(len(low), bool)
     for part in job.parts:
-        first = part.kernel.table(part.images)["reversals"]
-        counts = [first, *(_again(part, k + 1, after_chunk) for k in range(asked[0]))]
-        low[part.cells], high[part.cells] = np.nanmin(counts, axis=0), np.nanmax(counts, axis=0)
-    return {"reversals_low": low, "reversals_high": high, "sensitive": low != high}
+        first, cells = part.kernel.table(part.images)["reversals"], part.cells
+        counts = [first, *(_again(part, k + 1, work) for k in range(asked))]
+        low[cells], high[cells] = np.nanmin(counts, axis=0), np.nanmax(counts, axis=0)
+        sensitive[cells] = low[cells] != high[cells]
+        if companions is not None:
+            sensitive[cells] |= ~(companions[cells] == first) & ~part.failed
+    return {"sensitive": sensitive} | ({"reversals_low": low, "reversals_high": high} if asked else {})
 
 
-def _again(part: Part, number: int, after_chunk: Callable[[], None]) -> Array:
+def _again(part: Part, number: int, work: Work) -> Array:
     """Reversals of the cells of `part` in their run of this number, NaN for those that failed at first."""
     counts, sound = np.full(len(part.cells), np.nan), np.flatnonzero(~part.failed)
     if len(sound):
@@ -95,8 +110,7 @@ def _again(part: Part, number: int, after_chunk: Callable[[], None]) -> Array:
         columns |= {name: columns[name] * (1 + number * NUDGE) for name in START & columns.keys()}
         step = SHORTER * part.kernel.table(part.images)["step"][sound]
         near = replace(part.take(sound), columns=columns, step=step)
-        images = near.start()
-        settle = part.config.integrator.stop_when_settled
-        executor.execute(part.kernel, images, stop_when_settled=settle, after_chunk=after_chunk)
-        counts[sound] = part.kernel.table(images)["reversals"]
+        near = near.start()
+        work.run(f"{part.method} nudged {number}", near.kernel, near.images, settle=near.settles)
+        counts[sound] = near.kernel.table(near.images)["reversals"]
     return counts

@@ -163,6 +163,9 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | 
                 dashboard_address=":0",  # any free port: the usual one may be taken
                 scheduler_kwargs={"dashboard": False},
                 silence_logs="CRITICAL",
+                # Whoever reaches a scheduler runs code as the one who started it, so it asks for a certificate.
+                security=distributed.Security.temporary(),
+                protocol="tls://",
                 preload=__name__,
             ) as cluster,
             distributed.Client(cluster, set_as_default=False) as client,

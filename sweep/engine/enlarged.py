@@ -14,6 +14,7 @@ from sweep.config.document import parse_value
 from sweep.engine.checks import verify
 from sweep.engine.plan import choose
 from sweep.engine.whole import Some
+from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures.sensitivity import Sensitivity
@@ -183,4 +184,4 @@ class Enlarged(Some):
         labelled = dataset.label(self.config, self.grid, arrays, words)
         if not self.config.verify:
             return labelled
-        return dataset.beside(self.config, labelled, verify(self.config, np.arange(self.grid.size), arrays))
+        return dataset.beside(self.config, labelled, verify(self.config, np.arange(self.grid.size), arrays, Work()))

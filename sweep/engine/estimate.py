@@ -60,12 +60,13 @@ def estimate(config: Config) -> str:
 
 
 def _works(config: Config, chosen: list[Choice], steps: list[Array], share: float) -> Iterator[Array]:
-    """For each method, and for the cells run again to verify it: the work for each cell, in steps of dopri5 alone."""
+    """The work for each cell, in steps of dopri5 alone: for each method, and for the cells run again to verify it."""
     relative = 1.0 if config.equations.name in MODELS else _GENERAL
     relative *= math.prod(each.cost for each in chosen[0].kernel.measurements)
     for each, theirs in zip(chosen, steps, strict=True):
         method = METHODS[each.method]
         work = method.step_cost * relative * (theirs + method.start_up_cost)
+        work *= 1 + 1 / method.companion if config.integrator.estimate_errors else 1
         yield np.resize(work, round(len(work) * share))
     if config.verify:
         again = chosen[0]

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine import executor
-from sweep.engine.checks import sensitivity, verify
-from sweep.engine.plan import plan
-from sweep.engine.repeats import repeat_all
+from sweep.engine.checks import results, verify
+from sweep.engine.errors import keep_tolerance
+from sweep.engine.plan import Plan, plan
+from sweep.engine.repeats import decide_failures
+from sweep.engine.work import Work
 from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
-from sweep.kernels.status import FAILURES, RUNNING, SETTLED
+from sweep.kernels.status import RUNNING, SETTLED
 from sweep.prediction import predict
 from sweep.results import dataset
 from sweep.results.provenance import this_cpu
@@ -23,6 +24,9 @@ from sweep.results.store import Running, Store
 
 BATCH = 32_768
 """Cells simulated together (50 MB of images).  Lanes idle only at the end of such a batch of tiles."""
+
+_FIRST = 0.6
+"""The share of a cell's work that its first run is, where a second one tells its error."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ def run_batch(
     *,
     store: Store | None = None,
     left: Running | None = None,
-    after_chunk: Callable[[Array], None] = lambda status: None,  # noqa: ARG005
+    after_chunk: Callable[[float, int], None] = lambda done, failed: None,  # noqa: ARG005
 ) -> Iterator[Done]:
     """Run the tiles `batch` together.
 
@@ -51,7 +55,8 @@ def run_batch(
     ----------
     store : keeps the images after each chunk
     left : the images of this batch that an earlier run left, to be continued
-    after_chunk : called with the statuses of the batch's cells
+    after_chunk : called with the number of the batch's cells that are done, a fraction where a cell is run more than
+        once, and how many of them have failed
     """
     grid, cpu = Grid.of(config), this_cpu()
     if not config.simulated:
@@ -62,34 +67,53 @@ def run_batch(
     job = plan(config, *(grid.part(tiles[i]) for i in batch))
     for part in job.parts:
         part.kernel.compile()
-    images, began = {part.method: part.images for part in job.parts}, time.perf_counter()
-    if left and {m: t.shape for m, t in left.tables.items()} == {m: t.shape for m, t in images.items()}:
-        for method, table in left.tables.items():
-            images[method][:] = table
-        began -= left.seconds
+    began = time.perf_counter() - (left.seconds if left else 0)
+    work, twice = Work(left.tables if left else None), config.integrator.estimate_errors
+    first = _FIRST if twice else 1.0
 
-    def report() -> None:
-        after_chunk(np.concatenate([part.status for part in job.parts]))
-
-    def chunk() -> None:
-        # Images are saved only here, between two chunks: anywhere else an interrupt may find half of them advanced.
+    def save() -> None:
+        # Images are saved only between two chunks: anywhere else an interrupt may find half of them advanced.
         if store:
-            store.save_running(Running(list(batch), images, time.perf_counter() - began))
-        # What looks like a failure is decided only after all cells have ended.
-        status = np.concatenate([part.status for part in job.parts])
-        after_chunk(np.where(np.isin(status, FAILURES), RUNNING, status))
+            store.save_running(Running(list(batch), work.kept, time.perf_counter() - began))
 
+    def running() -> None:
+        save()
+        # What looks like a failure is decided only after all cells have ended.
+        after_chunk(first * sum(int(((p.status != RUNNING) & ~p.failed).sum()) for p in job.parts), 0)
+
+    def deciding() -> None:
+        save()
+        after_chunk(first * _ended(job), _failed(job))
+
+    def measuring() -> None:
+        save()
+        cells = sum(len(part.cells) for part in job.parts)
+        after_chunk(first * cells + (1 - first) * _ended(job), _failed(job))
+
+    work.after_chunk = running
     for part in job.parts:
-        settle = config.integrator.stop_when_settled
-        executor.execute(part.kernel, part.images, stop_when_settled=settle, after_chunk=chunk)
-    # Not saved: a run that is killed here goes on from the ends of the first runs.
-    repeat_all(job, report)
-    found = job.results() | sensitivity(job, report)
+        work.run(part.method, part.kernel, part.images, settle=part.settles)
+    work.after_chunk = deciding
+    for part in job.parts:
+        decide_failures(part, work, part.method)
+    work.after_chunk = measuring
+    errors = keep_tolerance(job, work) if twice else None
+    found = results(job, errors, work)
     numbers = np.concatenate([grid.first_cell(tiles[i]) + np.arange(grid.part(tiles[i]).size) for i in batch])
-    again = verify(config, numbers, found, report) if config.verify else {}
+    again = verify(config, numbers, found, work) if config.verify else {}
     seconds = (time.perf_counter() - began) / len(batch)
     for i, arrays in zip(batch, job.by_grid(found), strict=True):
         yield Done(i, arrays | _inside(grid, tiles[i], again), seconds, cpu)
+
+
+def _ended(job: Plan) -> int:
+    """The number of cells that have ended."""
+    return sum(int((part.status != RUNNING).sum()) for part in job.parts)
+
+
+def _failed(job: Plan) -> int:
+    """The number of cells that have failed."""
+    return sum(int(part.failed.sum()) for part in job.parts)
 
 
 def _inside(grid: Grid, tile: Tile, again: Mapping[str, Array]) -> dict[str, Array]:

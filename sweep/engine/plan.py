@@ -12,7 +12,7 @@ from sweep.grid import Array, Grid
 from sweep.kernels import methods
 from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.method import FIXED, MISSED, REPEAT
+from sweep.kernels.method import FIXED
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.models.model import Columns
@@ -69,14 +69,32 @@ class Part(Choice):
             stable=self.stable[:, rows], images=self.images[rows],
         )  # fmt: skip
 
-    def start(self, halvings: int | Array = 0) -> Array:
-        """Images at t = 0, with steps that are halved so many times."""
-        step, t_end = self.step / 2.0**halvings, self.config.integrator.t_end
+    @property
+    def settles(self) -> bool:
+        """Tell whether runs end where the spin can reverse no more."""
+        return self.config.integrator.stop_when_settled
+
+    @property
+    def fixed(self) -> bool:
+        """Tell whether the configuration gives the step, which is then never changed."""
+        return self.config.integrator.step != "auto"
+
+    @property
+    def times(self) -> Array:
+        """Times in sqrt(c/g) at which the runs have ended, shape (cells,)."""
+        return self.kernel.times(self.images, self.config.integrator.t_end)
+
+    def start(self, shorter: float | Array = 1.0) -> Part:
+        """These cells at t = 0, with steps that are shorter by a factor, a number or of shape (cells,)."""
+        step = self.step / shorter
         if not len(step):
-            return np.empty((0, len(self.kernel.layout.names)))
-        images = self.kernel.images(self.columns, step, t_end, self.stable)
-        self.kernel.table(images)["halvings"] = halvings
-        return images
+            return replace(self, step=step, images=np.empty((0, len(self.kernel.layout.names))))
+        images = self.kernel.images(self.columns, step, self.config.integrator.t_end, self.stable)
+        return replace(self, step=step, images=images)
+
+    def put(self, rows: Array, other: Part, rule: int | Array) -> None:
+        """Replace the runs of the cells `rows` by those of `other`, in place; `rule` says what set their steps."""
+        self.images[rows], self.step[rows], self.step_rule[rows] = other.images, other.step, rule
 
 
 @dataclass(frozen=True)
@@ -97,9 +115,7 @@ class Plan:
         arrays: dict[str, Array] = {}
         for part in self.parts:
             found = dataset.measured(part.kernel, part.images, self.config.integrator.t_end)
-            table = part.kernel.table(part.images)
-            repeated = np.where(table["missed"] > 0, MISSED, REPEAT)
-            found["step_rule"] = np.where(table["halvings"] > 0, repeated, part.step_rule)
+            found["step_rule"] = part.step_rule
             if self.config.integrator.method == AUTO:
                 found["method"] = np.full(len(part.cells), METHODS[part.method].code)
             for name, values in found.items():
@@ -178,4 +194,4 @@ def fill(config: Config, grids: tuple[Grid, ...], chosen: tuple[Choice, ...]) ->
     predictions = tuple(predict(config.equations, grid, config.measure) for grid in grids)
     stable = np.concatenate([each.stability.ranges for each in predictions if each.stability], axis=1)
     parts = [Part(**vars(each), config=config, stable=stable[:, each.cells], images=np.empty(0)) for each in chosen]
-    return Plan(config, grids, predictions, tuple(replace(part, images=part.start()) for part in parts))
+    return Plan(config, grids, predictions, tuple(part.start() for part in parts))

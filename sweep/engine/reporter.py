@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sweep.grid import Array
-from sweep.kernels.status import FAILURES, RUNNING
+from sweep.kernels.status import FAILURES
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,8 @@ class Count:
         there = cells - todo - self.done
         self.cells, self.before, self.done = cells, self.before + there, self.done + there
 
-    def chunk(self, status: Array) -> None:
-        """Report, with the statuses of the cells being computed."""
-        done, failed = int((status != RUNNING).sum()), int(np.isin(status, FAILURES).sum())
+    def chunk(self, done: float, failed: int) -> None:
+        """Report how many of the cells being computed are done, and how many have failed."""
         self._report(self.done + done, self.failed + failed)
 
     def tile(self, status: Array) -> None:
@@ -59,6 +58,6 @@ class Count:
         self.failed += int(np.isin(status, FAILURES).sum())
         self._report(self.done, self.failed)
 
-    def _report(self, done: int, failed: int) -> None:
+    def _report(self, done: float, failed: int) -> None:
         seconds = time.perf_counter() - self.began
         self.reporter.chunk(Progress(self.cells, done, failed, self.before, seconds))

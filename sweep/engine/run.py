@@ -26,6 +26,7 @@ from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
 from sweep.interrupt import deferred, point
+from sweep.kernels.methods import METHODS
 from sweep.results import dataset
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity, not_resumed
@@ -131,7 +132,9 @@ def _kept(result: Whole, store: Store, running: Running | None) -> str:
     """Find what an earlier run left."""
     grid = Grid.of(result.simulated())
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
-    more = f", {sum(map(len, running.tables.values()))} under way" if running else ""
+    tables = running.tables if running else {}
+    started = sum(len(table) for name, table in tables.items() if name in METHODS)
+    more = f", {started} under way" if running else ""
     return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 
 

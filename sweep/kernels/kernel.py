@@ -21,11 +21,10 @@ from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement
 from sweep.models.model import Array, Columns, Model, stack
 
-_DECIDED = ("halvings", "missed", "failed_at")
-"""Quantities that the engine finds out (`sweep.engine.repeats`): how often the step was halved because a longer one did
-not hold; whether even this one missed the tolerance; and the time of a failure, 0 if there is none."""
+_FAILED_AT = "failed_at"
+"""The time of a failure, which the engine finds out (`sweep.engine.repeats`); 0 if there is none."""
 
-_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", *_DECIDED, *STABLE)
+_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", _FAILED_AT, *STABLE)
 
 
 STRETCH = 100.0

@@ -113,8 +113,6 @@ def make_look(
     saturates = bool(model.faint)
     will_settle = _make_will_settle(layout, may_settle, saturates)
     FAINT = layout.at(f"constant.{model.faint}") if saturates else 0
-    stops = bool(model.still)
-    STILL = layout.at(f"constant.{model.still}") if stops else 0
     decides, decided = model.decided is not never_decided, model.decided
     GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP = map(layout.at, ("goal", "done", "status", "energy", "stable_step"))
     lanes, allowed, conserved = LANES, 1.0 + energy_gain, ENERGY in model.offers
@@ -137,8 +135,6 @@ def make_look(
             bounded, settled, followed = will_settle(group, lane, spin, energy_ratio)
             if saturates:
                 settled = settled & (rattle < group[FAINT + lane])
-            if stops:
-                settled = settled | ((total < group[STILL + lane]) & followed)
             if decides:
                 settled = settled | (decided(y, load_constants(group, lane)) & followed)
             ends = SETTLED if settled & stop_when_settled else RUNNING

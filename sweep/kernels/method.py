@@ -68,9 +68,10 @@ class Method:
     """Time of the start-up of one trajectory, in steps of this method."""
     compile_seconds: float = 6.0
     """Time to compile its kernel, for the estimate of a run (`scripts/run_costs.py`)."""
-    balance: float = 1.0
-    """The factor by which the error of its energy balance tends to exceed that in spin, both as
-    `sweep.engine.repeats` compares them."""
+    companion: float = 1.5
+    """Ratio of the steps of the run that tells a cell's error to its own (`sweep.engine.errors`)."""
+    error_order: int = 5
+    """The power of the step with which that error is taken to grow."""
     foresight: float = 0.0
     """Number of steps ahead of the time limit from which on it may decide by what is left.  A trajectory that has
     ended before does not depend on the limit."""

@@ -35,8 +35,9 @@ def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> 
     """
     motion, names = fastest_motion(model, columns), allowed(model)
     found = [_step(METHODS[name], model, columns, motion, tolerance) for name in names]
-    costs = [METHODS[name].step_cost * (t_end / step + METHODS[name].start_up_cost)
-             for name, (step, _) in zip(names, found, strict=True)]  # fmt: skip
+    with np.errstate(divide="ignore"):  # at hardly any friction a method may have no step at all
+        costs = [METHODS[name].step_cost * (t_end / step + METHODS[name].start_up_cost)
+                 for name, (step, _) in zip(names, found, strict=True)]  # fmt: skip
     chosen, cells = np.argmin(costs, axis=0), np.arange(len(motion))
     steps, rules = (np.stack(values)[chosen, cells] for values in zip(*found, strict=True))
     return np.array(names)[chosen], steps, rules

@@ -144,7 +144,7 @@ def method(tableau: Tableau) -> Method:
         stable_step=partial(_stable_step, tableau),
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",
         step_cost=tableau.stages / DOPRI5.stages,
-        balance=tableau.balance,
+        error_order=tableau.order,
         stops_anywhere=True,
         follows_tangents=True,
     )
@@ -159,7 +159,7 @@ def _accurate_step(tableau: Tableau, model: Model, columns: Columns, motion: Arr
     # A slip that differs by v for a time 1/λ moves the rattle, of frequency ν, by (ν/λ)² of itself.
     spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
     e = 2 * rattle / inertia
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         moved = tableau.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
         return np.asarray(np.fmin(step, LAYER_STEP / decay * (tolerance / moved) ** power))
 

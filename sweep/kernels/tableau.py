@@ -45,8 +45,6 @@ class Tableau:
     layer_error: float
     """Error constant of the start: the share of the slip's change that steps of `LAYER_STEP` decay times get wrong
     while the slip, at first zero, comes to the value that the slow motion asks for.  It falls with the same power."""
-    balance: float
-    """`Method.balance`."""
 
     def __post_init__(self) -> None:
         if not len(self.a) + 1 == len(self.b) == len(self.c):
@@ -130,8 +128,6 @@ DOPRI5 = Tableau(
     real_stability=3.3066,
     phase=1.0,
     layer_error=0.02,
-    # Of its first steps, in which the slip sets in, it integrates the work less exactly than the motion.
-    balance=14.0,
 )
 
 TABLEAUS = (DOPRI5,)

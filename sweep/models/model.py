@@ -192,9 +192,6 @@ class Settling:
     faint: str = ""
     """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
     rattle below it may settle."""
-    still: str = ""
-    """Name of the constant that is the energy above rest below which a body counts as at rest, so that the trajectory
-    settles; "" if there is none."""
 
 
 @dataclass(frozen=True, kw_only=True)

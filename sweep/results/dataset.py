@@ -59,6 +59,14 @@ VARIABLES: dict[str, Variable] = {
     "status": Variable("int8", "1", "how the simulation of the trajectory ended", STATUSES),
     "inferred": Variable("int8", "1", "how reversals and status were found", {0: "simulated", 1: "inferred"}),
     "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
+    "spin_error": Variable("float64", "1", "estimated error of the spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
+    "sensitive": Variable(
+        "int8",
+        "1",
+        "whether other steps, or starts 1e-10 apart, give another number of reversals",
+        {0: "firm", 1: "sensitive"},
+        of_sound_runs=True,
+    ),
     "t_stop": Variable("float64", "1", "time at which the simulation ended, in sqrt(c/g)"),
     "method": Variable(
         "int8", "1", "integration method of the trajectory", {method.code: name for name, method in METHODS.items()}

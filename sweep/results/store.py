@@ -25,7 +25,7 @@ class Running(NamedTuple):
     tiles: list[int]
     """Their numbers: at least one, each once."""
     tables: dict[str, Array]
-    """By method: the images of their cells, shape (cells, rows)."""
+    """By the name of a run: the images of its cells, shape (cells, rows)."""
     seconds: float
     """Time spent on them so far."""
 

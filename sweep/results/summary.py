@@ -93,6 +93,10 @@ def _summary(dataset: xr.Dataset) -> Iterator[str]:
         valid = np.isin(status, (SETTLED, TIME_LIMIT))
         if valid.any():
             yield _reversals(dataset, valid)
+    if "spin_error" in dataset:
+        error = np.ravel(dataset["spin_error"].values)
+        if np.isfinite(error).any():
+            yield f"spin error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}, as estimated"
     if "energy_error" in dataset:
         error = np.ravel(dataset["energy_error"].values)
         yield f"energy error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}"

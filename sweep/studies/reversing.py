@@ -92,7 +92,8 @@ def find_n_c2(
         return answers["outcomes"], answers["margins"]
 
     size = np.abs(n_c1)
-    return search(ask, size, np.minimum(_FARTHEST * size, SPIN_LIMIT), width, settled)
+    farthest = np.minimum(_FARTHEST * size, SPIN_LIMIT * config.equations.spin_unit(bodies))
+    return search(ask, size, farthest, width, settled)
 
 
 def _shared_out(config: Config, columns: Columns, exact: Array, tolerance: Any) -> dict[str, Array]:

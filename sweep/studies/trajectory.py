@@ -19,10 +19,13 @@ from sweep.config.schema import FOREVER
 from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
 from sweep.engine import executor
+from sweep.engine.checks import results
+from sweep.engine.errors import keep_tolerance
 from sweep.engine.executor import STEP_SECONDS
 from sweep.engine.plan import plan
-from sweep.engine.repeats import repeat_all
+from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
+from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import threads
@@ -138,15 +141,16 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
         covered = advanced(kernel, images).sum() * t_end
         reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, time.perf_counter() - began))
 
-    marks = _run(kernel, images, settles, report)
-    repeat_all(job, report)
-    halvings = kernel.table(images)["halvings"]
-    if halvings.any():
-        marks = _run(kernel, part.start(halvings), settles)
+    marks, steps = _run(kernel, images, settles, report), part.step.copy()
+    work = Work(after_chunk=report)
+    decide_failures(part, work, part.method)
+    errors = keep_tolerance(job, work) if chosen.integrator.estimate_errors else None
+    if (part.step != steps).any():
+        marks = _run(kernel, part.start().images, settles)
     _judge(kernel, images)
     times = _times(kernel, images, every or _intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
-    (found,) = job.by_grid(job.results())
+    (found,) = job.by_grid(results(job, errors, work))
     labelled = dataset.label(chosen, grid, found, provenance(chosen, 0.0, grid.size))
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(grid.size), {"units": "1", "long_name": "number of the trajectory"})

@@ -57,13 +57,6 @@ def test_defaults_are_the_papers_standard_case(write: Write) -> None:
     assert config.measure == ("reversals", "energy_error", "noise_limited", "resting_spin")
 
 
-def test_resolved_configuration_is_a_configuration(write: Write) -> None:
-    config = load_config(write())
-    again = load_config(write(config.to_yaml(), "again.yaml"))
-    assert again == config
-    assert again.fingerprint() == config.fingerprint()
-
-
 def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
     first = load_config(write()).fingerprint()
     for same in ({"name": "other"}, {"max_failed_fraction": 0.5}, {"delta": 0.03}):

@@ -129,21 +129,10 @@ def test_a_theory_that_does_not_hold_is_refused_where_trajectories_would_settle_
         assert result.exit_code == (2 if fault else 0), result.stderr
 
 
-@pytest.mark.parametrize("name", ["missing.py", "."])
+@pytest.mark.parametrize("name", ["missing.py", "sub.py"])
 def test_a_file_that_cannot_be_read_is_refused(folder: Path, name: str) -> None:
     (folder / "sub.py").mkdir()
-    name = "sub.py" if name == "." else name
     refused(invoke("run", folder / "pendulum.yaml", "--set", f"model={name}"), "--set model: ", name)
-
-
-def test_an_unknown_model_is_refused_with_what_is_allowed(folder: Path) -> None:
-    result = invoke("run", folder / "pendulum.yaml", "--set", "model=sliip")
-    assert result.exit_code == 2
-    said = result.stderr.splitlines()[0]
-    assert said.startswith(
-        "--set model: must be slip, noslip, effective, averaged, analytic, a Python file such as my_mo"
-    )
-    assert said.endswith(", not 'sliip' (did you mean slip?)")
 
 
 def test_its_code_is_announced_before_it_runs(folder: Path, ran: Path) -> None:
@@ -290,7 +279,7 @@ def test_a_body_of_either_surface_slips_by_the_law_of_a_file_as_by_the_same_of_o
         got.append([*slopes, *rest, *constants, model.fastest_decay(columns), *stable_ranges(model, columns)])
     np.testing.assert_allclose(got[1], got[0], rtol=1e-13)
     assert {LINEAR, ENERGY} <= mine.equations.offers == ours.equations.offers
-    assert (mine.equations.faint, mine.equations.still) == (ours.equations.faint, ours.equations.still)
+    assert mine.equations.faint == ours.equations.faint
 
 
 @pytest.fixture
@@ -325,10 +314,7 @@ def test_a_package_offers_models_by_entry_points(package: Path) -> None:
 
 @pytest.mark.parametrize("name", ["t_stop", "verified_spin_final", "reversal_times", "contact_x"])
 def test_names_of_the_dataset_are_no_names_of_parameters(folder: Path, name: str) -> None:
-    text = PENDULUM.replace('Parameter("damping"', f'Parameter("{name}"').replace(
-        'columns["damping"]', f'columns["{name}"]'
-    )
-    (folder / "pendulum.py").write_text(text, encoding="utf-8")
+    (folder / "pendulum.py").write_text(PENDULUM.replace('"damping"', f'"{name}"'), encoding="utf-8")
     words = f"parameter {name}: is reserved for a variable of the dataset; rename it"
     with pytest.raises(ConfigError, match=words):
         sweep.trajectory({"model": str(folder / "pendulum.py")})

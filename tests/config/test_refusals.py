@@ -61,6 +61,11 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (SMALL + f"model_sha256: {64 * 'a'}\n", 6, "model_sha256", "the slip model comes from no file; leave it out"),
     (step("method: euler"), 5, "integrator.method", "must be dopri5, adams or auto, not 'euler'"),
     ("model: averaged\nfriction: {mu: 60}\nintegrator: {method: adams}\n", 3, "integrator.method", "cannot run the averaged model; choose dopri5 or auto"),
+    ("model: noslip\nfriction: {mu: [20, 60]}\n", 2, "friction.mu", "the noslip model has no mu; its param"),
+    ("model: analytic\nfriction: {mu: 60}\nstart: {x0: [0.01, 0.02]}\n", 3, "start.x0", "the analytic model has no x0"),
+    ("model: effective\nfriction: {mu: 60}\nmeasure: [reversals, energy_error]\n", 3, "measure[1]", "energy_error cannot be measured on the effective model"),
+    ("model: effective\nfriction: {mu: [0, 60]}\n", 2, "friction.mu", "must be > 0 for the effective model, not 0"),
+    ("model: averaged\nfriction: {mu: 0}\n", 2, "friction.mu", "must be > 0 for the averaged model, not 0"),
     (step("step: 0"), 5, "integrator.step", "must be auto or a finite number > 0, not 0"),
     (step("step: aut"), 5, "integrator.step", "not 'aut' (did you mean auto?)"),
     (step("step: 5"), 5, "integrator.step", "must be auto or at most 0.802, a quarter of the rattle's period, not 5"),
@@ -154,7 +159,7 @@ def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None
 
 
 @pytest.mark.parametrize(
-    ("bytes_", "said"), [(b"name: \xff\n", "not UTF-8"), (b"a: \x00\n", "not YAML"), (b"[" * 1000, "nested too deeply")]
+    ("bytes_", "said"), [(b"name: \xff\n", "not UTF-8"), (b"a: \x00\n", "not YAML"), (b"[{" * 9999, "nested too deeply")]
 )
 def test_bytes_that_are_not_yaml(bytes_: bytes, said: str, tmp_path: Path) -> None:
     (tmp_path / "config.yaml").write_bytes(bytes_)
@@ -164,17 +169,6 @@ def test_bytes_that_are_not_yaml(bytes_: bytes, said: str, tmp_path: Path) -> No
 @pytest.mark.parametrize(("name", "said"), [("none.yaml", "no such file"), (".", "cannot be read: Is a directory")])
 def test_a_file_that_cannot_be_read(name: str, said: str, tmp_path: Path) -> None:
     assert invoke("run", tmp_path / name).stderr == f"{tmp_path / name}: {said}\n"
-
-
-@pytest.mark.parametrize(
-    ("setting", "said"),
-    [("friction.mu=-1", "--set friction.mu: must be a finite number >= 0 and < 1e+12, not -1"),
-     ("mu", "--set mu: not a setting; write PATH=VALUE, such as friction.mu=60"),
-     ("friction.nu=3", "the keys here are law, regularisation, mu"), ("friction.mu=[", "not YAML"),
-     ("name.first=3", "--set name.first: name is a value, not a section; name a key such as friction.mu")],
-)  # fmt: skip
-def test_broken_setting(setting: str, said: str, write: Write) -> None:
-    refused(invoke("run", write(), "--set", setting), said)
 
 
 CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
@@ -204,19 +198,14 @@ def test_broken_cases(table: str, place: str, said: str, write: Write, tmp_path:
     assert result.stderr.startswith(f"{tmp_path}/{place}: ")
 
 
-def test_an_axis_beside_cases_is_refused(write: Write, tmp_path: Path) -> None:
-    (tmp_path / "cells.csv").write_text("mu\n60\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"small\.yaml:4:8: body\.b: cannot be an axis beside cases"):
-        load_config(write(CASES + "body: {b: [1, 2]}\n"))
-
-
-@pytest.mark.parametrize("model", ["effective", "averaged"])
-def test_models_of_strong_friction_need_some(model: str, write: Write, tmp_path: Path) -> None:
-    """Their slip is a term of order 1/μ."""
-    text = f"model: {model}\nfriction: {{mu: [0, 60]}}\n"
-    with pytest.raises(ConfigError, match=rf"2:12: friction\.mu: must be > 0 for the {model} model, not 0"):
-        load_config(write(text))
+@pytest.mark.parametrize(
+    ("beside", "said"),
+    [
+        ("body: {b: [1, 2]}\n", r"small\.yaml:4:8: body\.b: cannot be an axis beside cases"),
+        ("model: averaged\n", "column mu: must be > 0 for the averaged model"),
+    ],
+)
+def test_what_cannot_stand_beside_cases_is_refused(beside: str, said: str, write: Write, tmp_path: Path) -> None:
     (tmp_path / "cells.csv").write_text("mu\n60\n0\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match=f"column mu: must be > 0 for the {model} model"):
-        load_config(write(f"model: {model}\ncases: cells.csv\n"))
-    assert load_config(write(text.replace(model, "slip"))).axes["mu"] == (0.0, 60.0)
+    with pytest.raises(ConfigError, match=said):
+        load_config(write(CASES + beside))

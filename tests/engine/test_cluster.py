@@ -22,7 +22,7 @@ from support.kernels import threads
 from support.same import contents
 
 import sweep
-from sweep.engine.cluster import AHEAD, Cluster
+from sweep.engine.cluster import AHEAD, Cluster, connected
 from sweep.engine.reporter import Progress, Reporter
 from sweep.results.provenance import sources
 from sweep.results.store import StoreError
@@ -147,12 +147,18 @@ def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> No
     assert dataset.attrs["cpu"] == "another, one"
 
 
-def test_a_worker_of_other_sources_is_refused(config: Path, client: distributed.Client) -> None:
-    _, versions = sources()
-    said = r"tcp://.*: the worker has other sources of the model or kernel"
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [((0, "0" * 16), "other sources of the model or kernel"), ((1, "numba 0.1"), "other versions: .*, now numba 0.1")],
+)
+def test_another_program_in_a_worker_is_refused(
+    config: Path, client: distributed.Client, changed: tuple[int, str], said: str
+) -> None:
+    own = list(sources())
+    own[changed[0]] = changed[1]
     with (
-        patched(client, "sweep.engine.cluster", "_own_sources", lambda: ("0" * 16, versions)),
-        pytest.raises(StoreError, match=said),
+        patched(client, "sweep.engine.cluster", "_own_sources", lambda: tuple(own)),
+        pytest.raises(StoreError, match=f"tcp://.*: the worker has {said}"),
     ):
         sweep.run(config, cluster=Cluster(client))
 
@@ -174,6 +180,16 @@ def test_a_tile_that_kills_its_workers_is_reported(config: Path, client: distrib
 
 def command(config: Path, out: Path) -> list[str]:
     return [sys.executable, "-m", "sweep", "run", str(config), "--output", str(out), "--workers", "2"]
+
+
+def test_only_the_run_itself_reaches_its_local_scheduler() -> None:
+    with connected(1, None) as cluster:
+        assert cluster
+        address = cluster.client.scheduler.address
+        assert cluster.client.submit(sum, [1, 2]).result(timeout=30) == 3
+        for other in (address, address.replace("tls", "tcp")):
+            with pytest.raises((OSError, TypeError)):
+                distributed.Client(other, timeout="2s", set_as_default=False)
 
 
 @pytest.mark.campaign

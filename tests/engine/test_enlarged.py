@@ -87,18 +87,27 @@ def test_what_is_taken_over_is_not_computed_again(write: Write, tmp_path: Path) 
     assert (found["reversals"] == 77).sum() == 1
 
 
-@pytest.mark.parametrize("t_end", [3050, 6000])
+@pytest.mark.parametrize("t_end", [3037, 6000])
 def test_the_time_limit_leaves_no_trace(write: Write, t_end: int) -> None:
     """Only those cells are taken over that do not know of the limit; another number of steps is another run."""
     short, config = sweep.run(write(MORE)), sweep.load_config(write(MORE.replace("3000", str(t_end))))
     cells = taken_over(config, short, None).cells
     taken = np.flatnonzero(cells >= 0)
-    assert len(taken) == 0 if t_end == 3050 else len(taken) > 5
+    assert len(taken) == 0 if t_end == 3037 else len(taken) > 5
     assert set(short["status"].values.ravel()[cells[taken]]) <= {SETTLED}
     long = sweep.run(config)
     for name in ("reversals", "t_stop", "spin_final", "spin_rest", "energy_error", "step"):
         values, longer = short[name].values.ravel(), long[name].values.ravel()
         np.testing.assert_array_equal(longer[taken], values[cells[taken]])
+
+
+def test_what_adams_foresaw_is_not_taken_over(write: Write) -> None:
+    """Near the limit it takes short steps where it would have leapt on to a later one."""
+    text = MORE.replace("{t_end", "{method: adams, t_end")
+    short, later = sweep.run(write(text)), sweep.load_config(write(text.replace("3000", "6000")))
+    assert (taken_over(later, short, None).cells >= 0).sum() > 5
+    short["t_stop"] = 3000 - 100 * short["step"]
+    assert (taken_over(later, short, None).cells < 0).all()
 
 
 @pytest.mark.usefixtures("short_chunks")

@@ -17,7 +17,8 @@ from sweep.kernels.measures import MEASURES
 def told(what: str, **settings: Any) -> float:
     """Seconds that are told for `what`."""
     cells = {"body": {"b": [2.0, 3.0]}, "friction": {"mu": STANDARD["mu"]}, "start": {"n0": 0.05}}
-    said = estimate(sweep.load_config(cells | {"integrator": {"t_end": 3e6, "method": "dopri5"}, **settings}))
+    integrator = {"t_end": 3e6, "method": "dopri5", "estimate_errors": settings.pop("estimate_errors", False)}
+    said = estimate(sweep.load_config(cells | {"integrator": integrator, **settings}))
     found = re.search(rf"([\d.e+]+) to {what}", said)
     assert found
     return float(found[1])
@@ -38,10 +39,11 @@ def test_every_measurement_is_counted(name: str, monkeypatch: pytest.MonkeyPatch
     [
         ({"measure": ["reversals", {"sensitivity": 2}]}, 1 + 2 / 0.8),
         ({"verify": 1}, 1 + 2),
+        ({"estimate_errors": True}, 1 + 1 / 1.5),
         ({"measure": ["reversals", "lyapunov"]}, 3),
         ({"body": {"b": [2.0, 3.0], "offset": 0.1}}, 1.4),
     ],
-    ids=["sensitivity", "verify", "lyapunov", "general"],
+    ids=["sensitivity", "verify", "errors", "lyapunov", "general"],
 )
 def test_what_runs_again_or_longer_is_counted(settings: dict[str, Any], runs: float) -> None:
     assert told("compute", **settings) == pytest.approx(runs * told("compute", measure=["reversals"]), rel=0.1)

@@ -197,7 +197,9 @@ def full(file: Path) -> xr.Dataset:
 def test_simulated_cells_are_those_of_the_full_run(refined: xr.Dataset, full: xr.Dataset) -> None:
     simulated = refined.inferred == 0
     assert 0.1 < float(simulated.mean()) == refined.attrs["simulated_share"] < 0.9
-    assert set(full.data_vars) - set(refined.data_vars) == {"noise_limited", "step_rule", "window_dependent"}
+    assert set(full.data_vars) - set(refined.data_vars) == {
+        "noise_limited", "sensitive", "step_rule", "window_dependent"
+    }  # fmt: skip
     assert set(refined.data_vars) - set(full.data_vars) == {"inferred"}
     assert refined.inferred.attrs["flag_meanings"] == "simulated inferred"
     assert "inferred" not in full

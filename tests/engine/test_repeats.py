@@ -1,4 +1,4 @@
-"""Cells that fail or miss their tolerance: no failure is false, true ones have their time, and the rest stays."""
+"""Cells that fail: no failure is false, true ones have their time, and the rest stays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import sweep
 from sweep.engine import local, repeats
 from sweep.engine.reporter import Progress, Reporter
 from sweep.kernels import methods
-from sweep.kernels.method import FIXED, MISSED, REPEAT
+from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, TIME_LIMIT, TOPPLED
 
 Write = Callable[..., Path]
@@ -105,7 +105,7 @@ def test_failures_on_the_way_of_a_run_that_is_too_long(cells: Cells, monkeypatch
 
 
 def test_without_a_second_look_both_would_be_paradoxes(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local, "repeat_all", lambda *_: None)
+    monkeypatch.setattr(local, "decide_failures", lambda *_: None)
     found = cells([THIN, STIFF], method="adams", t_end=14.5)
     assert found.status.values.tolist() == [PARADOX, PARADOX]
 
@@ -160,28 +160,6 @@ def test_no_energy_error_above_a_hundredth_without_a_failure(cells: Cells, body:
     assert (int(found.status[0]), float(found.t_stop[0])) == (DIVERGED, 400.0)
 
 
-def test_a_missed_tolerance_is_repeated(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
-    settings = {"method": "adams", "t_end": 400.0, "stop_when_settled": False}
-    lengthen(monkeypatch, 4)
-    repeated = cells([MISSES], **settings)
-    unmeasured = cells([MISSES], measure=["reversals"], **settings)
-    monkeypatch.setattr(repeats, "ROUNDS", 0)
-    once = cells([MISSES], **settings)
-    expected = adaptive.spin(columns(**MISSES), 400.0)
-    assert abs(float(once.spin_final[0]) - expected) > 1e-7
-    assert abs(float(repeated.spin_final[0]) - expected) < 3e-8
-    assert float(once.step[0] / repeated.step[0]) in (pytest.approx(2, rel=1e-2), pytest.approx(4, rel=1e-2))
-    assert int(repeated.step_rule[0]) == REPEAT
-    assert unmeasured.spin_final == once.spin_final  # nothing says that it missed
-
-
-def test_a_tolerance_that_no_repeat_keeps_is_told(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(repeats, "ROUNDS", 1)
-    lengthen(monkeypatch, 4)
-    found = cells([MISSES], method="adams", t_end=400.0, tolerance=1e-13)
-    assert (int(found.status[0]), int(found.step_rule[0])) == (TIME_LIMIT, MISSED)
-
-
 @pytest.mark.parametrize("method", ["adams", "auto"])
 @pytest.mark.parametrize("size", [1, 3])
 def test_tiles_and_threads_do_not_touch_the_numbers(
@@ -213,16 +191,20 @@ class Stops(Reporter):
 
 
 @pytest.mark.usefixtures("short_chunks")
-def test_an_interrupt_while_cells_are_repeated(cells: Cells, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", ["decide_failures", "keep_tolerance"])
+def test_an_interrupt_while_cells_are_repeated(
+    cells: Cells, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     settings = {"method": "adams", "t_end": 30.0}
-    whole, stops, repeat_all = cells(MIXED, **settings), Stops(), repeats.repeat_all
+    whole, stops, again = cells(MIXED, **settings), Stops(), getattr(local, name)
 
-    def repeat(*arguments: Any) -> None:
+    def repeat(*arguments: Any) -> Any:
         stops.repeating = True
-        repeat_all(*arguments)
+        found = again(*arguments)
         stops.repeating = False
+        return found
 
-    monkeypatch.setattr(local, "repeat_all", repeat)
+    monkeypatch.setattr(local, name, repeat)
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
         cells(MIXED, out, reporter=stops, **settings)
@@ -230,7 +212,8 @@ def test_an_interrupt_while_cells_are_repeated(cells: Cells, tmp_path: Path, mon
     same_numbers(cells(MIXED, out, reporter=stops, **settings), whole)
     # A failure is reported only when it is certain, and no progress is taken back.
     assert stops.stopped
-    failed = [progress.failed for progress in stops.seen]
+    failed, done = ([getattr(progress, name) for progress in stops.seen] for name in ("failed", "done"))
+    assert done[-1] == len(MIXED)
     assert max(failed) == failed[-1] == int(np.isin(whole.status, list(ENDS)).sum())
 
 

@@ -61,7 +61,8 @@ def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.
             assert [path.name for path in out.iterdir()] == ["small.checkpoint"]
             with np.load(out / "small.checkpoint" / "running.npz") as archive:
                 (part,) = plan(sweep.load_config(write())).parts
-                steps.append(archive["dopri5"][:, part.kernel.layout.index("done")].sum())
+                done = part.kernel.layout.index("done")
+                steps.append(sum(archive[run][:, done].sum() for run in archive if run.startswith("dopri5")))
     assert interruptions > 2
     assert steps == sorted(set(steps))
     same_numbers(dataset, small)

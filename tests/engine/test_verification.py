@@ -17,6 +17,7 @@ from sweep import ConfigError
 from sweep.engine.checks import verify
 from sweep.engine.executor import execute
 from sweep.engine.plan import plan
+from sweep.engine.work import Work
 from sweep.kernels import methods
 from sweep.models import MODELS
 
@@ -107,7 +108,7 @@ def test_a_changed_count_is_counted(write: Write) -> None:
     (part,) = job.parts
     execute(part.kernel, part.images, stop_when_settled=True)
     part.kernel.table(part.images)["reversals"][3] += 1
-    found = verify(job.config, np.arange(12), job.results())
+    found = verify(job.config, np.arange(12), job.results(), Work())
     assert list(np.flatnonzero(found["verified_count_changed"])) == [3]
 
 

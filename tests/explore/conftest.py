@@ -9,6 +9,8 @@ import pytest
 import xarray as xr
 
 import sweep
+from sweep.explore.setup import Setup
+from sweep.explore.slices import Source, open_source
 from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
 
 TEXT = """\
@@ -41,6 +43,16 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = folder / "tiny.nc"
     dataset.to_netcdf(path)
     return path
+
+
+@pytest.fixture(scope="session")
+def source(tiny: Path) -> Source:
+    return open_source(tiny)
+
+
+@pytest.fixture(scope="session")
+def setup(source: Source) -> Setup:
+    return Setup(source)
 
 
 @pytest.fixture

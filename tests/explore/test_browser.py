@@ -30,24 +30,11 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.browser
 
-CHROMIUM = "/usr/bin/chromium"
-"""Debian's: playwright's own is downloaded from a place that many machines do not reach."""
-
 TIMEOUT = 60_000
 """Milliseconds: more than any machine needs; the kernel is compiled before."""
 
 N0 = 1
 """Index of the slice with cells of many kinds."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
-        yield found
-        found.close()
 
 
 @pytest.fixture(scope="module")

@@ -14,20 +14,10 @@ from sweep.engine.reporter import Progress
 from sweep.explore import export, runner
 from sweep.explore.runner import COMPILING, Curve, Job, Runner
 from sweep.explore.setup import Setup, usable
-from sweep.explore.slices import Source, open_source
+from sweep.explore.slices import Source
 from sweep.explore.state import Cell, State
 from sweep.jit import compiling
 from sweep.kernels.status import LIFT_OFF
-
-
-@pytest.fixture(scope="module")
-def source(tiny: Path) -> Source:
-    return open_source(tiny)
-
-
-@pytest.fixture(scope="module")
-def setup(source: Source) -> Setup:
-    return Setup(source)
 
 
 def cell_at(source: Source, setup: Setup, **index: int) -> dict[str, float]:

@@ -17,17 +17,17 @@ from sweep.results.store import StoreError
 
 @pytest.mark.parametrize(("x", "y"), list(permutations(("mu", "b", "n0"), 2)))
 @pytest.mark.parametrize("name", ["reversals", "difference", "spin_final", "n_c1_plus", "status"])
-def test_a_slice_is_the_selection(name: str, x: str, y: str, tiny: Path, opened: xr.Dataset) -> None:
+def test_a_slice_is_the_selection(name: str, x: str, y: str, source: Source, opened: xr.Dataset) -> None:
     (rest,) = {"mu", "b", "n0"} - {x, y}
     whole = opened["reversals"] - opened["reversals_predicted"] if name == "difference" else opened[name]
     expected = whole.broadcast_like(opened["status"]).isel({rest: 1}).transpose(y, x).values
-    part = open_source(tiny).map(name, x, y, {rest: 1})
+    part = source.map(name, x, y, {rest: 1})
     np.testing.assert_array_equal(part.values, expected)
-    np.testing.assert_array_equal(open_source(tiny).tables([name], x, y, {rest: 1})[name], expected)
+    np.testing.assert_array_equal(source.tables([name], x, y, {rest: 1})[name], expected)
 
 
-def test_kinds_are_those_of_the_figures(tiny: Path, opened: xr.Dataset) -> None:
-    part = open_source(tiny).map("reversals", "mu", "b", {"n0": 1})
+def test_kinds_are_those_of_the_figures(source: Source, opened: xr.Dataset) -> None:
+    part = source.map("reversals", "mu", "b", {"n0": 1})
     for kind, where in marks.marks(opened.isel(n0=1), "reversals").items():
         np.testing.assert_array_equal(part.marks[kind], where.transpose("b", "mu").values, kind)
     assert part.marks["failed"][0, 0]
@@ -59,8 +59,7 @@ def test_cells_end_half_way_between_values(spacing: str, values: list[float], ed
     np.testing.assert_array_equal(axis.place(values), [0, 1, 2] if spacing == "uneven" else values)
 
 
-def test_a_cell_is_told_in_words(tiny: Path, opened: xr.Dataset) -> None:
-    source = open_source(tiny)
+def test_a_cell_is_told_in_words(source: Source, opened: xr.Dataset) -> None:
     told = [source.describe({"mu": k, "b": 0, "n0": 1}) for k in range(4)]
     ends = [each["how the trajectory ended"] for each in told]
     assert ends == ["lifted off the table", "settled", "ended at the time limit", "settled"]

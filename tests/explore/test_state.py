@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from urllib.parse import parse_qs
 
 import pytest
 
 from sweep.explore import state
 from sweep.explore.setup import Setup
-from sweep.explore.slices import Source, open_source
+from sweep.explore.slices import Source
 from sweep.explore.state import State
 
 HOSTILE = {
@@ -30,14 +29,9 @@ HOSTILE = {
 """What is said of an address that asks for what is not there."""
 
 
-@pytest.fixture(scope="module")
-def source(tiny: Path) -> Source:
-    return open_source(tiny)
-
-
-@pytest.fixture(scope="module")
-def base(source: Source) -> state.Cell:
-    return Setup(source).base
+@pytest.fixture
+def base(setup: Setup) -> state.Cell:
+    return setup.base
 
 
 def read(query: str, source: Source, base: state.Cell) -> tuple[State, list[str]]:

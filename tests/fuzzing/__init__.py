@@ -2,9 +2,7 @@
 
 A kind takes a source of randomness and a folder, makes one input, hands it in, and returns whether it was accepted.
 It raises `Violation` where the input was neither accepted nor properly refused.  tests/test_fuzz.py tries some inputs
-of each kind with hypothesis; a campaign tries many:
-
-    python -m tests.fuzzing --inputs 10000
+of each kind with hypothesis, and among the campaigns many.
 """
 
 from __future__ import annotations
@@ -195,7 +193,7 @@ def table(random: Random, folder: Path) -> bool:
             if row and random.random() < 0.8:
                 row[random.randrange(len(row))] = random.choice(CELLS)
             else:
-                row[:] = random.choice((row[1:], [*row, "1"], row * 3000))
+                row[:] = random.choice((row[1:], [*row, "1"], row * (3000 if len(row) < 9 else 1)))
     comma, end = random.choice((*",,,,,,,,,,;\t|",)), random.choice(("\n", "\n", "\r\n", "\r"))
     data = "".join(comma.join(row) + end for row in [names, *rows]).encode()
     if random.random() < 0.3:

@@ -60,14 +60,6 @@ def test_count_on_the_edge_of_an_inequality() -> None:
     assert list(analytic.reversal_count(columns(n0=np.nextafter(edges, 1)))) == [1, 2]
 
 
-@given(mu=st.floats(5, 300), b=st.floats(1.2, 9.5), delta=st.floats(0.005, 0.1), n0=st.floats(-0.2, 0.2))
-def test_mirror_image_has_mirrored_predictions(mu: float, b: float, delta: float, n0: float) -> None:
-    body, image = columns(mu=mu, b=b, delta=delta, n0=n0), columns(mu=mu, b=b, delta=-delta, n0=-n0)
-    plus, minus = analytic.critical_spins(body)
-    np.testing.assert_allclose(analytic.critical_spins(image), (-minus, -plus), rtol=1e-12)
-    assert analytic.reversal_count(body) == analytic.reversal_count(image)
-
-
 @given(scale=st.floats(0.1, 10), mu=st.floats(5, 300), b=st.floats(1.2, 9.5), n0=st.floats(-0.2, 0.2))
 def test_predictions_scale_with_the_body(scale: float, mu: float, b: float, n0: float) -> None:
     body = columns(mu=mu, b=b, n0=n0)

@@ -14,7 +14,6 @@ from support import columns
 from support.kernels import finish, images, kernel, spin
 
 import sweep
-from sweep import ConfigError
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import TIME_LIMIT
@@ -143,20 +142,6 @@ def test_reduced_models_have_the_papers_critical_spins(name: str, write: Write) 
     dataset = sweep.predict(write("friction: {mu: 75}\n"), model=name)
     assert float(dataset.n_c1_plus_linear) == pytest.approx(float(dataset.n_c1_plus), rel=3e-2)
     assert float(dataset.n_c1_minus_linear) == pytest.approx(float(dataset.n_c1_minus), rel=3e-2)
-
-
-def test_a_parameter_that_the_model_lacks_cannot_be_swept(write: Write) -> None:
-    text = "model: noslip\nfriction: {mu: [20, 60]}\n"
-    with pytest.raises(ConfigError, match=r"2:12: friction\.mu: the noslip model has no mu; its param"):
-        sweep.load_config(write(text))
-    with pytest.raises(ConfigError, match=r"x0: the analytic model has no x0"):
-        sweep.load_config(write(text), {"model": "analytic", "x0": [0.01, 0.02]})
-    assert "mu" not in sweep.load_config(write(text), {"mu": 60.0}).parameters
-
-
-def test_a_measurement_that_the_model_lacks_is_refused(write: Write) -> None:
-    with pytest.raises(ConfigError, match=r"measure\[1\]: energy_error cannot be measured on the effective model"):
-        sweep.load_config(write("friction: {mu: 60}\nmeasure: [reversals, energy_error]\n"), {"model": "effective"})
 
 
 def test_rolling_has_no_critical_spin(write: Write) -> None:

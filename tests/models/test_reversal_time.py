@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import columns, wide_bodies
+from support import cells, columns, wide_bodies
+from support.physics import KANE_LEVINSON
 
 import sweep
 from sweep.models import find
@@ -16,16 +17,8 @@ from sweep.models.general import rigid_body
 from sweep.models.general.reversal_time import REASONS, energies, first_reversal, growth
 from sweep.models.theory import linear
 
-KANE_LEVINSON = {
-    "a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 1.0, "gravity": 9.81,
-    "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5,
-}  # fmt: skip
 ANGLES = {"roll": 0.01, "pitch": -0.02, "omega1": 0.3, "omega2": -0.1, "omega3": -1.0}
 NO_SLIP = np.zeros(1), np.zeros(1)
-
-
-def cells(**parameters: float) -> dict[str, np.ndarray]:
-    return {name: np.array([value]) for name, value in parameters.items()}
 
 
 def bodies() -> dict[str, tuple[str, dict[str, np.ndarray]]]:

@@ -27,10 +27,6 @@ def test_form_agrees_with_a_numerical_derivation(body: dict[str, float]) -> None
     np.testing.assert_allclose(ours, theirs, atol=1e-3 * np.abs(theirs).max())
 
 
-def test_form_of_one_body() -> None:
-    assert np.ravel(ripple.form(columns(b=5.0))) == pytest.approx([-1.63509, 0.02493, 0.01980, -0.51858], abs=1e-5)
-
-
 def scatter(model: Model, start: np.ndarray, body: dict[str, np.ndarray]) -> tuple[float, float]:
     """How far n and n* scatter about parabolas in time."""
     constants = take(model.constants.of(body), 0)

@@ -349,6 +349,21 @@ def test_numbers_along_a_further_dimension_get_panels() -> None:
     assert len(maps(picture.plot(more, "reversal_times"))) == 2
 
 
+def test_a_sweep_of_too_many_panels_is_not_drawn(tmp_path: Path) -> None:
+    axes = ["b=2..2.4:5", "mu=40..44:5", "n0=0.01..0.03:3", "delta=0.01..0.03:3", "t_end=5"]
+    (tmp_path / "many.yaml").write_text("friction: {mu: 60}\n", encoding="utf-8")
+    settings = [part for axis in axes for part in ("--set", axis)]
+    result = invoke("run", tmp_path / "many.yaml", "--output", tmp_path / "out", *settings)
+    assert result.exit_code == 0
+    assert "no picture: 9 panels" in result.stderr
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["many.nc"]
+
+
+@pytest.mark.parametrize("selection", [{"mu": 0}, {"mu": 0, "n0": 0}, {"mu": 0, "b": 0, "n0": 0}])
+def test_draws_any_number_of_axes(small: xr.Dataset, selection: dict[str, int]) -> None:
+    assert picture.plot(small.isel(selection)).axes
+
+
 def test_a_notebook_shows_a_map_before_pyplot_is_imported(small: xr.Dataset) -> None:
     shown = sweep.plot(small)._repr_png_()
     assert shown.startswith(b"\x89PNG")

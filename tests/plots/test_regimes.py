@@ -15,25 +15,21 @@ from sweep.plots.marks import legend
 from sweep.plots.quantities import field
 from sweep.plots.regimes import FEW, REGIMES, REGULAR, SETTLES, UNDECIDED, WANDERS
 
-
-def cell(status: int, reversals: int, variation: float, exponent: float, error: float = 1e-3) -> tuple[Any, ...]:
-    return status, reversals, variation, exponent, error
-
-
 CELLS = {
-    SETTLES: cell(SETTLED, 7, 0.5, 0.1),
-    FEW: cell(TIME_LIMIT, 3, np.nan, 0.1),
-    REGULAR: cell(TIME_LIMIT, 30, 0.009, 0.001),
-    WANDERS: cell(TIME_LIMIT, 30, 0.011, 0.0031),
-    UNDECIDED: cell(TIME_LIMIT, 30, 0.011, 0.0029),
+    SETTLES: (SETTLED, 7, 0.5, 0.1),
+    FEW: (TIME_LIMIT, 3, np.nan, 0.1),
+    REGULAR: (TIME_LIMIT, 30, 0.009, 0.001),
+    WANDERS: (TIME_LIMIT, 30, 0.011, 0.0031),
+    UNDECIDED: (TIME_LIMIT, 30, 0.011, 0.0029),
 }
+"""Status, reversals, variation of the cycles, and exponent."""
 
 
 def dataset(cells: list[tuple[Any, ...]]) -> xr.Dataset:
-    names = ("status", "reversals", "cycle_variation", "lyapunov", "lyapunov_error")
+    names = ("status", "reversals", "cycle_variation", "lyapunov")
     columns = {name: ("n0", np.array(values)) for name, values in zip(names, zip(*cells, strict=True), strict=True)}
-    columns["status"] = ("n0", columns["status"][1].astype("int8"))
-    return xr.Dataset(columns, {"n0": np.arange(len(cells)) / 10})
+    dataset = xr.Dataset(columns, {"n0": np.arange(len(cells)) / 10})
+    return dataset.assign(lyapunov_error=("n0", np.full(len(cells), 1e-3)), status=dataset["status"].astype("int8"))
 
 
 @pytest.mark.parametrize("regime", CELLS, ids=REGIMES.get)
@@ -42,7 +38,7 @@ def test_a_regime_is_told_by_its_thresholds(regime: int) -> None:
 
 
 def test_a_body_that_lifts_off_has_none() -> None:
-    found = dataset([*CELLS.values(), cell(LIFT_OFF, 0, np.nan, np.nan)])
+    found = dataset([*CELLS.values(), (LIFT_OFF, 0, np.nan, np.nan)])
     assert "failed: 1 lifted off" in legend(found, "regime")["failed"]
     assert any("lifted off" in each for each in entries(sweep.plot(found, "regime")))
 

@@ -108,32 +108,31 @@ def test_a_page_of_all_series_fits_a_screen() -> None:
     assert trajectories.draw(made([60])).get_size_inches()[1] * 110 < 1200
 
 
-def test_plot_and_info_know_the_file_of_a_trajectory(write: Write, tmp_path: Path) -> None:
-    options = ("--at", "mu=60", "--at", "mu=75", "--set", "t_end=50", "--output", tmp_path)
-    assert invoke("trajectory", write(), *options).exit_code == 0
-    drawn = (tmp_path / "small_trajectory.png").read_bytes()
-    (tmp_path / "small_trajectory.png").unlink()
-    assert invoke("plot", tmp_path / "small_trajectory.nc").exit_code == 0
-    assert (tmp_path / "small_trajectory.png").read_bytes() == drawn
-    told = invoke("info", tmp_path / "small_trajectory.nc").stdout
+def told_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:
+    """The file that a command writes, of which `plot` draws the same picture, and what `info` says of it."""
+    file = config.with_name(f"small_{verb}.nc")
+    assert invoke(verb, config, *options, "--output", config.parent).exit_code == 0
+    drawn = file.with_suffix(".png").read_bytes()
+    file.with_suffix(".png").unlink()
+    assert invoke("plot", file).exit_code == 0
+    assert file.with_suffix(".png").read_bytes() == drawn
+    return file, invoke("info", file).stdout
+
+
+def test_plot_and_info_know_the_file_of_a_trajectory(write: Write) -> None:
+    file, told = told_of("trajectory", write(), "--at", "mu=60", "--at", "mu=75", "--set", "t_end=50")
     assert "2 trajectories" in told
     assert "mu = 75, n0 = 0.02, x0 = 0.01, y0 = 0.01: time_limit at t = 50, 0 reversals" in told
-    refused(invoke("plot", tmp_path / "small_trajectory.nc", "--x", "mu"), "not for a figure of single trajectories")
+    refused(invoke("plot", file, "--x", "mu"), "not for a figure of single trajectories")
 
 
-def test_plot_and_info_know_the_file_of_critical_spins(write: Write, tmp_path: Path) -> None:
-    settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--width", "0.1", "--output", tmp_path)
-    assert invoke("critical", write(), *settings).exit_code == 0
-    drawn = (tmp_path / "small_critical.png").read_bytes()
-    (tmp_path / "small_critical.png").unlink()
-    assert invoke("plot", tmp_path / "small_critical.nc").exit_code == 0
-    assert (tmp_path / "small_critical.png").read_bytes() == drawn
-    told = invoke("info", tmp_path / "small_critical.nc")
-    assert told.exit_code == 0
-    assert "critical spins of 2 bodies (mu 2)" in told.stdout
-    assert "n_c1_plus: 1 no friction, 1 found; 0.0024" in told.stdout
-    assert invoke("plot", tmp_path / "small_critical.nc", "--var", "n_c2_plus_simulated").exit_code == 0
-    figure = picture.plot(tmp_path / "small_critical.nc")
+def test_plot_and_info_know_the_file_of_critical_spins(write: Write) -> None:
+    settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--width", "0.1")
+    file, told = told_of("critical", write(), *settings)
+    assert "critical spins of 2 bodies (mu 2)" in told
+    assert "n_c1_plus: 1 no friction, 1 found; 0.0024" in told
+    assert invoke("plot", file, "--var", "n_c2_plus_simulated").exit_code == 0
+    figure = picture.plot(file)
     assert sum(line.get_gid() in VARIABLES for line in figure.axes[0].lines if line.get_gid()) == 8
     assert not figure.axes[0].get_legend()
     assert "simulation" in entries(figure)

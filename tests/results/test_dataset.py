@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -41,7 +43,6 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
         "raw_reversals",
         "reversals_low",
         "reversals_high",
-        "sensitive",
     }
     assert {name: str(small[name].dtype) for name in ("reversals", "status", "spin_final", "reversals_predicted")} == {
         "reversals": "int16", "status": "int8", "spin_final": "float64", "reversals_predicted": "int16",
@@ -97,6 +98,24 @@ def test_open_dataset_is_in_memory(write: Write, tmp_path: Path) -> None:
     dataset = open_dataset(tmp_path / "out" / "small.nc")
     (tmp_path / "out" / "small.nc").unlink()
     assert int(dataset["reversals"].sum()) >= 0
+
+
+def test_a_file_is_on_the_disk_before_it_gets_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, fsync, replace, done = tmp_path / "x.nc", os.fsync, os.replace, list[str]()
+
+    def flush(handle: int) -> None:
+        done.append(f"flush {'folder' if stat.S_ISDIR(os.fstat(handle).st_mode) else os.fstat(handle).st_size}")
+        fsync(handle)
+
+    def rename(old: Path, new: Path) -> None:
+        done.append("rename")
+        replace(old, new)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    monkeypatch.setattr(os, "replace", rename)
+    with replacing(path) as temporary:
+        temporary.write_text("whole")
+    assert done == ["flush 5", "rename", "flush folder"]
 
 
 def test_no_temporary_file_survives_a_failure(tmp_path: Path) -> None:

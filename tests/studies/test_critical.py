@@ -10,14 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from support import wide_bodies
 from support.kernels import kernel
 
 import sweep
-from sweep.cli import main
 from sweep.engine.executor import execute
-from sweep.engine.reporter import Reporter
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.status import TIME_LIMIT
@@ -25,10 +22,7 @@ from sweep.models import MODELS
 from sweep.models.model import Columns, Model, stack
 from sweep.models.theory import linear
 from sweep.results.dataset import REASONS
-from sweep.results.memory import Memory
-from sweep.results.store import Running
 from sweep.studies import rounds
-from sweep.studies.critical import _search as search
 from sweep.studies.critical import critical, remarks
 
 Write = Callable[..., Path]
@@ -159,16 +153,6 @@ def test_where_n_c2_is_undecided_its_upper_bound_is_told(write: Write) -> None:
     assert short.n_c2_plus_simulated_outer > 1.1 * long.n_c2_plus_simulated_outer
 
 
-def test_critical_command(write: Write, tmp_path: Path) -> None:
-    command = ["critical", write(STANDARD), "--set", "mu=[60,75]", "--set", "model=averaged", "--width", "0.01"]
-    result = CliRunner().invoke(main, [*map(str, command), "--output", str(tmp_path / "o")], catch_exceptions=False)
-    assert result.exit_code == 0
-    assert result.stdout.startswith("wrote ")
-    stored = xr.load_dataset(tmp_path / "o" / "standard_critical.nc")
-    np.testing.assert_allclose(stored.n_c2_plus_simulated, 2 * stored.n_c1_plus, rtol=0.1)
-    assert (tmp_path / "o" / "standard_critical.png").exists()
-
-
 def test_a_fixed_step_is_taken_by_its_own_method_alone(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     """With an automatic step the way outwards is simulated with the cheapest method; the ends of brackets never are."""
     used = set[str]()
@@ -181,18 +165,5 @@ def test_a_fixed_step_is_taken_by_its_own_method_alone(write: Write, monkeypatch
     monkeypatch.setattr("sweep.studies.rounds.executor.execute", noted)
     for step, kernels in ((0.02, {"RungeKuttaKernel"}), ("auto", {"RungeKuttaKernel", "AdamsKernel"})):
         used.clear()
-        critical(sweep.load_config(write(STANDARD), {"mu": 20.0, "t_end": 500.0, "step": step}), width=0.1)
+        critical(sweep.load_config(write(STANDARD), {"mu": 2.0, "t_end": 500.0, "step": step}), width=0.1)
         assert used == kernels
-
-
-class Damaged(Memory):
-    """Has images of another round, as they are found after the answers to an earlier round were lost to damage."""
-
-    def load_running(self) -> Running:
-        return Running([7], {"adams": np.zeros((2, 3))}, 1.0)
-
-
-def test_images_of_another_round_are_left_alone(write: Write) -> None:
-    config = sweep.load_config(write(STANDARD), {"t_end": 30.0})
-    whole, again = (search(config, 0.1, store, Reporter()) for store in (Memory(), Damaged()))
-    xr.testing.assert_equal(again, whole)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 import sweep
 from sweep.config import ConfigError
+
+Write = Callable[..., Path]
 
 STONE = """\
 units: SI
@@ -19,10 +22,8 @@ integrator: {t_end: 100}
 """
 
 
-def test_critical_spins_of_a_real_body(tmp_path: Path) -> None:
-    file = tmp_path / "stone.yaml"
-    file.write_text(STONE, encoding="utf-8")
-    result = sweep.critical(file, width=1e-2)
+def test_critical_spins_of_a_real_body(write: Write) -> None:
+    result = sweep.critical(write(STONE), width=1e-2)
     for side in ("plus", "minus"):
         assert (result[f"n_c1_{side}_reason"] == 0).all()
         assert np.abs(result[f"n_c2_{side}_simulated"] / result[f"n_c1_{side}_linear"])[1] > 1  # t_end decides
@@ -31,21 +32,36 @@ def test_critical_spins_of_a_real_body(tmp_path: Path) -> None:
     assert "n_c1_plus" not in result
 
 
-def test_a_start_by_angles_has_no_spin_to_search(tmp_path: Path) -> None:
-    file = tmp_path / "stone.yaml"
-    file.write_text(STONE.replace("n0: 1, x0: 1.0e-3, y0: 1.0e-3", "roll: 1 deg"), encoding="utf-8")
+def test_a_start_by_angles_has_no_spin_to_search(write: Write) -> None:
     with pytest.raises(ConfigError, match="give x0 and y0"):
-        sweep.critical(file)
+        sweep.critical(write(STONE.replace("n0: 1, x0: 1.0e-3, y0: 1.0e-3", "roll: 1 deg")))
 
 
-def test_vectors_of_a_trajectory_are_along_the_same_axes_with_any_equations(tmp_path: Path) -> None:
+def test_vectors_of_a_trajectory_are_along_the_same_axes_with_any_equations() -> None:
     """Those of the paper's model are along the axes of inertia; the general equations know those of the surface."""
-    file = tmp_path / "turned.yaml"
-    body, start = "{a: 10, b: 3, delta: 0.3}", "{n0: 0.2, x0: 0.3, y0: -0.1}"
-    file.write_text(f"body: {body}\nfriction: {{mu: 3}}\nstart: {start}\nintegrator: {{t_end: 20}}\n", encoding="utf-8")
-    with_couple = sweep.load_config(file, {"sigma": 1e-14})
-    papers, general = sweep.trajectory(file, every=0.5), sweep.trajectory(with_couple, every=0.5)
+    turned = {"body": {"a": 10, "b": 3, "delta": 0.3}, "start": {"n0": 0.2, "x0": 0.3, "y0": -0.1}}
+    papers, general = (
+        sweep.trajectory(turned | {"friction": {"mu": 3} | couple}, t_end=20, every=0.5)
+        for couple in ({}, {"sigma": 1e-14})
+    )
     assert float(general.contact_x[0, 0]) == pytest.approx(0.3)
     for name in ("spin", "contact_x", "contact_y", "slip_1", "slip_2"):
         assert np.abs(papers[name]).max() > 1e-3
         np.testing.assert_allclose(general[name], papers[name], rtol=0, atol=1e-8)
+
+
+def test_a_small_body_reverses_as_a_large_one_does(write: Write) -> None:
+    """With lengths 400 times as small, times are 20 times as short, and spins larger than 10 rad/s."""
+    small = (
+        "units: SI\n"
+        "body: {a: 5.0e-4, b: 7.5e-5, c: 5.0e-5, offset: 2.5e-5, mass: 1.0, Ixx: 1.25e-9, Iyy: 1.0e-8,"
+        " Izz: 1.0625e-8, Ixy: -1.25e-10}\n"
+        "friction: {mu: 2000}\nstart: {n0: 1, x0: 2.5e-6, y0: 2.5e-6}\nintegrator: {t_end: 5}\n"
+    )
+    large = sweep.critical(write(STONE.replace("[30, 100]", "100")), width=1e-2)
+    found = sweep.critical(write(small), width=1e-2)
+    for side in ("plus", "minus"):
+        there, here = (each[f"n_c2_{side}_simulated"] for each in (large, found))
+        assert (found[f"n_c2_{side}_reason"] == large[f"n_c2_{side}_reason"]).all()
+        np.testing.assert_allclose(here, 20 * there, rtol=0.01)
+    assert np.abs(found["n_c2_minus_simulated"]).max() > 10

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from scipy.interpolate import CubicSpline
 
 import sweep
 from sweep import ConfigError
-from sweep.cli import main
 from sweep.plots.trajectories import reversal_times
 
 Write = Callable[..., Path]
@@ -79,6 +77,7 @@ def test_a_saved_trajectory_is_plotted_over_time(write: Write, tmp_path: Path) -
 
 def test_trajectory_shows_the_motion(write: Write) -> None:
     one = sweep.trajectory(write(STANDARD), mu=60).isel(trajectory=0)
+    assert all({"long_name", "units"} <= set(v.attrs) for v in one.variables.values())
     assert float(one.contact_x[0]) == pytest.approx(0.01)
     assert float(one.contact_y[0]) == pytest.approx(0.01)
     # The slip's derivative, and the balance of energy and work, from the series themselves.
@@ -102,45 +101,6 @@ def test_trajectories_of_every_model(model: str, write: Write) -> None:
     series = sweep.trajectory(config)
     assert float(series.spin[0, 0]) == pytest.approx(0.05)
     assert np.isfinite(series.spin).all()
-
-
-@pytest.mark.parametrize(
-    ("at", "said"),
-    [
-        ({"mu": -1}, "mu: must be a finite number >= 0"),
-        ({"nu": 1}, "nu: unknown key"),
-        ({"x0": 20}, "off the ellipsoid"),
-        ({"n0": np.nan}, "nan"),
-    ],
-)
-def test_impossible_cells_are_refused(at: dict[str, float], said: str, write: Write) -> None:
-    with pytest.raises(ConfigError, match=said):
-        sweep.trajectory(write(STANDARD), **at)
-
-
-def test_trajectory_command(write: Write, tmp_path: Path) -> None:
-    command = [
-        "trajectory",
-        write(STANDARD),
-        "--at",
-        "mu=60",
-        "--at",
-        "mu=75",
-        "--at",
-        "n0=0.02",
-        "--output",
-        tmp_path / "o",
-    ]
-    result = CliRunner().invoke(main, [*map(str, command), "--set", "t_end=30"], catch_exceptions=False)
-    assert result.exit_code == 0
-    stored = xr.load_dataset(tmp_path / "o" / "standard_trajectory.nc")
-    assert stored.sizes["trajectory"] == 2
-    np.testing.assert_array_equal(stored.mu, [60, 75])
-    np.testing.assert_array_equal(stored.n0, [0.02, 0.02])
-    assert all({"long_name", "units"} <= set(v.attrs) for v in stored.variables.values())
-    assert (tmp_path / "o" / "standard_trajectory.png").read_bytes().startswith(b"\x89PNG")
-    wrong = CliRunner().invoke(main, ["trajectory", str(write(STANDARD)), "--at", "mu"])
-    assert (wrong.exit_code, "NAME=NUMBER" in wrong.stderr) == (2, True)
 
 
 def test_first_reversal_is_measured_on_request(write: Write) -> None:

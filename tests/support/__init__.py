@@ -22,10 +22,15 @@ integrator: {method: dopri5, t_end: 1500}
 """A sweep of twelve cells, slow enough to be interrupted."""
 
 
+def cells(**parameters: Any) -> dict[str, np.ndarray]:
+    """Columns over cells."""
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, float)) for value in parameters.values()))
+    return {name: array.copy() for name, array in zip(parameters, arrays, strict=True)}
+
+
 def columns(**parameters: Any) -> dict[str, np.ndarray]:
     """The standard case with some parameters replaced, as columns over cells."""
-    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (STANDARD | parameters).values()))
-    return {name: array.copy() for name, array in zip(STANDARD | parameters, arrays, strict=True)}
+    return cells(**STANDARD | parameters)
 
 
 def wide_bodies(number: int) -> dict[str, np.ndarray]:

@@ -55,15 +55,21 @@ def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vect
     return slopes, N, power
 
 
+def _attitude(y: Vector, law: str | None) -> tuple[Vector, Vector]:
+    """The downward normal, and the slip velocity in the body's axes."""
+    u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
+    return u, np.array([*y[5:], -(y[5] * u[0] + y[6] * u[1]) / u[2]]) if law else np.zeros(3)
+
+
 def _solution(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vector, float, float, float]:
     """As `derivative`, and the determinant of the linear system, which vanishes where no force solves it."""
     m, g = p.get("mass", 1.0), p.get("gravity", 1.0)
-    u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
+    u, slip = _attitude(y, law)
     side = np.cross(u, [1.0, 0, 0]) / np.linalg.norm(np.cross(u, [1.0, 0, 0]))
     space = np.array([np.cross(side, u), side, u])  # rows: axes fixed in space, in the body's components
     J = space @ inertia(p) @ space.T
     omega, up = space @ y[2:5], np.array([0, 0, 1.0])
-    v = space @ np.array([*y[5:], -(y[5] * u[0] + y[6] * u[1]) / u[2]]) if law else np.zeros(3)
+    v = space @ slip
     du = np.cross(u, y[2:5])
     x_p = space @ contact(u, p)
     # The velocity of the contact point, in space, as the body turns: by a complex step.
@@ -106,6 +112,14 @@ def _solution(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vecto
         slopes += list((space.T @ in_space - np.cross(y[2:5], space.T @ v))[:2])
     power = -found[6:] @ v + (p.get("sigma", 0.0) + N * rolling) * speed**2 + N * spinning * n**2
     return np.array(slopes), N, power, np.linalg.det(matrix)
+
+
+def energy(y: Vector, p: Mapping[str, float], law: str | None) -> float:
+    """Energy per unit mass, above that of upright rest."""
+    u, v = _attitude(y, law)
+    x_p, m = contact(u, p), p.get("mass", 1.0)
+    v_g, rest = v + np.cross(x_p, y[2:5]), p["c"] - p.get("offset", 0.0)
+    return float((y[2:5] @ inertia(p) @ y[2:5] / m + v_g @ v_g) / 2 - p.get("gravity", 1.0) * (x_p @ u + rest))
 
 
 def follow(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) -> Vector:

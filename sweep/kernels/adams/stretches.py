@@ -9,8 +9,8 @@ then grow again from noise, and the reversal that it causes would come too early
   becomes.
 
 A leap or a lift changes the spin at second order in the sizes α of the modes; this change is applied to M3.  With d the
-distance of the spin from the critical spin of the mode, an error of d α⁴/8 < 1e-10 in spin is left, and for a lifted
-mode d α²/2 for as long as it is lifted, which is kept below `tolerance`.
+distance of the spin from the critical spin of the mode, an error of the order of d α⁴ in spin is left, and for a lifted
+mode d α²/2 for as long as it is lifted; both are kept below `tolerance`.
 
 When a growing mode is read off the state, less than tolerance/n of it comes from the other mode: from its *products*,
 that is through the nonlinear terms, and from its round-off.  Products make up less than 1e-5 of a lifted mode.
@@ -37,9 +37,11 @@ from sweep.models.stiff.slip import STIFF_MODEL, Constants
 # Largest size of the modes of a rattle that leaps, which is where a leap ends, and of a lifted mode.  The second value
 # of each pair is for rattles whose fast mode decays far more quickly than the slow one grows: the ratio of their
 # d Re λ/dn is at least _RATIO.  The limit for a lifted mode has to be below that for a leap, or a lifted mode acts on
-# the spin before it is lowered again.
+# the spin before it is lowered again.  The error of a leap grows with the fourth power of the size, to 8e-9 in spin at
+# 1e-2 (wide cells with little friction); so for tolerances below _LOOSE all sizes are smaller, by its fourth root.
 _RATIO = 2.6
 _LARGEST, _LARGEST_LIFTED = (3e-3, 1e-2), (1e-3, 3e-3)
+_LOOSE = 1e-7
 
 # A mode is lifted only if it always exceeds what the other mode excites in it by this factor, because that would be
 # lowered with it.
@@ -163,7 +165,8 @@ def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, l
         growing = np.argmax(rates, axis=1)
         seen, true = _Modes.of(logs, rates, growing), _Modes.of(logs - lifts, rates, growing)
         hard = np.divide(*(np.abs(rattle.slopes[:, k]) for k in (1, 0))) >= _RATIO
-        largest = np.log(np.where(hard, _LARGEST[1], _LARGEST[0]))
+        smaller = min(1.0, (tolerance / _LOOSE) ** 0.25)
+        largest = np.log(smaller * np.where(hard, _LARGEST[1], _LARGEST[0]))
         # The time at which the first mode leaves the linear range, by the true sizes.
         ends = np.where(rates > 0, (largest[:, None] - (logs - lifts)) / rates, np.inf).min(axis=1)
         low = true.log_d + true.rate_d * np.ceil(ends / step) * step
@@ -177,7 +180,7 @@ def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, l
         use = sinks | (seen.log_g > true.log_g) | (steps >= np.minimum(WORTHWHILE, left))
         now = small & use & (unclear <= 0)
 
-        cap = np.where(hard, _LARGEST_LIFTED[1], _LARGEST_LIFTED[0])
+        cap = smaller * np.where(hard, _LARGEST_LIFTED[1], _LARGEST_LIFTED[0])
         cap = np.log(np.minimum(cap, np.sqrt(2 * tolerance / rattle.distances().min(axis=1))))
         after = np.zeros_like(lifts)
         np.put_along_axis(after, (1 - growing)[:, None], np.where(sinks, np.maximum(cap - low, 0), 0)[:, None], 1)

@@ -27,9 +27,6 @@ class Sensitivity(Measurement):
     variables = {
         "reversals_low": measured("int16", "fewest spin reversals from starts 1e-10 apart"),
         "reversals_high": measured("int16", "most spin reversals from starts 1e-10 apart"),
-        "sensitive": measured(
-            "int8", "whether starts 1e-10 apart differ in their number of reversals", flag="sensitive"
-        ),
     }  # fmt: skip
     bounds = (1, 100)
     count: int = 1

@@ -1,6 +1,6 @@
 """Bounds on what a body of `general` may do, from its energy at the start: how hard it presses, slips and turns.
 
-The step of an explicit method, and the energies below which a law of friction is linear or a body at rest, follow.
+The step of an explicit method, and the energy below which a law of friction is linear, follow.
 """
 
 from __future__ import annotations
@@ -31,11 +31,6 @@ def faint_energy(speed: Array, columns: Columns, surface: Surface) -> Array:
     stiffness = np.minimum(*rigid_body.stiffness(columns, surface))
     per_root = np.sqrt(2 * grip) + np.sqrt(g / c) * arm * np.sqrt(2 / (g * stiffness))
     return np.asarray((speed / per_root) ** 2)
-
-
-def still_energy(speed: Array, columns: Columns) -> Array:
-    """Energy that allows no angular velocity above `speed`, per unit mass, shape (cells,)."""
-    return np.asarray(0.5 * np.linalg.eigvalsh(rigid_body.matrix(rigid_body.inertia(columns)))[:, 0] * speed**2)
 
 
 def couples_decay(couples: Sequence[Couple], columns: Columns, surface: Surface) -> Array:

@@ -8,14 +8,9 @@ from typing import Any
 import numpy as np
 
 from sweep.models.general import rigid_body
-from sweep.models.general.bounds import still_energy
 from sweep.models.general.couples import Couple
-from sweep.models.general.laws import Law
 from sweep.models.general.surfaces import Surface
 from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, zeros
-
-STILL = "still"
-"""The constant `Model.still` of variants with a couple that stops the body."""
 
 
 def record(surface: Surface, constants: Sequence[str], more: Any) -> type[Any]:
@@ -32,16 +27,11 @@ def record(surface: Surface, constants: Sequence[str], more: Any) -> type[Any]:
     return Constants
 
 
-def couple_constants(couples: Sequence[Couple], law: Law | None = None) -> tuple[tuple[str, ...], Any]:
-    names = tuple(name for couple in couples for name in couple.constants)
-    stopping = [couple.stops_below for couple in couples if couple.stops_below]
-    stopping = [law.stops_below] if law and law.stops_below else stopping
-
+def couple_constants(couples: Sequence[Couple]) -> tuple[tuple[str, ...], Any]:
     def values(columns: Columns) -> tuple[Array, ...]:
-        still = (still_energy(stops_below(columns), columns) for stops_below in stopping)
-        return (*(value for couple in couples for value in couple.of(columns)), *still)
+        return tuple(value for couple in couples for value in couple.of(columns))
 
-    return (*names, *(STILL for _ in stopping)), values
+    return tuple(name for couple in couples for name in couple.constants), values
 
 
 def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:

@@ -35,9 +35,6 @@ class Couple:
     about_normal: bool = False
     """Whether it resists the spin alone; it is per unit of the normal force then."""
     linear: bool = True
-    stops_below: Callable[[Columns], Array] | None = None
-    """(columns) -> angular velocity, shape (cells,), below which its resistance is that of creeping.  A body whose
-    energy allows no faster motion counts as at rest; None if it never does."""
 
 
 @inline
@@ -53,10 +50,6 @@ def _rolling(square: Any, p: Any) -> Any:
 @inline
 def _spinning(square: Any, p: Any) -> Any:
     return p.arm_spinning / rounded(np.sqrt(square), p.speed_spinning)
-
-
-_CREEPING = 0.1
-"""Share of `speed_spinning` below which the resistance is linear to 0.03."""
 
 
 @inline
@@ -83,7 +76,6 @@ COUPLES: dict[str, Couple] = {
             lambda columns: (columns["mu_spinning"] * columns["radius_spinning"], columns["speed_spinning"]), _spinning,
             lambda columns: 3 * columns["mu_spinning"] * columns["radius_spinning"] / columns["speed_spinning"],
             needs_normal_force=True, about_normal=True, linear=False,
-            stops_below=lambda columns: _CREEPING * columns["speed_spinning"],
         ),
     )
 }  # fmt: skip

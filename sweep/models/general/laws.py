@@ -37,8 +37,6 @@ class Law:
     of normal force; `resistance` is its k without spin then."""
     strongest_couple: Callable[[Columns], Array] | None = None
     """(columns) -> bound on the derivative of m n with respect to n, shape (cells,)."""
-    stops_below: Callable[[Columns], Array] | None = None
-    """As of a `sweep.models.general.couples.Couple`."""
     linear_to: Callable[[Columns], Array] | None = None
     """(columns) -> slip velocity up to which k is constant to a few per cent, shape (cells,); None if k is constant."""
     pure: frozenset[str] = frozenset()
@@ -192,7 +190,6 @@ LAWS: dict[str, Law] = {
             coupled=_contensou,
             # The couple falls with d most steeply where d² = 0.8.
             strongest_couple=lambda columns: 0.338 * columns["mu"] * columns["radius_contact"] ** 2 / columns["speed"],
-            stops_below=lambda columns: _LINEAR * columns["speed"] / columns["radius_contact"],
             pure=frozenset({"mu"}),
         ),
     )

@@ -16,7 +16,7 @@ from sweep.jit import inline
 from sweep.models.general import rigid_body, starts, validity
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay
-from sweep.models.general.common import STILL, couple_constants, offers, record, seen, turned
+from sweep.models.general.common import couple_constants, offers, record, seen, turned
 from sweep.models.general.couples import Couple, no_resistance
 from sweep.models.general.resistance import drag_of, isotropic_drag, resistances
 from sweep.models.general.rigid_body import gyroscopic
@@ -97,7 +97,6 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         tilt=noslip.MODEL.tilt,
         radians_a_step=noslip.MODEL.radians_a_step,
         ripple=Ripple(ripples.NAMES, lambda columns: ripples.form(columns, surface), ripples.rolling),
-        still=STILL if STILL in names else "",
         observe=lambda y, p: seen(contact, rhs, y, p),
         turned=turned,
         spin_unit=rigid_body.spin_unit,

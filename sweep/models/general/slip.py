@@ -27,7 +27,7 @@ from sweep.jit import inline
 from sweep.models.general import rigid_body, starts, validity
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
-from sweep.models.general.common import STILL, couple_constants, offers, record, seen, turned
+from sweep.models.general.common import couple_constants, offers, record, seen, turned
 from sweep.models.general.couples import Couple, no_resistance
 from sweep.models.general.laws import Law
 from sweep.models.general.resistance import drag_of, isotropic_drag, resistance_of, resistances
@@ -43,7 +43,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
     resistance, (plain, loaded), drag = resistance_of(law), resistances(couples), drag_of(couples, law)
     # A product with 0.0 would remain: the compiler has to allow for infinity.  A branch on these does not.
     damps, drags = plain is not no_resistance, loaded is not no_resistance or drag is not isotropic_drag
-    names, values = couple_constants(couples, law)
+    names, values = couple_constants(couples)
 
     @inline
     def rhs(y: Any, p: Any) -> Any:
@@ -121,7 +121,6 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
         spin_unit=rigid_body.spin_unit,
         impossible=lambda columns: validity.impossible(columns, surface),
         faint="" if law.linear_to is None else "faint",
-        still=STILL if STILL in names else "",
         extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
     )
 

@@ -76,8 +76,6 @@ class StiffForm:
     """(columns) -> rate at which the slip decays at first, shape (cells,)."""
     rise: Callable[[Columns], Array]
     """(columns) -> share by which the rattle may raise the decay rate of the slip, shape (cells,)."""
-    resistance: Callable[[Columns], Array]
-    """(columns) -> bound on friction's resistance in 1/sqrt(g c), shape (cells,)."""
     damping: Callable[[Columns], Array]
     """(columns) -> bound on the rate at which couples damp the angular velocity, shape (cells,)."""
     resolves_modes: bool

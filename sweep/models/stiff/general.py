@@ -136,7 +136,6 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         time_unit=lambda columns: 1 / rigid_body.spin_unit(columns),
         slip_decay=lambda columns: full.fastest_decay(columns) + 2.2 * rigid_body.spin_unit(columns),
         rise=lambda columns: _rise(columns, surface),
-        resistance=lambda columns: law.strongest(columns) * np.sqrt(rigid_body.gravity(columns) * columns["c"]),
         damping=lambda columns: couples_decay(couples, columns, surface),
         resolves_modes=False,
     )

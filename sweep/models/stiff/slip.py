@@ -175,7 +175,6 @@ PAPER_FORM = StiffForm(
     time_unit=lambda columns: np.sqrt(columns["c"]),
     slip_decay=lambda columns: 2.2 * friction.strongest_resistance(columns) + 2.2,
     rise=_rise,
-    resistance=lambda columns: friction.strongest_resistance(columns) * np.sqrt(columns["c"]),
     damping=zeros,
     resolves_modes=True,
 )

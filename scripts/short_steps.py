@@ -1,0 +1,124 @@
+"""Compares the estimated errors of spins with those that much shorter steps of dopri5 tell.
+
+    python scripts/short_steps.py bodies [LAW …]     40 random real bodies with each law of friction, over 20 s
+    python scripts/short_steps.py CONFIG CELLS       as many random cells of a configuration, to its t_end
+
+Each cell is run as a user would run it, and again in fixed steps a fifth as long as its own, to the time at which it
+ended.  That error is below 1/3000 of its own; where half of these steps differ from it by a tenth of the tolerance, the
+cell is not compared.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import sweep
+from sweep.config import Config
+from sweep.engine import executor
+from sweep.engine.plan import kernel_of
+from sweep.grid import Array, Grid
+from sweep.kernels.methods import PLAIN
+from sweep.kernels.status import SETTLED, TIME_LIMIT
+
+SHORTER = (5.0, 10.0)
+
+DRY = {"mu": 0.3, "speed": 5e-3}
+LAWS: dict[str, dict[str, Any]] = {
+    "viscous": {"mu": 30.0},
+    "coulomb sqrt": {"law": "coulomb", "regularisation": "sqrt", **DRY},
+    "coulomb tanh": {"law": "coulomb", "regularisation": "tanh", **DRY},
+    "coulomb cubic": {"law": "coulomb", "regularisation": "cubic", **DRY},
+    "stribeck": {"law": "stribeck", **DRY, "mu_static": 0.4, "speed_stick": 0.01, "mu_viscous": 0.1},
+    "contensou": {"law": "contensou", **DRY, "radius_contact": 5e-4},
+    "no friction": {"law": "none"},
+    "viscous, sigma": {"mu": 30.0, "sigma": 1e-4},
+    "viscous, rolling": {"mu": 30.0, "mu_rolling": 0.01, "radius": 0.01, "speed_rolling": 0.5},
+    "viscous, spinning": {"mu": 30.0, "mu_spinning": 0.2, "radius_spinning": 1e-3, "speed_spinning": 0.5},
+}
+BODIES = 40
+
+
+def bodies(seed: int) -> Iterator[dict[str, Any]]:
+    """Solid bodies of 5 to 20 cm, turned against their surface, with the spins and tilts of an experiment."""
+    random = np.random.default_rng(seed)
+    for _ in range(BODIES):
+        a, b, c = random.uniform(0.05, 0.2), random.uniform(0.02, 0.045), random.uniform(0.01, 0.018)
+        delta, mass = random.uniform(0.01, 0.2) * random.choice([-1, 1]), random.uniform(0.05, 1.0)
+        first, second, third = (mass / 5 * (p**2 + q**2) for p, q in ((b, c), (a, c), (a, b)))
+        cos, sin = np.cos(delta), np.sin(delta)
+        yield {
+            "a": a, "b": b, "c": c, "mass": mass, "Ixx": first * cos**2 + second * sin**2, "Izz": third,
+            "Iyy": first * sin**2 + second * cos**2, "Ixy": (first - second) * sin * cos,
+            "omega3": random.uniform(1, 8) * random.choice([-1, 1]), "roll": random.uniform(0.001, 0.03),
+            "pitch": random.uniform(0.001, 0.03),
+        }  # fmt: skip
+
+
+def with_law(friction: dict[str, Any], seed: int = 7) -> xr.Dataset:
+    """The datasets of all bodies, one after another."""
+    runs = []
+    for each in bodies(seed):
+        start = {name: each[name] for name in ("omega3", "roll", "pitch")}
+        body = {name: value for name, value in each.items() if name not in start}
+        config = {"units": "SI", "body": body, "friction": friction, "start": start, "integrator": {"t_end": 20}}
+        runs.append(compared(sweep.load_config(config)))
+    return xr.concat([run.drop_attrs().reset_coords(drop=True).squeeze(drop=True) for run in runs], "case")
+
+
+def compared(config: Config, cells: int = 0) -> xr.Dataset:
+    """The dataset of a configuration, or of some cells of it, with the errors that shorter steps tell."""
+    grid = Grid.of(config)
+    rows = np.sort(np.random.default_rng(0).permutation(grid.size)[: cells or None])
+    columns = grid.take(rows).columns()
+    if cells:
+        names = list(grid.axes)
+        config = replace(config, cases={name: columns[name] for name in names})
+    found = sweep.run(config, verify=0.0)
+    flat = {name: found[name].values.ravel() for name in ("step", "t_stop", "spin_final", "spin_error", "status")}
+    sound = np.isin(flat["status"], (SETTLED, TIME_LIMIT))
+    kernel = kernel_of(PLAIN, config)
+    columns = {name: values[sound] for name, values in columns.items()}
+    ends = [np.full(grid.size if not cells else len(rows), np.nan) for _ in SHORTER]
+    for end, shorter in zip(ends, SHORTER, strict=True):
+        images = kernel.images(columns, flat["step"][sound] / shorter, flat["t_stop"][sound])
+        executor.execute(kernel, images, stop_when_settled=False)
+        end[sound] = kernel.model.energy(*kernel.unpack(images))[0]
+    unit = config.equations.spin_unit(grid.take(rows).columns())
+    told = {"error": np.abs(flat["spin_final"] - ends[1]), "unsure": np.abs(ends[0] - ends[1]), "unit": unit}
+    told |= {name: flat[name] for name in ("spin_error", "t_stop", "status")}
+    return xr.Dataset({name: ("case", values) for name, values in told.items()})
+
+
+def report(label: str, found: xr.Dataset, tolerance: float) -> str:
+    """How many cells keep the tolerance, and how near the estimates are."""
+    longer = np.maximum(found.t_stop * found.unit / 400, 1)
+    allowed = (tolerance * longer * found.unit).values
+    error, told = found.error.values, found.spin_error.values
+    sharp = found.unsure.values < allowed / 10
+    says = sharp & ~(told <= allowed)
+    silent: Array = sharp & ~says
+    seen = sharp & (error > 1e-3 * allowed) & np.isfinite(told)
+    ratio = told[seen] / error[seen]
+    spread = " ".join(f"{value:.2g}" for value in np.percentile(ratio, [5, 50, 95])) if seen.any() else "-"
+    kept = ", ".join(f"{np.mean(error[silent] <= k * allowed[silent]):.2%} within {k}" for k in (1, 3))
+    return (
+        f"{label}: {sharp.sum()} cells; of {silent.sum()} silent ones {kept}; {says.sum()} say that they miss, "
+        f"{(error[says] > allowed[says]).sum()} rightly; estimate / error: {spread}, "
+        f"{np.mean(ratio < 0.1):.2%} ten times too small"
+    )
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "bodies":
+        for law in sys.argv[2:] or LAWS:
+            print(report(law, with_law(LAWS[law]), 1e-6), flush=True)
+    else:
+        chosen = sweep.load_config(sys.argv[1])
+        cells = compared(chosen, int(sys.argv[2]))
+        print(report(sys.argv[1], cells, chosen.integrator.tolerance), flush=True)

@@ -1,0 +1,191 @@
+"""Finds the error of each cell, and runs cells again that are not within the tolerance.
+
+Each cell is run a second time, in longer steps and to the time at which it ended.  The error of this *companion* is
+larger by a power of the ratio of the steps, so the difference of the two spins tells the error of the first run
+(Hairer, Nørsett and Wanner 1993, section II.4).  Whatever the motion does to an error, it does to this difference too:
+where it amplifies errors without bound, the difference is large, and no shorter step helps.  Where the companion counts
+other reversals than the run, so might another start or another computer.
+
+Of the other ways to an error, local estimates (the embedded formula, predictor less corrector) and the energy balance
+know nothing of what the motion does to an error; the balance misses it by a factor of 10 to 30.  A tangent costs twice
+the first run.  Figures: docs/explanation/accuracy.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sweep.engine.plan import Part, Plan
+from sweep.engine.repeats import MOST_STEPS, decide_failures
+from sweep.engine.work import Work
+from sweep.grid import Array
+from sweep.kernels.method import MISSED, REPEAT
+from sweep.kernels.methods import METHODS
+from sweep.kernels.status import FAILURES, RUNNING
+
+ROUNDS = 3
+"""Largest number of repeats of a cell."""
+
+AIM = 0.5
+"""Share of the tolerance above which an error is made smaller: it is known within a factor of two for most cells."""
+
+SHORTEST = 8.0
+"""Largest factor by which a repeat has a shorter step.  An error that asks for more is taken as one that the motion
+amplifies without bound."""
+
+TOLERANCE_TIME = 400.0
+"""The time in sqrt(c/g) to which a tolerance refers; a longer run may have a larger error, in proportion."""
+
+ROUND_OFF = 1e-13
+"""An error in spin that no shorter step makes smaller, in sqrt(g/c)."""
+
+AMPLIFIED = 1e3
+"""Ratio of an error to what the energy balance tells, beyond which no step that is shorter by more than `_MILD` is
+tried: the motion amplifies errors so much that it amplifies round-off too."""
+
+APART = 0.1
+"""The same for the difference of the two spins relative to their size: they have nothing in common any more."""
+
+_MILD = 2.0
+
+# A step that is shorter by some factor has to make the error smaller by at least this power of the factor.  Otherwise
+# there is no use in another step.
+_LEAST_ORDER = 3
+
+# The order that is expected of both methods when a step is made shorter, and how close to the limit of stability a
+# longer one may come, from the share of the limit that automatic steps take.
+_ORDER, _NEARER = 5, 1.1
+
+# Ratio of steps below which two runs are too much alike to tell an error.
+_ALIKE = 1.02
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What the companions of a run's cells tell, each of shape (cells,)."""
+
+    spin: Array
+    """Estimated error of the spin at the end; NaN for runs that failed, or whose companion did."""
+    reversals: Array
+    """The companions' counts; NaN where there is none."""
+    apart: Array
+    """Difference of the spins relative to the spins themselves."""
+
+    @classmethod
+    def none(cls, cells: int) -> Errors:
+        return cls(*np.full((3, cells), np.nan))
+
+    def put(self, rows: Array, other: Errors) -> None:
+        self.spin[rows], self.reversals[rows], self.apart[rows] = other.spin, other.reversals, other.apart
+
+    def take(self, rows: Array) -> Errors:
+        return Errors(self.spin[rows], self.reversals[rows], self.apart[rows])
+
+
+def keep_tolerance(job: Plan, work: Work) -> Errors:
+    """Find the error of each cell of `job`, whose runs have all ended, and repeat cells above the tolerance, in place.
+
+    A step that the configuration fixes stays.  Otherwise it is made shorter, `ROUNDS` times at most, until the error is
+    below `AIM` times what the tolerance allows.  A cell whose error stays above the tolerance is `MISSED`.
+
+    While `work` goes on, the cells whose error is not known yet are `RUNNING`.
+    """
+    found = Errors.none(sum(grid.size for grid in job.grids))
+    waiting = []
+    for part in job.parts:
+        rows = np.flatnonzero(~part.failed)
+        first = part.take(rows)
+        waiting.append((part, rows, first))
+        part.kernel.table(part.images)["status"][rows] = RUNNING
+    for part, rows, first in waiting:
+        errors = Errors.none(len(part.cells))
+        _keep(part, rows, first, errors, work)
+        found.put(part.cells, errors)
+    found.spin[np.isinf(found.spin)] = np.nan
+    return found
+
+
+def allowed(part: Part) -> Array:
+    """Error in spin that the tolerance allows at the ends of the runs, in the model's units, shape (cells,)."""
+    unit = part.config.equations.spin_unit(part.columns)
+    longer = np.maximum(part.times * unit / TOLERANCE_TIME, 1)
+    return np.asarray(max(part.config.integrator.tolerance, ROUND_OFF) * longer * unit)
+
+
+def imbalance(part: Part) -> Array:
+    """Error of the energy balance as one in spin, at the fastest spin that the energy allows, shape (cells,).
+
+    Infinite if the run does not measure it.
+    """
+    if "energy_error" not in part.kernel.measure:
+        return np.full(len(part.cells), np.inf)
+    table = part.kernel.table(part.images)
+    _, _, inertia = part.kernel.model.energy(*part.kernel.unpack(part.images))
+    scale = np.sqrt(2 * inertia * table["energy_start"])
+    return np.asarray(np.divide(table["violation"], scale, out=np.zeros(len(scale)), where=scale > 0))
+
+
+def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None:
+    """Decide the cells of `part` with the indices `rows`; `now` are these cells after their first run."""
+    rules, most = part.step_rule[rows], np.full(len(rows), np.inf)
+    for round_ in range(ROUNDS + 1):
+        name = f"{part.method} repeat {round_}"
+        other = companions(now)
+        work.run(f"{name} companion", other.kernel, other.images)
+        errors, limit = compare(now, other), allowed(now)
+        shorter = np.fmax((errors.spin / (AIM * limit)) ** (1 / _ORDER), 1.0)
+        shorter = np.where(np.isinf(errors.spin), METHODS[part.method].companion, shorter)
+        hopeless = (shorter > SHORTEST) | (errors.spin > most)
+        hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
+        long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
+        again = (errors.spin > AIM * limit) & ~hopeless & ~long & (round_ < ROUNDS) & (not part.fixed)
+        missed = (errors.spin > limit) & (not part.fixed)
+        done = now.take(~again)
+        part.put(rows[~again], done, np.where(missed, MISSED, rules)[~again])
+        found.put(rows[~again], errors.take(~again))
+        if not again.any():
+            return
+        rows, most = rows[again], errors.spin[again] / shorter[again] ** _LEAST_ORDER
+        now = now.take(again).start(shorter[again])
+        rules = np.full(len(rows), REPEAT)
+        name = f"{part.method} repeat {round_ + 1}"
+        work.run(name, now.kernel, now.images, settle=now.settles)
+        decide_failures(now, work, name)
+        failed = now.failed
+        part.put(rows[failed], now.take(failed), now.step_rule[failed])
+        rows, now, most, rules = rows[~failed], now.take(~failed), most[~failed], rules[~failed]
+
+
+def companions(part: Part) -> Part:
+    """The companions at t = 0 of all cells of `part`, none of which has failed."""
+    if not len(part.cells):
+        return part
+    step = part.kernel.table(part.images)["step"] * _ratio(part)
+    return replace(part, images=part.kernel.images(part.columns, step, part.times, part.stable))
+
+
+def compare(part: Part, companion: Part) -> Errors:
+    """Compare the cells of `part` with their companions, when all have ended."""
+    kernel, both = part.kernel, (part.images, companion.images)
+    table, other = map(kernel.table, both)
+    with np.errstate(invalid="ignore"):  # the states of a companion that failed
+        spins = [kernel.model.energy(*kernel.unpack(each))[0] for each in both]
+    ratio = other["step"] / table["step"]
+    larger = np.where(ratio > _ALIKE, ratio, np.nan) ** METHODS[part.method].error_order - 1
+    failed = np.isin(other["status"], FAILURES)
+    difference, size = np.abs(spins[0] - spins[1]), np.abs(spins[0]) + np.abs(spins[1])
+    apart = np.divide(difference, size, out=np.zeros_like(size), where=~failed & (size > 0))
+    counts = other["reversals"] if "reversals" in kernel.measure else np.nan
+    return Errors(np.where(failed, np.inf, difference / larger), np.where(failed, np.nan, counts), apart)
+
+
+def _ratio(part: Part) -> Array:
+    """Ratio of the companions' steps to those of the cells, shape (cells,), within what is stable."""
+    method, ratio = METHODS[part.method], np.full(len(part.cells), METHODS[part.method].companion)
+    if method.stable_step is None:
+        return ratio
+    with np.errstate(divide="ignore"):
+        stable = _NEARER * method.stable_step(part.config.equations, part.columns)
+    return np.asarray(np.clip(stable / part.kernel.table(part.images)["step"], _NEARER, ratio))

@@ -1,0 +1,131 @@
+"""The estimated errors of spins, beside true ones, and the repeats that they cause."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import ROOT, STANDARD
+from support.runs import same_numbers
+
+import sweep
+from sweep.engine import errors
+from sweep.kernels import methods
+from sweep.kernels.method import FIXED, MISSED, REPEAT
+from sweep.kernels.status import TIME_LIMIT
+
+Cells = Callable[..., xr.Dataset]
+
+BODY = {"b": 2.8, "mu": 100.0, "n0": 0.02}
+
+CHAOTIC = {"a": 39.7614, "b": 11.6247, "c": 1.19954, "delta": 0.020937, "mu": 240.612}
+CHAOTIC |= {"n0": -0.0490836, "x0": 8.26e-4, "y0": 2.26e-4}
+
+WIDE = [
+    {"a": 17.9935, "b": 7.78145, "c": 1.51196, "delta": -0.46953, "mu": 70.2, "n0": -0.04347, "x0": -1.28, "y0": 0.72},
+    {
+        "a": 8.29799,
+        "b": 1.63538,
+        "c": 1.479,
+        "delta": -0.3023,
+        "mu": 4.51968,
+        "n0": -0.158858,
+        "x0": 0.074,
+        "y0": -0.06,
+    },
+    {"a": 6.46, "b": 3.61, "c": 1.31, "delta": -0.0836, "mu": 45.0, "n0": -0.0555, "x0": -0.387, "y0": -0.104},
+    {"a": 3.31, "b": 2.49, "c": 1.38, "delta": 0.321, "mu": 0.306, "n0": -0.059, "x0": 0.277, "y0": 0.0655},
+]
+
+SPINS = np.array(
+    [-0.012111871241316385, 0.028480759831735498, 0.04598497612760233, 0.029284696352942577, -0.06038411718032135]
+)
+"""Spins of `BODY` and `WIDE` at t = 400, by SciPy's DOP853: `support.adaptive.spin`, half a minute of work."""
+
+
+@pytest.fixture
+def cells(tmp_path: Path) -> Cells:
+    """Runs cells given by their parameters to t = 400, along the dimension `case`."""
+
+    def run(bodies: Iterable[Mapping[str, float]], **settings: Any) -> xr.Dataset:
+        rows = [",".join(STANDARD), *(",".join(map(repr, (STANDARD | dict(body)).values())) for body in bodies)]
+        (tmp_path / "cells.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+        (tmp_path / "cells.yaml").write_text("name: cells\ncases: cells.csv\n", encoding="utf-8")
+        return sweep.run(tmp_path / "cells.yaml", **{"t_end": 400.0, "stop_when_settled": False, **settings})
+
+    return run
+
+
+@pytest.fixture
+def long_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the automatic steps of first runs four times as long as they should be."""
+    automatic = methods.automatic_step
+    monkeypatch.setattr(methods, "automatic_step", lambda *which: (4 * automatic(*which)[0], automatic(*which)[1]))
+
+
+@pytest.mark.parametrize(("method", "step"), [("dopri5", 0.01), ("adams", 0.05)])
+def test_estimates_are_near_true_errors(cells: Cells, method: str, step: float) -> None:
+    found = cells([BODY, *WIDE], method=method, step=step)
+    ratio = found.spin_error.values / np.abs(found.spin_final.values - SPINS)
+    assert np.all((ratio > 0.1) & (ratio < 20)), ratio
+    assert set(found.step_rule.values.tolist()) == {FIXED}
+
+
+@pytest.mark.usefixtures("long_steps")
+def test_a_missed_tolerance_is_repeated(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever is measured."""
+    for measure in (["reversals", "energy_error"], ["reversals"]):
+        repeated = cells([BODY], method="adams", measure=measure)
+        assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8
+        assert float(repeated.spin_error[0]) < 1e-8
+        assert int(repeated.step_rule[0]) == REPEAT
+    monkeypatch.setattr(errors, "ROUNDS", 0)
+    once = cells([BODY], method="adams")
+    assert abs(float(once.spin_final[0]) - SPINS[0]) > 1e-7
+    assert float(once.spin_error[0]) > 1e-7
+    assert int(once.step_rule[0]) == MISSED
+
+
+def test_what_nobody_asked_for_is_not_run(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(errors, "companions", None)
+    found = cells([BODY], method="adams", estimate_errors=False)
+    assert not {"spin_error", "sensitive"} & set(found)
+    assert int(found.status[0]) == TIME_LIMIT
+
+
+def test_a_chaotic_cell_says_so(cells: Cells) -> None:
+    """It would count otherwise from another start, and no step is short enough for it."""
+    found = cells([CHAOTIC, BODY], t_end=10_000)
+    assert found.step_rule.values[0] == MISSED
+    assert found.spin_error.values[0] > 1e-5
+    assert found.sensitive.values.tolist() == [1, 0]
+
+
+def test_a_cell_alone_has_the_same_error(cells: Cells) -> None:
+    bodies = [BODY, CHAOTIC, WIDE[0]]
+    together = cells(bodies)
+    for i, body in enumerate(bodies):
+        same_numbers(cells([body]).assign_coords(together.isel(case=[i]).coords), together.isel(case=[i]))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
+def test_wide_cells_keep_the_tolerance_or_say_so(cells: Cells, tolerance: float) -> None:
+    with (ROOT / "data" / "reference_wide.csv").open(encoding="utf-8") as table:
+        rows = [row for row in csv.DictReader(table) if row["end"] == "time_limit"]
+    found = cells([{name: float(row[name]) for name in STANDARD} for row in rows], method="adams", tolerance=tolerance)
+    true, known = np.array([[float(row[name]) for row in rows] for name in ("spin_400", "uncertainty_400")])
+    error, told = np.abs(found.spin_final.values - true), found.spin_error.values
+    sharp = known < tolerance / 10
+    silent = sharp & (told <= tolerance)
+    assert silent.sum() > 0.95 * sharp.sum()
+    assert np.mean(error[silent] <= tolerance) > 0.98
+    assert np.all(error[silent] <= 3 * tolerance)
+    ratio = (told / error)[sharp & (error > 1e-3 * tolerance) & np.isfinite(told)]
+    assert 1 / 3 < np.median(ratio) < 3
+    assert np.mean(ratio < 0.1) < 0.04
