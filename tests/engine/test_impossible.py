@@ -54,11 +54,11 @@ def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> Non
     assert failed_fraction(edge) == 0
     assert edge.attrs["impossible"] == (
         "6 cells, centre of mass outside the ellipsoid, the first at b=0.9, offset=1; "
-        "2 cells, upright rest is unstable, the first at b=0.9, offset=0"
+        "2 cells, upright rest is not stable, the first at b=0.9, offset=0"
     )
     words = summarize(edge)
     assert "8 impossible" in words
-    assert "2 cells, upright rest is unstable" in words
+    assert "2 cells, upright rest is not stable" in words
     assert "set by accuracy in 10 cells" in words
 
 
@@ -122,9 +122,9 @@ def test_critical_spins_of_the_others(write: Write) -> None:
 
 def test_what_is_refused(write: Write) -> None:
     for change in ({"b": 0.9, "offset": 0.05}, {"offset": 1.0}, {"b": [0.8, 0.9], "offset": [0.0, 1.0]}):
-        with pytest.raises(ConfigError, match=r"upright rest is unstable|centre of mass outside"):
+        with pytest.raises(ConfigError, match=r"upright rest is not stable|centre of mass outside"):
             load_config(write(TEXT), change)
-    with pytest.raises(ConfigError, match="upright rest is unstable"):
+    with pytest.raises(ConfigError, match="upright rest is not stable"):
         sweep.trajectory(write(TEXT), b=[0.9, 3.0], offset=0.05)
     # A fixed step is judged by the bodies that there are.
     config = load_config(write(TEXT), {"step": 0.02})

@@ -233,7 +233,8 @@ def test_300_wide_cells_end_as_they_truly_do(cells: Cells, method: str) -> None:
     with (ROOT / "data" / "reference_wide.csv").open(encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
     bodies = [{name: float(row[name]) for name in STANDARD} for row in rows]
-    found = cells(bodies, method=method, t_end=400.0, stop_when_settled=False)
+    # Failures are decided before errors are estimated, which takes dopri5 minutes at strong friction.
+    found = cells(bodies, method=method, t_end=400.0, stop_when_settled=False, estimate_errors=method == "adams")
     ends = {"time_limit": TIME_LIMIT, "toppled": TOPPLED}
     np.testing.assert_array_equal(found.status, [ends[row["end"]] for row in rows])
     np.testing.assert_allclose(found.t_stop, [float(row["t_end"]) for row in rows], rtol=0, atol=2e-6)

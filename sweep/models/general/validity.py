@@ -31,5 +31,5 @@ def wrongs(columns: Columns, surface: Surface = ELLIPSOID) -> Iterator[tuple[Arr
     k1, k2 = rigid_body.stiffness(columns, surface)
     yield (
         np.minimum(k1, k2) <= 0,
-        f"upright rest is unstable; keep the centre of mass below both centres of curvature, {surface.bounds}",
+        f"upright rest is not stable; keep the centre of mass below both centres of curvature, {surface.bounds}",
     )
