@@ -48,7 +48,7 @@ RK4 = """RK4 = Tableau(
     name="rk4", code=9, summary="the classical formula", order=4,
     a=((F(1, 2),), (F(0), F(1, 2)), (F(0), F(0), F(1))),
     b=(F(1, 6), F(1, 3), F(1, 3), F(1, 6)), c=(F(0), F(1, 2), F(1, 2), F(1)),
-    real_stability=2.7853, phase=0.3, layer_error=0.1, balance=14.0,
+    real_stability=2.7853, phase=0.3, layer_error=0.1,
 )
 TABLEAUS = (DOPRI5, RK4)"""
 
