@@ -99,7 +99,9 @@ def rows(case: Case) -> Iterator[Row]:
     end, near = (np.broadcast_to(each, len(case.names)) for each in (case.end, case.near))
     spin = fine["spin_final"] if case.spin is None else case.spin
     for method in methods:
-        ends = simulate(case.columns, case.t_end, method=method, tolerance=case.tolerance, settle=case.settle)
+        ends = simulate(
+            case.columns, case.t_end, method=method, tolerance=case.tolerance, settle=case.settle, decide=True
+        )
         for i, name in enumerate(case.names):
             status, time, energy = int(ends["status"][i]), ends["t_stop"][i], ends["energy_error"][i]
             if end[i] in (TIME_LIMIT, SETTLED):

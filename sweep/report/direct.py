@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from sweep.config import load_config
 from sweep.engine.executor import execute
+from sweep.engine.plan import Part
+from sweep.engine.repeats import decide_failures
+from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.build import build
@@ -68,6 +72,7 @@ def simulate(
     measure: tuple[str, ...] = MEASURE,
     ranges: bool = True,
     settle: bool = False,
+    decide: bool = False,
 ) -> Ends:
     """Run trajectories to their ends.
 
@@ -79,6 +84,8 @@ def simulate(
     measure : measurements, of which those that the model knows are taken
     ranges : whether the kernel gets the spins at which the rattle decays; without them nothing settles
     settle : whether a trajectory ends as soon as it has settled
+    decide : whether a failure is repeated with shorter steps until it is certain, as `sweep.run` does it;
+        not without `ranges`
     """
     chosen = MODELS[model]
     kernel = make_kernel(method, chosen, measure)
@@ -89,4 +96,10 @@ def simulate(
     steps = np.broadcast_to(steps, cells).astype(float)
     images = kernel.images(columns, steps, t_end, stable)
     execute(kernel, images, stop_when_settled=settle)
+    if decide and stable is not None:
+        first = {name: float(columns[name][0]) for name in chosen.parameters}
+        settings = {"t_end": t_end, "tolerance": tolerance, "stop_when_settled": settle}
+        config, rules = load_config({"model": model, "integrator": settings}, first), np.zeros(cells)
+        part = Part(kernel, np.arange(cells), columns, steps, rules, config=config, stable=stable, images=images)
+        decide_failures(part, Work(), method)
     return Ends(kernel, images, t_end)
