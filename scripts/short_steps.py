@@ -1,7 +1,7 @@
 """Compares the estimated errors of spins with those that much shorter steps of dopri5 tell.
 
     python scripts/short_steps.py bodies [LAW …]     40 random real bodies with each law of friction, over 20 s
-    python scripts/short_steps.py CONFIG CELLS       as many random cells of a configuration, to its t_end
+    python scripts/short_steps.py CONFIG CELLS       as many random cells of a map of the paper's model, to its t_end
 
 Each cell is run as a user would run it, and again in fixed steps a fifth as long as its own, to the time at which it
 ended.  That error is below 1/3000 of its own; where half of these steps differ from it by a tenth of the tolerance, the
@@ -11,8 +11,9 @@ cell is not compared.
 from __future__ import annotations
 
 import sys
+import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -76,10 +77,7 @@ def compared(config: Config, cells: int = 0) -> xr.Dataset:
     grid = Grid.of(config)
     rows = np.sort(np.random.default_rng(0).permutation(grid.size)[: cells or None])
     columns = grid.take(rows).columns()
-    if cells:
-        names = list(grid.axes)
-        config = replace(config, cases={name: columns[name] for name in names})
-    found = sweep.run(config, verify=0.0)
+    found = sweep.run(_table(config, columns) if cells else config, verify=0.0)
     flat = {name: found[name].values.ravel() for name in ("step", "t_stop", "spin_final", "spin_error", "status")}
     sound = np.isin(flat["status"], (SETTLED, TIME_LIMIT))
     kernel = kernel_of(PLAIN, config)
@@ -93,6 +91,19 @@ def compared(config: Config, cells: int = 0) -> xr.Dataset:
     told = {"error": np.abs(flat["spin_final"] - ends[1]), "unsure": np.abs(ends[0] - ends[1]), "unit": unit}
     told |= {name: flat[name] for name in ("spin_error", "t_stop", "status")}
     return xr.Dataset({name: ("case", values) for name, values in told.items()})
+
+
+def _table(config: Config, columns: dict[str, Array]) -> Config:
+    """The same configuration for the cells `columns` alone."""
+    with tempfile.TemporaryDirectory() as folder:
+        lines = [
+            ",".join(columns),
+            *(",".join(map(repr, row)) for row in np.stack([*columns.values()], axis=1).tolist()),
+        ]
+        (Path(folder) / "cells.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        text = f"name: cells\ncases: cells.csv\nintegrator: {{t_end: {config.integrator.t_end}}}\n"
+        (Path(folder) / "cells.yaml").write_text(text, encoding="utf-8")
+        return sweep.load_config(Path(folder) / "cells.yaml")
 
 
 def report(label: str, found: xr.Dataset, tolerance: float) -> str:
