@@ -5,7 +5,7 @@
 
 Each cell is run as a user would run it, and again in fixed steps a fifth as long as its own, to the time at which it
 ended.  That error is below 1/3000 of its own; where half of these steps differ from it by a tenth of the tolerance, the
-cell is not compared.
+cell is not compared, nor where round-off decides in dopri5 (`noise_limited`).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from sweep.engine.plan import kernel_of
 from sweep.grid import Array, Grid
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT
+from sweep.results.dataset import measured
 
 SHORTER = (5.0, 10.0)
 
@@ -77,7 +78,8 @@ def compared(config: Config, cells: int = 0) -> xr.Dataset:
     grid = Grid.of(config)
     rows = np.sort(np.random.default_rng(0).permutation(grid.size)[: cells or None])
     columns = grid.take(rows).columns()
-    found = sweep.run(_table(config, columns) if cells else config, verify=0.0)
+    config = _table(config, columns) if cells else config
+    found = sweep.run(config, verify=0.0)
     flat = {name: found[name].values.ravel() for name in ("step", "t_stop", "spin_final", "spin_error", "status")}
     sound = np.isin(flat["status"], (SETTLED, TIME_LIMIT))
     kernel = kernel_of(PLAIN, config)
@@ -86,7 +88,9 @@ def compared(config: Config, cells: int = 0) -> xr.Dataset:
     for end, shorter in zip(ends, SHORTER, strict=True):
         images = kernel.images(columns, flat["step"][sound] / shorter, flat["t_stop"][sound])
         executor.execute(kernel, images, stop_when_settled=False)
-        end[sound] = kernel.model.energy(*kernel.unpack(images))[0]
+        again = measured(kernel, images, flat["t_stop"][sound])
+        # dopri5 does not lift modes: where they decay into round-off, it comes too early to a late reversal.
+        end[sound] = np.where(again.get("noise_limited", 0), np.nan, again["spin_final"])
     unit = config.equations.spin_unit(grid.take(rows).columns())
     told = {"error": np.abs(flat["spin_final"] - ends[1]), "unsure": np.abs(ends[0] - ends[1]), "unit": unit}
     told |= {name: flat[name] for name in ("spin_error", "t_stop", "status")}
