@@ -11,11 +11,10 @@ cell is not compared, nor where round-off decides in dopri5 (`noise_limited`).
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
+import comparison
 import numpy as np
 import xarray as xr
 
@@ -23,7 +22,8 @@ import sweep
 from sweep.config import Config
 from sweep.engine import executor
 from sweep.engine.plan import kernel_of
-from sweep.grid import Array, Grid
+from sweep.grid import Grid
+from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.results.dataset import measured
@@ -78,61 +78,38 @@ def compared(config: Config, cells: int = 0) -> xr.Dataset:
     grid = Grid.of(config)
     rows = np.sort(np.random.default_rng(0).permutation(grid.size)[: cells or None])
     columns = grid.take(rows).columns()
-    config = _table(config, columns) if cells else config
+    if cells:
+        rows_of = [dict(zip(columns, row, strict=True)) for row in np.stack([*columns.values()], axis=1).tolist()]
+        config = sweep.load_config(comparison.table(rows_of), {"t_end": config.integrator.t_end})
     found = sweep.run(config, verify=0.0)
     flat = {name: found[name].values.ravel() for name in ("step", "t_stop", "spin_final", "spin_error", "status")}
     sound = np.isin(flat["status"], (SETTLED, TIME_LIMIT))
-    kernel = kernel_of(PLAIN, config)
+    kernel, unit = kernel_of(PLAIN, config), config.equations.spin_unit(columns)
     columns = {name: values[sound] for name, values in columns.items()}
-    ends = [np.full(grid.size if not cells else len(rows), np.nan) for _ in SHORTER]
+    ends = [np.full(len(rows), np.nan) for _ in SHORTER]
     for end, shorter in zip(ends, SHORTER, strict=True):
         images = kernel.images(columns, flat["step"][sound] / shorter, flat["t_stop"][sound])
         executor.execute(kernel, images, stop_when_settled=False)
         again = measured(kernel, images, flat["t_stop"][sound])
         # dopri5 does not lift modes: where they decay into round-off, it comes too early to a late reversal.
         end[sound] = np.where(again.get("noise_limited", 0), np.nan, again["spin_final"])
-    unit = config.equations.spin_unit(grid.take(rows).columns())
     told = {"error": np.abs(flat["spin_final"] - ends[1]), "unsure": np.abs(ends[0] - ends[1]), "unit": unit}
     told |= {name: flat[name] for name in ("spin_error", "t_stop", "status")}
     return xr.Dataset({name: ("case", values) for name, values in told.items()})
-
-
-def _table(config: Config, columns: dict[str, Array]) -> Config:
-    """The same configuration for the cells `columns` alone."""
-    with tempfile.TemporaryDirectory() as folder:
-        lines = [
-            ",".join(columns),
-            *(",".join(map(repr, row)) for row in np.stack([*columns.values()], axis=1).tolist()),
-        ]
-        (Path(folder) / "cells.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-        text = f"name: cells\ncases: cells.csv\nintegrator: {{t_end: {config.integrator.t_end}}}\n"
-        (Path(folder) / "cells.yaml").write_text(text, encoding="utf-8")
-        return sweep.load_config(Path(folder) / "cells.yaml")
 
 
 def report(label: str, found: xr.Dataset, tolerance: float) -> str:
     """How many cells keep the tolerance, and how near the estimates are."""
     longer = np.maximum(found.t_stop * found.unit / 400, 1)
     allowed = (tolerance * longer * found.unit).values
-    error, told = found.error.values, found.spin_error.values
     sharp = found.unsure.values < allowed / 10
-    says = sharp & ~(told <= allowed)
-    silent: Array = sharp & ~says
-    seen = sharp & (error > 1e-3 * allowed) & np.isfinite(told)
-    ratio = told[seen] / error[seen]
-    spread = " ".join(f"{value:.2g}" for value in np.percentile(ratio, [5, 50, 95])) if seen.any() else "-"
-    kept = ", ".join(f"{np.mean(error[silent] <= k * allowed[silent]):.2%} within {k}" for k in (1, 3))
-    return (
-        f"{label}: {sharp.sum()} cells; of {silent.sum()} silent ones {kept}; {says.sum()} say that they miss, "
-        f"{(error[says] > allowed[says]).sum()} rightly; estimate / error: {spread}, "
-        f"{np.mean(ratio < 0.1):.2%} ten times too small"
-    )
+    return f"{label}: {comparison.words(found.error.values, found.spin_error.values, allowed, sharp)}"
 
 
 if __name__ == "__main__":
     if sys.argv[1] == "bodies":
         for law in sys.argv[2:] or LAWS:
-            print(report(law, with_law(LAWS[law]), 1e-6), flush=True)
+            print(report(law, with_law(LAWS[law]), TOLERANCE), flush=True)
     else:
         chosen = sweep.load_config(sys.argv[1])
         cells = compared(chosen, int(sys.argv[2]))

@@ -159,7 +159,8 @@ def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None
 
 
 @pytest.mark.parametrize(
-    ("bytes_", "said"), [(b"name: \xff\n", "not UTF-8"), (b"a: \x00\n", "not YAML"), (b"[{" * 9999, "nested too deeply")]
+    ("bytes_", "said"),
+    [(b"name: \xff\n", "not UTF-8"), (b"a: \x00\n", "not YAML"), (b"[{" * 9999, "nested too deeply")],
 )
 def test_bytes_that_are_not_yaml(bytes_: bytes, said: str, tmp_path: Path) -> None:
     (tmp_path / "config.yaml").write_bytes(bytes_)
