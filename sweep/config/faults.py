@@ -28,8 +28,9 @@ def quote(value: object) -> str:
 
 
 def brief(text: str, limit: int = 200) -> str:
-    """`text`, without its middle if it is long."""
-    return text if len(text) <= limit else f"{text[: limit // 2]}…{text[-limit // 2 :]}"
+    """`text` as it is printed, without its middle if it is then long."""
+    shown = printable(text)
+    return shown if len(shown) <= limit else f"{shown[: limit // 2]}…{shown[-limit // 2 :]}"
 
 
 def printable(text: str) -> str:

@@ -66,6 +66,14 @@ def test_nothing_close_is_not_suggested(write: Write) -> None:
     assert "did you mean" not in invoke("run", write(TEXT), "--set", "colour=3").stderr
 
 
+@pytest.mark.parametrize("character", ["\udcff", "\0", "\U000e0001"])
+def test_what_cannot_be_printed_is_quoted_as_short_as_any_other(character: str, write: Write) -> None:
+    """Such a character takes up to ten in print, of which 300 once filled a screen."""
+    result = invoke("trajectory", write(TEXT), "--at", f"{character * 300}=1")
+    assert result.exit_code == 2
+    assert len(result.stderr) < 700, result.stderr
+
+
 RANGES = {
     "20..60:41": (20, 60, 41), "-0.1..1e-1:3": (-0.1, 0.1, 3), ".5..1.:2": (0.5, 1, 2), "1e1..25:1e3": (10, 25, 1000),
     "-3..-1:5": (-3, -1, 5),
