@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from sweep.studies.predictions import predict
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "critical", "load_config", "open", "plot", "predict", "run",
+    "Config", "ConfigError", "StoreError", "boundaries", "critical", "load_config", "open", "plot", "predict", "run",
     "trajectory",
 ]  # fmt: skip
 
@@ -84,6 +84,50 @@ def run(
     with shown(progress, reporter) as told:
         checked = load_config(config, overrides, announce=told.note)
         return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, cluster=cluster)
+
+
+def boundaries(
+    config: ConfigLike,
+    x: str | None = None,
+    y: str | None = None,
+    width: float = 1e-6,
+    output: str | Path | None = None,
+    *,
+    fresh: bool = False,
+    progress: bool | None = None,
+    reporter: Reporter | None = None,
+    cluster: Cluster | None = None,
+    **overrides: Any,
+) -> xr.Dataset:
+    """The curves over two axes on which the number of reversals changes, for each value of the other axes.
+
+    The cells of the configuration are simulated first.  Where two neighbours along `x` or `y` count differently, the
+    place between them at which each count begins is bracketed by further simulations.
+
+    Parameters
+    ----------
+    config, output, fresh, progress, reporter, cluster, overrides : as for `run`
+    x, y : axes over which the curves are drawn; by default the second and the first of more than one value
+    width : of the brackets, relative to the value of the parameter along which each lies
+
+    Returns
+    -------
+    Dataset over the points of all curves, in order along each: the place, the `level` (the count that begins there),
+    the number of the `curve`, and of the bracket the axis along which it lies, the two simulated cells at its ends and
+    what these count.
+
+    Raises
+    ------
+    ConfigError, StoreError
+        as `run`; also if the model is a formula, or there are no two axes.
+    """
+    from sweep.config import load_config
+    from sweep.progress import shown
+    from sweep.studies.boundaries import boundaries
+
+    with shown(progress, reporter) as told:
+        checked = load_config(config, overrides, announce=told.note)
+        return boundaries(checked, x, y, width, output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def critical(

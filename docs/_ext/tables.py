@@ -70,7 +70,7 @@ def _variables() -> tuple[Row, list[Row]]:
 _STATUS_MEANINGS = {
     "not_run": "not simulated",
     "settled": "upright spin is stable, and the rattle left can change neither that nor the count",
-    "time_limit": "`t_end` was reached first",
+    "time_limit": "`t_end` was reached first, or `patience` where nothing more can be foreseen",
     "lift_off": "the normal force fell to zero: the body leaves the plane",
     "diverged": "the integration did not hold, even with a shorter step; the numbers are worth nothing",
     "paradox": "Painlevé's paradox: no contact force solves the equations",

@@ -36,7 +36,7 @@ def plot(
     files: tuple[Path, ...], variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...],
     limits: str | None, cmap: str | None, output: Path | None,
 ) -> None:  # fmt: skip
-    """Draw a dataset: maps or curves of a run, trajectories, or critical spins.
+    """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries.
 
     Of several runs, the maps of one variable are drawn side by side, with one scale.
     """

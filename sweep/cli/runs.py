@@ -1,9 +1,10 @@
-"""The commands that simulate: `run`, `trajectory` and `critical`."""
+"""The commands that simulate: `run`, `trajectory`, `boundaries` and `critical`."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -14,6 +15,21 @@ from sweep.parameters import PARAMETERS
 
 _TIMES = {"paper": "sqrt(c/g)", "SI": "s", "own": "of time"}
 """The unit in which a progress bar counts time, by the `units` of a configuration."""
+
+
+def _either(context: click.Context, parameter: click.Parameter, value: Any) -> Any:  # noqa: ARG001
+    """Refuse workers of two kinds."""
+    if value and any(context.params.get(name) for name in ("workers", "scheduler")):
+        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
+    return value
+
+
+WORKERS = click.option(
+    "--workers", type=click.IntRange(1, 4096), callback=_either, help="Run in this many processes of one thread each."
+)
+SCHEDULER = click.option(
+    "--scheduler", metavar="ADDRESS", callback=_either, help="Run on the workers of this dask scheduler."
+)
 
 
 def _parameter_help() -> str:
@@ -33,8 +49,8 @@ def _parameter_help() -> str:
 @click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")
 @click.option("--rerun", type=click.Choice(["failed", "limit"]),
               help="Simulate again only those cells of the dataset that failed, or that reached t_end.")  # fmt: skip
-@click.option("--workers", type=click.IntRange(1, 4096), help="Run in this many processes of one thread each.")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
+@WORKERS
+@SCHEDULER
 @QUIET
 def run(
     config: Path, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool,
@@ -53,8 +69,6 @@ def run(
 
         click.echo(estimate(checked))
         return
-    if workers and scheduler:
-        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
     from sweep.engine.cluster import connected
     from sweep.engine.run import run as run_sweep
     from sweep.progress import Terminal
@@ -122,6 +136,54 @@ def trajectory(
     files.save_result(result, plots.draw(result))
     if not quiet:
         say(f"wrote {files.dataset} and .png")
+
+
+@click.command()
+@CONFIG
+@click.option("--x", help="Parameter along the horizontal axis.")
+@click.option("--y", help="Parameter along the vertical axis.")
+@click.option("--width", type=click.FloatRange(1e-12, 0.5), default=1e-6, show_default=True,
+              help="Relative distance of the two simulated cells between which a count changes.")  # fmt: skip
+@OUTPUT
+@SETTINGS
+@click.option("--dry-run", is_flag=True, help="Print cells, steps, memory and estimated time; compute nothing.")
+@click.option("--fresh", is_flag=True, help="Discard what an earlier search left instead of resuming it.")
+@WORKERS
+@SCHEDULER
+@QUIET
+def boundaries(
+    config: Path, x: str | None, y: str | None, width: float, output: Path | None, settings: tuple[str, ...],
+    dry_run: bool, fresh: bool, workers: int | None, scheduler: str | None, quiet: bool,
+) -> None:  # fmt: skip
+    """Find the curves over two axes of CONFIG on which the number of reversals changes.
+
+    The cells of the grid tell where the curves pass, and further simulations how exactly: each point lies between
+    two simulated cells.  Writes NAME_boundaries.nc and .png.  If it is interrupted, finished simulations are kept,
+    and the same command resumes the search.
+    """
+    checked = loaded(config, settings)
+    if dry_run:
+        from sweep.studies.boundaries import estimate
+
+        click.echo(estimate(checked, x, y))
+        return
+    from sweep.engine.cluster import connected
+    from sweep.progress import Terminal
+    from sweep.results.summary import describe
+    from sweep.studies.boundaries import boundaries as search
+
+    folder, name = output or Path("runs") / checked.name, f"{checked.name}_boundaries"
+    before = _stamps(folder, name)
+    interrupt.raise_again()
+    with (
+        Terminal(quiet) as terminal,
+        resumable(terminal, "search", "cells"),
+        connected(workers, scheduler) as cluster,
+    ):
+        found = search(checked, x, y, width, folder, fresh=fresh, reporter=terminal, cluster=cluster)
+    if not quiet:
+        click.echo(describe(found))
+        say(_written(folder, name, before))
 
 
 @click.command()

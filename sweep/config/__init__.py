@@ -28,7 +28,7 @@ from sweep.kernels.measures import MEASURES
 from sweep.models.general.laws import LAWS
 from sweep.models.general.selection import PAPER_LAW, Physics
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.models.model import Model, Tier
+from sweep.models.model import MODES, Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.parameters import PARAMETERS, SI, Parameter, sections
@@ -223,6 +223,8 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
         longest = schema.T_END * sqrt(max(in_si["c"]) / min(in_si["gravity"]))
         # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
         found["t_end"] = STRETCH * ceil(min(longest, schema.LATEST) / STRETCH)
+    if "t_end" not in said and MODES in model.offers and integrator.stop_when_settled:
+        found |= {"t_end": schema.LATER, "patience": integrator.patience or schema.T_END}
     return Integrator(**{**dict(integrator), **found})
 
 

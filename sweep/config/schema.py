@@ -61,6 +61,9 @@ then has the status `time_limit` all the same."""
 T_END = 30_000.0
 """Default of `t_end`, in sqrt(c/g); in SI it is as long for the body."""
 
+LATER = 1e6
+"""Default of `t_end` where it can be foreseen whether a spin reverses once more; that of `patience` is then `T_END`."""
+
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
 
@@ -94,11 +97,22 @@ class Integrator(Strict):
         default=T_END, gt=0, le=LATEST,
         description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}; "
         f"with `units: SI` in s, by default {T_END:g} sqrt(c/g) of the largest c and the least gravity, rounded up to "
-        "hundreds",
+        f"hundreds, and {LATER:g} sqrt(c/g) where `patience` has a meaning",
+    )  # fmt: skip
+    patience: Annotated[float | None, Allowed("null or a finite number > 0")] = Field(
+        default=None, gt=0,
+        description="time after which a trajectory of `slip` goes on to `t_end` only if the slow equations foresee "
+        f"that its spin reverses once more, in sqrt(c/g); null for all that have not settled; by default {T_END:g} "
+        "if `t_end` is left out",
     )  # fmt: skip
     stop_when_settled: bool = Field(
         default=True, description="whether a trajectory of a sweep ends when neither spin nor count can change any more"
     )
+
+    @property
+    def patient(self) -> Integrator:
+        """The same for what is followed in time, or searched: to `patience` at the latest."""
+        return self.model_copy(update={"t_end": min(self.t_end, self.patience or self.t_end), "patience": None})
 
 
 def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 
 from sweep.config import Config
+from sweep.engine import final
 from sweep.engine.errors import Errors
 from sweep.engine.plan import Part, Plan, kernel_of
 from sweep.engine.work import Work
@@ -28,6 +29,10 @@ from sweep.results import dataset
 
 NUDGE = 1e-10
 """Relative difference of the starts next to one another, in all their parameters."""
+
+DECIDED = 10.0
+"""How many times its estimated error the margin of a count has to be: of estimates, one in some hundred is more than
+ten times too small (docs/explanation/accuracy.md)."""
 
 
 @cache
@@ -71,9 +76,18 @@ def verify(config: Config, cells: Array, first: Mapping[str, Array], work: Work)
 
 def results(job: Plan, errors: Errors | None, work: Work) -> dict[str, Array]:
     """Collect what was simulated, and what further runs tell of it, by name, each over all cells of `job`."""
+    found = job.results()
     if errors is None:
-        return job.results() | _counted(job, None, work)
-    return job.results() | {"spin_error": errors.spin} | _counted(job, errors.reversals, work)
+        return found | _counted(job, None, work)
+    found |= {"spin_error": errors.spin} | _counted(job, errors.reversals, work)
+    return found | ({"decided": _decided(found, errors)} if "margin_more" in found else {})
+
+
+def _decided(found: Mapping[str, Array], errors: Errors) -> Array:
+    """Tell which counts are final and certain, shape (cells,)."""
+    firm = (found["sensitive"] == 0) & (found["window_dependent"] == 0) & (found["status"] == SETTLED)
+    below = (found["reversals"] == 0) | (found["margin_fewer"] > DECIDED * errors.overshoot)
+    return np.asarray(firm & below & (found["margin_more"] > DECIDED * errors.nearest_approach))
 
 
 def _counted(job: Plan, companions: Array | None, work: Work) -> dict[str, Array]:
@@ -111,6 +125,6 @@ def _again(part: Part, number: int, work: Work) -> Array:
         step = SHORTER * part.kernel.table(part.images)["step"][sound]
         near = replace(part.take(sound), columns=columns, step=step)
         near = near.start()
-        work.run(f"{part.method} nudged {number}", near.kernel, near.images, settle=near.settles)
+        final.run(near, work, f"{part.method} nudged {number}")
         counts[sound] = near.kernel.table(near.images)["reversals"]
     return counts

@@ -13,14 +13,16 @@ the first run.  Figures: docs/explanation/accuracy.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from sweep.engine import final
 from sweep.engine.plan import Part, Plan
 from sweep.engine.repeats import MOST_STEPS, decide_failures
 from sweep.engine.work import Work
 from sweep.grid import Array
+from sweep.kernels.measures.margin import EXTREMES
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import FAILURES, RUNNING
@@ -72,16 +74,21 @@ class Errors:
     """The companions' counts; NaN where there is none."""
     apart: Array
     """Difference of the spins relative to the spins themselves."""
+    overshoot: Array
+    """Estimated error of the margin to one reversal fewer; NaN where it is not measured, or there is no companion."""
+    nearest_approach: Array
+    """The same to one more."""
 
     @classmethod
     def none(cls, cells: int) -> Errors:
-        return cls(*np.full((3, cells), np.nan))
+        return cls(*np.full((len(fields(cls)), cells), np.nan))
 
     def put(self, rows: Array, other: Errors) -> None:
-        self.spin[rows], self.reversals[rows], self.apart[rows] = other.spin, other.reversals, other.apart
+        for each in fields(self):
+            getattr(self, each.name)[rows] = getattr(other, each.name)
 
     def take(self, rows: Array) -> Errors:
-        return Errors(self.spin[rows], self.reversals[rows], self.apart[rows])
+        return Errors(*(getattr(self, each.name)[rows] for each in fields(self)))
 
 
 def keep_tolerance(job: Plan, work: Work) -> Errors:
@@ -151,7 +158,7 @@ def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None
         now = now.take(again).start(shorter[again])
         rules = np.full(len(rows), REPEAT)
         name = f"{part.method} repeat {round_ + 1}"
-        work.run(name, now.kernel, now.images, settle=now.settles)
+        final.run(now, work, name)
         decide_failures(now, work, name)
         failed = now.failed
         part.put(rows[failed], now.take(failed), now.step_rule[failed])
@@ -178,7 +185,12 @@ def compare(part: Part, companion: Part) -> Errors:
     difference, size = np.abs(spins[0] - spins[1]), np.abs(spins[0]) + np.abs(spins[1])
     apart = np.divide(difference, size, out=np.zeros_like(size), where=~failed & (size > 0))
     counts = other["reversals"] if "reversals" in kernel.measure else np.nan
-    return Errors(np.where(failed, np.inf, difference / larger), np.where(failed, np.nan, counts), apart)
+    margins = np.full((len(EXTREMES), len(failed)), np.nan)
+    if "margin" in kernel.measure:
+        margins = np.stack([np.abs(table[name] - other[name]) for name in EXTREMES]) / larger
+    margins[:, failed] = np.nan
+    spin = np.where(failed, np.inf, difference / larger)
+    return Errors(spin, np.where(failed, np.nan, counts), apart, *margins)
 
 
 def _ratio(part: Part) -> Array:

@@ -41,7 +41,7 @@ def estimate(config: Config) -> str:
     share = grid.size / sample.size
     with explained(config.origin):
         chosen = [each for each in choose(config, sample) if len(each.cells)]
-        steps = [np.ceil(config.integrator.t_end / each.step) for each in chosen]
+        steps = [np.ceil(config.integrator.patient.t_end / each.step) for each in chosen]
         seconds = sum(map(nominal_seconds, _works(config, chosen, steps, share)))
         compiling = compile_seconds(missing(kernels(config)))
     total = sum(each.sum() for each in steps) * share
@@ -72,4 +72,4 @@ def _works(config: Config, chosen: list[Choice], steps: list[Array], share: floa
         again = chosen[0]
         number = math.ceil(config.verify * share * sum(len(each.cells) for each in chosen))
         step, _ = automatic_step(PLAIN, config.equations, again.columns, config.integrator.tolerance)
-        yield np.resize(2 * config.integrator.t_end / step, number) * relative
+        yield np.resize(2 * config.integrator.patient.t_end / step, number) * relative

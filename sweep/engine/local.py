@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sweep.config import Config
+from sweep.engine import final
 from sweep.engine.checks import results, verify
 from sweep.engine.errors import keep_tolerance
 from sweep.engine.plan import Plan, plan
@@ -92,7 +93,7 @@ def run_batch(
 
     work.after_chunk = running
     for part in job.parts:
-        work.run(part.method, part.kernel, part.images, settle=part.settles)
+        final.run(part, work, part.method)
     work.after_chunk = deciding
     for part in job.parts:
         decide_failures(part, work, part.method)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sweep.engine import final
 from sweep.engine.plan import Part
 from sweep.engine.work import Work
 from sweep.grid import Array
@@ -80,7 +81,7 @@ def _repeat(part: Part, rows: Array, first: Part, work: Work, name: str) -> None
         if halvings:
             most = np.where(brief, 2 * (now.kernel.table(now.images)["done"] + _BEYOND), np.inf)
             now = now.start(2)
-            work.run(f"{name} halved {halvings}", now.kernel, now.images, settle=now.settles, most=most)
+            final.run(now, work, f"{name} halved {halvings}", most)
         met, met_before = _meet(now, work, f"{name} halved {halvings} approach"), met
         table = now.kernel.table(now.images)
         if part.fixed:

@@ -112,20 +112,24 @@ def _earlier(
 def _compute(
     config: Config, store: Store, reporter: Reporter, cluster: Cluster | None, earlier: Earlier | None = None
 ) -> Whole:
-    running = store.load_running()
     if earlier:
         reporter.note(earlier.words)
         result: Whole = Enlarged(config, store, earlier)
     else:
         # A single cell has no neighbours from which it could be inferred.
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
-    count = Count(reporter)
-    with explained(config.origin):
+    carry_out(result, store, reporter, cluster)
+    return result
+
+
+def carry_out(result: Whole, store: Store, reporter: Reporter, cluster: Cluster | None) -> None:
+    """Run the tiles of `result` that `store` does not have, until it asks for no more."""
+    count, running = Count(reporter), store.load_running()
+    with explained(result.config.origin):
         while result.grow(tile_size):
             if not count.cells and (store.done or running):
                 reporter.note(_kept(result, store, running))
             _run_tiles(result.simulated(), result.tiles, store, count, cluster)
-    return result
 
 
 def _kept(result: Whole, store: Store, running: Running | None) -> str:

@@ -40,8 +40,11 @@ _SHORT = {"reversals": "simulated", "reversals_predicted": "predicted", "differe
 _TICKS = 12
 """On an axis whose values are listed one by one, at most."""
 
-DASHES = {"n_c1": "dotted", "n_c2": "solid", "best": "dashed"}
-"""Of the lines of theory."""
+DASHES = {"n_c1": "dotted", "n_c2": "solid", "best": "dashed", "boundary": "solid"}
+"""Of the lines over a map."""
+
+_WIDTHS = {"boundary": 0.7}
+"""Of those that are many; the others are 1.5 wide."""
 
 _BAR = {
     "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": "#1b2733",
@@ -88,7 +91,7 @@ class MapFigure:
         ]
         overlay = ColumnDataSource({"image": [np.zeros((2, 2), "uint32")], **self._place}, syncable=False)
         plot.image_rgba(image="image", x="x", y="y", dw="dw", dh="dh", source=overlay)
-        self._lines = {name: _line(plot, dash) for name, dash in DASHES.items()}
+        self._lines = {name: _line(plot, dash, _WIDTHS.get(name, 1.5)) for name, dash in DASHES.items()}
         self.cursor, self.pins = _cursor(plot), _pins(plot)
         self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
@@ -134,11 +137,11 @@ class MapFigure:
         )  # fmt: skip
 
 
-def _line(plot: Any, dash: str) -> ColumnDataSource:
+def _line(plot: Any, dash: str, width: float) -> ColumnDataSource:
     """A line that is seen on every colour."""
     source = ColumnDataSource({"xs": [], "ys": []})
-    plot.multi_line("xs", "ys", source=source, color="white", width=3.5)
-    plot.multi_line("xs", "ys", source=source, color="black", width=1.5, dash=dash)
+    plot.multi_line("xs", "ys", source=source, color="white", width=2.5 * width)
+    plot.multi_line("xs", "ys", source=source, color="black", width=width, dash=dash)
     return source
 
 

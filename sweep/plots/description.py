@@ -12,13 +12,13 @@ import numpy as np
 import xarray as xr
 
 from sweep.grid import Array
-from sweep.plots import labels, scales, theory
+from sweep.plots import labels, levels, scales, theory
 from sweep.plots.axis import Axis
 from sweep.plots.marks import BLANK, legend, marks
 from sweep.plots.quantities import DERIVED, field
 from sweep.plots.scales import Limits, Scale
 
-_NEEDED_BY_MARKS = ("status", "inferred", "noise_limited", "sensitive", "window_dependent")
+_NEEDED_BY_MARKS = ("status", "inferred", "noise_limited", "sensitive", "window_dependent", "decided")
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,7 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
     found, kinds = field(dataset, name), marks(dataset, name)
     across, up = Axis(x, along(dataset, x)), Axis(y, along(dataset, y))
     lines = theory.lines(dataset, across, up) if y and name in theory.REVERSALS else []
+    lines += levels.lines(dataset, across, up) if y and name == "reversals" else []
     return Map(
         name, labels.label(dataset.assign({name: found}), name), across, up, table(found, across, up),
         {kind: table(where, across, up) for kind, where in kinds.items()},
@@ -75,6 +76,7 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
 def needed(dataset: xr.Dataset, name: str) -> set[str]:
     """The variables of a dataset that `describe` looks at."""
     lines = [str(n) for n in dataset.data_vars if str(n).startswith("n_c")] if name in theory.REVERSALS else []
+    lines += levels.NEEDED if name == "reversals" else []
     return {*(DERIVED[name].needs if name in DERIVED else (name,)), *_NEEDED_BY_MARKS, *lines} & set(dataset.data_vars)
 
 

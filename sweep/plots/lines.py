@@ -1,4 +1,4 @@
-"""How matplotlib draws the lines of theory."""
+"""How matplotlib draws the lines of theory, and those on which counts change."""
 
 from __future__ import annotations
 
@@ -10,11 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import Stroke, withStroke
 
+from sweep.grid import Array
 from sweep.plots.description import Map
 from sweep.plots.theory import Line
 
-_STYLES: dict[str, Any] = {"n_c1": (0, (1.5, 1.5)), "n_c2": "-", "best": (0, (6, 3))}
-_LINE: dict[str, Any] = {"color": "black", "linewidth": 1.2}
+_STYLES: dict[str, dict[str, Any]] = {
+    "n_c1": {"linestyle": (0, (1.5, 1.5)), "linewidth": 1.2},
+    "n_c2": {"linestyle": "-", "linewidth": 1.2},
+    "best": {"linestyle": (0, (6, 3)), "linewidth": 1.2},
+    "boundary": {"linestyle": "-", "linewidth": 0.6},
+}
 
 
 def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
@@ -26,27 +31,37 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
     """
     box, over_n0 = axes.axis(), "n0" in (shown.x.name, shown.y.name)
     for line in shown.lines:
+        style = _STYLES[line.name]
         for part in line.parts:
-            axes.plot(*part, linestyle=_STYLES[line.name], path_effects=_halo(2.4), gid=line.name, **_LINE)
+            axes.plot(*part, color="black", path_effects=_halo(2 * style["linewidth"]), gid=line.name, **style)
     axes.axis(box)
     for line in shown.lines:
         # Over n0 the lines of n_c1 are too close to those of n_c2 for a symbol of their own.
-        if labelled and line.symbol and (not over_n0 or line.name == "n_c2"):
-            _label(axes, shown, line)
+        if labelled and line.symbol and not (over_n0 and line.name == "n_c1"):
+            if line.name == "boundary":
+                number(axes, int(line.symbol), *max(line.parts, key=lambda part: len(part[0])))
+            else:
+                _label(axes, shown, line)
     return {line.name: entry(line.name, line.words) for line in shown.lines}
+
+
+def number(axes: Axes, level: int, x: Array, y: Array) -> None:
+    """Write the count that begins on a line into the line itself; neighbours have theirs at other places."""
+    at = int((0.8 - 0.07 * (level % 6)) * (len(x) - 1))
+    axes.annotate(f"{level}", (x[at], y[at]), fontsize=7, ha="center", va="center", path_effects=_halo(2))
 
 
 def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
     """Draw lines over curves; returns their entries for the legend."""
     for line in lines:
         for at in line.parts[0][0]:
-            axes.axvline(at, linestyle=_STYLES[line.name], color="black", linewidth=0.8, gid=line.name)
+            axes.axvline(at, linestyle=_STYLES[line.name]["linestyle"], color="black", linewidth=0.8, gid=line.name)
     return {line.name: entry(line.name, line.words) for line in lines}
 
 
 def entry(name: str, words: str) -> Line2D:
     """The entry of a legend for a line."""
-    return Line2D([], [], linestyle=_STYLES[name], label=in_maths(words), **_LINE)
+    return Line2D([], [], color="black", label=in_maths(words), **_STYLES[name])
 
 
 def in_maths(words: str) -> str:

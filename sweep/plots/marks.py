@@ -11,7 +11,7 @@ from functools import reduce
 import numpy as np
 import xarray as xr
 
-from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.plots.labels import STATUS_WORDS, is_code
 from sweep.plots.quantities import DERIVED, field
 from sweep.results.dataset import VARIABLES
@@ -24,7 +24,7 @@ WORDS = {
     "time_limit": "lower bound: ended at the time limit, may still grow",
     "inferred": "inferred from the cells around, not simulated",
     "noise_limited": "limited by round-off: the count is firm, late times are not",
-    "uncertain": "count not certain: it depends on the windows or on the start's 10th digit",
+    "uncertain": "count not certain: as near to another count as its error, or nearer",
 }
 """The kinds of cell, and what they mean.  A cell may be of several kinds, but of one of the first four at most."""
 
@@ -70,6 +70,7 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     not_run, failed, inferred = among("status", 0), among("status", *FAILURES), among("inferred", 1)
     impossible, missing = among("status", IMPOSSIBLE), found.isnull()
     sound = ~(not_run | failed | impossible)
+    settled_open = among("status", SETTLED) & among("decided", 0)
     grows, limited = name in _GROWING, name in _GROWING or (name, "time_limit") in _PER_VARIABLE
     return {
         "not_run": not_run,
@@ -79,7 +80,7 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
         "time_limit": among("status", TIME_LIMIT) & ~missing & limited,
         "inferred": inferred,
         "noise_limited": among("noise_limited", 1) & sound,
-        "uncertain": (among("sensitive", 1) | among("window_dependent", 1)) & sound & grows,
+        "uncertain": (among("sensitive", 1) | among("window_dependent", 1) | settled_open) & sound & grows,
     }
 
 

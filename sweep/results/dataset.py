@@ -67,6 +67,13 @@ VARIABLES: dict[str, Variable] = {
         {0: "firm", 1: "sensitive"},
         of_sound_runs=True,
     ),
+    "decided": Variable(
+        "int8",
+        "1",
+        "whether the number of reversals is final, and its margins are larger than ten times their errors",
+        {0: "open", 1: "decided"},
+        of_sound_runs=True,
+    ),
     "t_stop": Variable("float64", "1", "time at which the simulation ended, in sqrt(c/g)"),
     "method": Variable(
         "int8", "1", "integration method of the trajectory", {method.code: name for name, method in METHODS.items()}

@@ -1,4 +1,4 @@
-"""Says what a dataset is of: a run, single trajectories, or critical spins."""
+"""Says what a dataset is of: a run, single trajectories, critical spins, or boundaries."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import xarray as xr
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 
-RUN, TRAJECTORY, CRITICAL = "a run", "single trajectories", "critical spins"
+RUN, TRAJECTORY, CRITICAL, BOUNDARIES = "a run", "single trajectories", "critical spins", "boundaries"
 
 
 OWN_BODY = "a model"
@@ -25,7 +25,7 @@ def parameters(dataset: xr.Dataset) -> list[str]:
 
 
 def kind(dataset: xr.Dataset) -> str | None:
-    """Which of the three, told by the variables alone; None if it is of another program.
+    """Which of the four, told by the variables alone; None if it is of another program.
 
     Predictions count as a run, and so does a part of one.
     """
@@ -33,4 +33,6 @@ def kind(dataset: xr.Dataset) -> str | None:
         return TRAJECTORY
     if "critical_reason" in dataset:
         return CRITICAL
+    if {"level", "curve", "end_more"} <= set(dataset.variables):
+        return BOUNDARIES
     return RUN if set(VARIABLES) & set(dataset.data_vars) else None

@@ -10,7 +10,8 @@ import xarray as xr
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import EXISTS, REASONS, STATUSES
-from sweep.results.kind import CRITICAL, TRAJECTORY, kind, parameters
+from sweep.results.kind import BOUNDARIES, CRITICAL, TRAJECTORY, kind, parameters
+from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 
 
 def failed_fraction(dataset: xr.Dataset) -> float:
@@ -30,6 +31,8 @@ def describe(dataset: xr.Dataset) -> str:
         return "\n".join(_trajectories(dataset))
     if found == CRITICAL:
         return "\n".join(_critical(dataset))
+    if found == BOUNDARIES:
+        return "\n".join(_boundaries(dataset))
     if "status" in dataset:
         return summarize(dataset)
     return "no status: predictions, or a part of a run"
@@ -43,6 +46,21 @@ def contents(dataset: xr.Dataset) -> str:
     ]
     attributes = [f"{key}: {dataset.attrs[key]}" for key in sorted(set(dataset.attrs) - {"title", "config"})]
     return "\n".join([*variables, *attributes, f"config:\n{dataset.attrs.get('config', '')}"])
+
+
+def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
+    """How many points were found, and how exactly."""
+    points, open_ = dataset.sizes["point"], int((dataset["outcome"] == OPEN).sum())
+    curves, simulated = len(np.unique(dataset["curve"])), dataset.attrs["trajectories"]
+    yield f"{curves} curves with {points} points, by {simulated} simulations"
+    one = dataset.isel(point=(dataset["outcome"] == FOUND).values)
+    if found := one.sizes["point"]:
+        width = np.abs(one["end_more"] - one["end_fewer"]) / np.maximum(abs(one["end_more"]), abs(one["end_fewer"]))
+        yield f"found {found}, within {float(width.max()):.1e} at most, relative to the place along the bracket"
+    if open_:
+        yield f"open {open_}: a cell near them failed, or did not end before the time limit"
+    if uncertain := int((dataset["outcome"] == UNCERTAIN).sum()):
+        yield f"uncertain {uncertain}: as near to the other count as ten times the error; ask for a larger width"
 
 
 def _trajectories(dataset: xr.Dataset) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -15,21 +16,22 @@ from sweep.config.user_models import explained
 from sweep.engine.reporter import Progress, Reporter
 from sweep.grid import Array, Grid
 from sweep.interrupt import deferred
-from sweep.jit import fingerprint
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
-from sweep.results import dataset, netcdf
-from sweep.results.checkpoint import Checkpoint
+from sweep.results import dataset
 from sweep.results.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity
-from sweep.results.memory import Memory
-from sweep.results.provenance import identify, provenance
+from sweep.results.provenance import provenance
 from sweep.results.store import Store
 from sweep.studies import bracket
+from sweep.studies.kept import identified, kept
 from sweep.studies.reversing import USUAL, body_seconds, find_n_c2
 from sweep.studies.rounds import Rounds
 from sweep.studies.trajectory import require_simulated
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WIDTH = 1e-3
 """Relative width down to which simulation brackets n_c2."""
@@ -73,30 +75,12 @@ def critical(
 ) -> xr.Dataset:
     """As `sweep.api.critical`; what there is to tell goes to `reporter` alone, with progress counted in bodies."""
     config, reporter = _searchable(config), reporter or Reporter()
+    files = None if output is None else RunFiles(Path(output), f"{config.name}_critical")
     with explained(config.origin):
-        return _found(config, width, output, fresh, reporter)
-
-
-def _found(config: Config, width: float, output: str | Path | None, fresh: bool, reporter: Reporter) -> xr.Dataset:
-    if output is None:
-        return _search(config, width, Memory(), reporter)
-    files, identity = RunFiles(Path(output), f"{config.name}_critical"), _identify(config, width)
-    with files.locked():
-        if fresh:
-            files.discard()
-        if files.has_dataset(identity):
-            reporter.note(f"{files.dataset}: already complete, nothing to compute")
-        else:
-            files.picture.unlink(missing_ok=True)  # of a dataset that is gone
-            store = Checkpoint(files.checkpoint, identity, reporter.note)
-            netcdf.write(files.dataset, _search(config, width, store, reporter))
-        files.discard_checkpoint()
-        result = netcdf.open_dataset(files.dataset)
-        if not files.picture.exists():
-            from sweep.plots import critical as plots  # matplotlib takes a third of the time of `import sweep`
-
-            files.save_picture(plots.draw(result))
-    return result
+        return kept(
+            files, _identify(config, width), lambda store: _search(config, width, store, reporter), _draw,
+            fresh=fresh, reporter=reporter,
+        )  # fmt: skip
 
 
 def estimate(config: Config) -> str:
@@ -146,18 +130,17 @@ def _searchable(config: Config) -> Config:
         )
     parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
-    return replace(config, parameters=parameters, cases=cases or None)
+    return replace(config, parameters=parameters, cases=cases or None, integrator=config.integrator.patient)
 
 
 def _identify(config: Config, width: float) -> Identity:
-    """Identify a search: what a run does, the width, and the sources of the search."""
-    run, search = identify(config), fingerprint(*(str(path) for path in sorted(Path(__file__).parent.glob("*.py"))))
-    return replace(
-        run,
-        config=f"{run.config}# width of the brackets: {width!r}\n",
-        config_hash=f"{run.config_hash}-{width!r}",
-        source_hash=f"{run.source_hash}-{search}",
-    )
+    return identified(config, f"width of the brackets: {width!r}")
+
+
+def _draw(result: xr.Dataset) -> Figure:
+    from sweep.plots import critical as plots  # matplotlib takes a third of the time of `import sweep`
+
+    return plots.draw(result)
 
 
 def _search(config: Config, width: float, store: Store, reporter: Reporter) -> xr.Dataset:

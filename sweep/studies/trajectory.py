@@ -18,7 +18,7 @@ from sweep.config.faults import either, suggestion
 from sweep.config.schema import FOREVER
 from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
-from sweep.engine import executor
+from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
 from sweep.engine.executor import STEP_SECONDS
@@ -148,6 +148,7 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     if (part.step != steps).any():
         marks = _run(kernel, part.start().images, settles)
     _judge(kernel, images)
+    final.settle(part)
     times = _times(kernel, images, every or _intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
     (found,) = job.by_grid(results(job, errors, work))
@@ -191,6 +192,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
     config = load_config(config)
     require_simulated(config)
+    config = replace(config, integrator=config.integrator.patient)
     method = METHODS.get(config.integrator.method)
     if not (method and method.stops_anywhere):
         # A step that was fixed for another method may be unstable with this one.

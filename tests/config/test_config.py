@@ -53,8 +53,8 @@ def test_defaults_are_the_papers_standard_case(write: Write) -> None:
         "mu": (60.0,), "b": (3.0,), "n0": (0.05,), "a": (10.0,), "c": (1.0,), "delta": (0.03,),
         "x0": (0.01,), "y0": (0.01,),
     }  # fmt: skip
-    assert config.integrator.t_end == 30_000
-    assert config.measure == ("reversals", "energy_error", "noise_limited", "resting_spin")
+    assert (config.integrator.t_end, config.integrator.patience) == (1e6, 30_000)
+    assert config.measure == ("reversals", "energy_error", "margin", "noise_limited", "resting_spin")
 
 
 def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import struct
 from collections.abc import Callable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile, is_zipfile
 
 import numba
 import numpy as np
@@ -92,10 +94,23 @@ def cut(share: float) -> Callable[[Path], None]:
 def flip(share: float) -> Callable[[Path], None]:
     def flip_byte(path: Path) -> None:
         whole = bytearray(path.read_bytes())
-        whole[int(share * (len(whole) - 1))] ^= 0xFF
+        at = int(share * (len(whole) - 1))
+        whole[_in_an_array(path, at) if 0 < share < 1 and is_zipfile(path) else at] ^= 0xFF
         path.write_bytes(whole)
 
     return flip_byte
+
+
+def _in_an_array(path: Path, at: int) -> int:
+    """The first byte from `at` on that belongs to an array: between arrays, some bytes of a ZIP file say nothing."""
+    whole = path.read_bytes()
+    with ZipFile(path) as members:
+        for member in members.infolist():
+            names = sum(struct.unpack_from("<HH", whole, member.header_offset + 26))
+            start = member.header_offset + 30 + names
+            if start + member.compress_size > at:
+                return max(at, start)
+    raise AssertionError(f"{path}: no array after byte {at}")
 
 
 def foreign(path: Path) -> None:

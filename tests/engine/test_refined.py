@@ -198,7 +198,7 @@ def test_simulated_cells_are_those_of_the_full_run(refined: xr.Dataset, full: xr
     simulated = refined.inferred == 0
     assert 0.1 < float(simulated.mean()) == refined.attrs["simulated_share"] < 0.9
     assert set(full.data_vars) - set(refined.data_vars) == {
-        "noise_limited", "sensitive", "step_rule", "window_dependent"
+        "decided", "noise_limited", "sensitive", "step_rule", "window_dependent"
     }  # fmt: skip
     assert set(refined.data_vars) - set(full.data_vars) == {"inferred"}
     assert refined.inferred.attrs["flag_meanings"] == "simulated inferred"

@@ -27,14 +27,18 @@ class Stop(Reporter):
 
 
 def in_sittings(chunks: int, config: Path, output: Path) -> tuple[xr.Dataset, int, Stop]:
-    """A run that is interrupted after so many chunks and resumed, until it ends: how often, and what was said last."""
-    interruptions = 0
+    """A run that is interrupted after so many chunks and resumed, until it ends: how often, and what was said last.
+
+    The last sitting has nothing to say if the one before was interrupted after the last chunk.
+    """
+    interruptions, last = 0, Stop(chunks)
     while True:
         reporter = Stop(chunks)
         try:
-            return sweep.run(config, output, reporter=reporter), interruptions, reporter
+            result = sweep.run(config, output, reporter=reporter)
+            return result, interruptions, reporter if reporter.seen else last
         except KeyboardInterrupt:
-            interruptions += 1
+            interruptions, last = interruptions + 1, reporter
 
 
 def same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:

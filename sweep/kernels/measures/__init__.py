@@ -8,6 +8,7 @@ from sweep.kernels.measures.cycles import Cycles
 from sweep.kernels.measures.energy import EnergyError
 from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.measures.lyapunov import Lyapunov
+from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.measures.noise import NoiseLimited
 from sweep.kernels.measures.raw_reversals import RawReversals
@@ -18,7 +19,7 @@ from sweep.kernels.measures.sensitivity import Sensitivity
 from sweep.models.model import Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
-    Reversals, EnergyError, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Sensitivity,
+    Reversals, EnergyError, Margin, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Sensitivity,
     Cycles, Lyapunov,
 )  # fmt: skip
 

@@ -1,99 +1,146 @@
-"""The spin at which a body stays: what the slow equations make of the rattle that is left.
+"""What becomes of a small rattle that is left to itself: the slow equations.
 
 A mode of energy E_k = I3 e_k / 2 grows at the rate r_k of the linear theory and changes the spin by (ndotab, abdot),
 
-    e_k' = 2 r_k(n) e_k,   n' = -Σ s_k e_k,   r_k(n) = r_k + s_k (n - n_0),
+    e_k' = 2 r_k(n) e_k,   n' = -Σ s_k(n) e_k,
 
-with r_k and s_k of the full model at the spin n_0 of the start (`sweep.models.stiff.modes`).  Most rattles decay.
-Beyond n_c1 one mode grows at first, until it has turned the spin back to where both decay.
+with r_k and s_k of the full model (`sweep.models.stiff.modes`) at five spins, and polynomials between them.  What this
+neglects is of the order of `bending` times n² + Σ e_k, and grows where the two modes meet, as in nearly round bodies.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from sweep.models.model import Array
-from sweep.models.stiff.modes import Rattle, growth_rates
+from sweep.models.model import Array, take
+from sweep.models.stiff.modes import Rattle, slow_rates
 from sweep.models.stiff.slip import Constants
 
-# The first step in units of the fastest decay, the ratio of a step to the one before, and the decay times of the
-# slower mode after which nothing is left.
-_FIRST, _RATIO, _LAST = 0.02, 1.05, 20.0
+# Spins at which the rates are computed, in units of the fastest spin within reach, and what fits a polynomial to them.
+_NODES = np.array([0.0, -1.0, 1.0, -0.5, 0.5])
+_FIT = np.linalg.inv(_NODES[:, None] ** np.arange(len(_NODES)))
+_REACH = 1.02
 
-# While a mode grows, a step turns the spin by this share of its distance from where the mode decays.  The mode has
-# turned the spin when it decays at this share of the rate at which it grew.  That takes 100 to 300 steps.
-_TURN, _TURNED, _MOST_STEPS = 0.02, 0.1, 2000
+# Ratio of the difference of the two frequencies to the rates, below which the modes do not act each for itself: of
+# settled cells of the wide domain above it, none was off by more than 1 % of the spin.
+_APART = 5.0
+
+# A step lasts half of what a mode takes to change by e, and turns the spin by no more than this share of what it can.
+# A mode that turns the spin by less than a share `_FAINT` of what the other does sets no step.
+_RATE, _TURN, _FAINT = 0.5, 0.02, 1e-4
+
+# It is over when both modes decay, and can change the spin by no more than this share.  That takes 100 to 1000 steps.
+_OVER, _MOST_STEPS = 1e-3, 5000
 
 
-def resting_spin(states: Array, constants: Constants) -> Array:
-    """The spin that is left when the rattle has decayed, in sqrt(g/c), shape (cells,).
+class Ending(NamedTuple):
+    """How trajectories end; arrays of shape (cells,), NaN where the slow equations do not tell."""
 
-    NaN where the rattle cannot be resolved into two modes, or grows without turning the spin back.
+    spin: Array
+    """The spin that stays, in sqrt(g/c)."""
+    reversals: Array
+    """How often the spin reverses on the way."""
+    overshoot: Array
+    """Largest |spin| since the last reversal, or since the beginning."""
+    nearest_approach: Array
+    """Smallest |spin| after that."""
+
+
+def ending(states: Array, constants: Constants) -> Ending:
+    """How a small rattle ends; the spin is without its ripple.
 
     Parameters
     ----------
-    states : of `stiff.slip`, shape (7, cells), with a rattle so small that the spin can reverse no more
+    states : of `stiff.slip`, shape (7, cells)
     """
     rattle = Rattle.of(states, constants)
-    sound = rattle.sound
-    result = np.full(len(sound), np.nan)
-    if not sound.any():
+    spin = -(states[4] - rattle.rippled(rattle.amplitudes)) / constants.I3
+    e = np.abs(rattle.amplitudes) ** 2 * rattle.unit_energies
+    reach = _REACH * np.sqrt(spin**2 + e.sum(axis=1))
+    result = Ending(*np.full((4, len(spin)), np.nan))
+    known = np.flatnonzero(rattle.sound & np.isfinite(reach) & (reach > 0))
+    if not len(known):
         return result
-    rattle = rattle.select(sound)
-    start = -(states[4, sound] - rattle.rippled(rattle.amplitudes)) / rattle.constants.I3
-    end = _end(start, rattle, rattle.slopes)
-    # Again, with the change of the rates on the way that the linear theory gives at both ends.
-    known = np.isfinite(end)
-    there = growth_rates(rattle.constants, np.where(known, end, start))
-    way = np.where(known, end - start, 0.0)[:, None]
-    bends = np.divide(there - rattle.rates.real, way, out=rattle.slopes.copy(), where=np.abs(way) > 1e-9)
-    result[sound] = _end(start, rattle, bends)
+    rates, slopes, apart = _fits(take(constants, known), reach[known])
+    known = known[apart]
+    unit = reach[known]
+    found = _follow(spin[known] / unit, e[known] / unit[:, None] ** 2, rates[:, apart], slopes[:, apart], unit)
+    for whole, part in zip(result, found, strict=True):
+        whole[known] = part
     return result
 
 
-def _end(start: Array, rattle: Rattle, bends: Array) -> Array:
-    """The spin that is left, if the rates change by `bends` with the spin; these are (cells, 2)."""
-    e = np.abs(rattle.amplitudes) ** 2 * rattle.unit_energies
-    return _decay(*_turn_back(start, e, rattle, bends), start, rattle, bends)
+def _fits(constants: Constants, reach: Array) -> tuple[Array, Array, Array]:
+    """Coefficients of r_k and s_k, powers of n / `reach` first, and whether the modes are apart, shape (cells,)."""
+    apart, nodes = np.ones(len(reach), bool), []
+    for node in _NODES:
+        rates, slopes, sound = slow_rates(constants, node * reach)
+        gap = np.abs(np.diff(rates.imag, axis=1))[:, 0]
+        apart &= sound & (gap > _APART * np.abs(rates.real).max(axis=1))
+        nodes.append((rates.real, slopes))
+    # Not a matrix product: how BLAS rounds a cell depends on how many other cells there are.
+    fits = [np.stack([sum(w * each for w, each in zip(row, of, strict=True)) for row in _FIT])
+            for of in zip(*nodes, strict=True)]  # fmt: skip
+    return fits[0], fits[1], apart
 
 
-def _turn_back(start: Array, e: Array, rattle: Rattle, bends: Array) -> tuple[Array, Array]:
-    """Spin and e where no mode grows any more; the spin is NaN if it never gets there."""
-    spin, slopes = start, rattle.slopes
-    growth = rattle.rates.real.max(axis=1)
-    way = np.abs(growth) / np.maximum(np.abs(slopes).max(axis=1), 1e-300) + np.sqrt(e.sum(axis=1))
+def _follow(spin: Array, e: Array, rates: Array, slopes: Array, reach: Array) -> Ending:
+    """Follow the slow equations to their end; spins in units of `reach`, and e in its square."""
+    slopes = slopes * reach[:, None]  # r' = s n' with n in units of reach
+    log_e, over = np.log(np.maximum(e, 1e-300)), np.zeros(len(spin), bool)
+    found = Ending(spin.copy(), np.zeros_like(spin), np.abs(spin), np.abs(spin))
     for _ in range(_MOST_STEPS):
-        rates = rattle.rates.real + bends * (spin - start)[:, None]
-        grows = (growth >= 0) & (rates.max(axis=1) >= -_TURNED * growth)
-        if not grows.any():
+        r, s = _at(rates, spin), _at(slopes, spin)
+        turns = np.abs(s) * np.exp(log_e)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = np.where(turns > 0, turns / np.abs(2 * r), 0.0).sum(axis=1)
+        over |= (r < 0).all(axis=1) & (left < _OVER * np.abs(spin))
+        if over.all():
             break
-        turn = np.maximum(np.abs(slopes * e).sum(axis=1), 1e-300)
-        step = np.minimum(1 / np.abs(rates).max(axis=1), _TURN * way / turn)
-        middle, _ = _move(spin, e, rates, slopes, step / 2)
-        moved, after = _move(spin, e, rates + bends * (middle - spin)[:, None], slopes, step)
-        spin, e = np.where(grows, moved, spin), np.where(grows[:, None], after, e)
-    return np.where(grows, np.nan, spin), e
+        step = np.where(over, 0.0, _step(r, s, turns, log_e))
+        middle, _ = _move(spin, log_e, r, s, step / 2)
+        moved, log_e = _move(spin, log_e, _at(rates, middle), _at(slopes, middle), step)
+        _account(found, spin, moved)
+        spin = moved
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rest = spin + np.where(over, (s * np.exp(log_e) / (2 * r)).sum(axis=1), np.nan)
+    _account(found, spin, rest)
+    known = np.where(over, 1.0, np.nan)
+    overshoot, nearest = found.overshoot * reach * known, found.nearest_approach * reach * known
+    return Ending(rest * reach, found.reversals * known, overshoot, nearest)
 
 
-def _decay(spin: Array, e: Array, start: Array, rattle: Rattle, bends: Array) -> Array:
-    """The spin after the decay that begins at `spin`; both e and `bends` are (cells, 2)."""
-    rates = rattle.rates.real + bends * (spin - start)[:, None]
-    begin, slowest, fastest = spin, np.abs(rates).min(axis=1), np.abs(rates).max(axis=1)
-    # Each cell in steps of its own, so that the others do not matter.
-    step, time = _FIRST / fastest, np.zeros_like(start)
-    while (left := time < _LAST / slowest).any():
-        # Exponentials of the rates at the middle of a step: stable however fast a mode decays.
-        decay = np.minimum(rates + bends * (spin - begin)[:, None], 0.0)
-        middle, _ = _move(spin, e, decay, rattle.slopes, step / 2)
-        decay = np.minimum(rates + bends * (middle - begin)[:, None], 0.0)
-        moved, after = _move(spin, e, decay, rattle.slopes, step)
-        spin, e = np.where(left, moved, spin), np.where(left[:, None], after, e)
-        time, step = time + step, step * _RATIO
-    return spin
+def _step(r: Array, s: Array, turns: Array, log_e: Array) -> Array:
+    """Length of the next step, shape (cells,)."""
+    rate, turn = np.abs(r), turns.sum(axis=1)
+    way = np.exp(log_e / 2).sum(axis=1) + rate.min(axis=1) / np.maximum(np.abs(s).max(axis=1), 1e-300)
+    fastest = np.where(turns > _FAINT * turn[:, None], rate, 0.0).max(axis=1)
+    by_turn = _TURN * way / np.maximum(turn, 1e-300)
+    return np.asarray(np.minimum(_RATE / np.maximum(fastest, 1e-300), by_turn))
 
 
-def _move(spin: Array, e: Array, rates: Array, slopes: Array, step: Array) -> tuple[Array, Array]:
-    """Spin and e after a step in which the modes grow at constant `rates`."""
-    growth = 2 * rates * step[:, None]
+def _account(found: Ending, before: Array, after: Array) -> None:
+    """Take in a step, in place."""
+    size, reverses = np.abs(after), before * after < 0
+    further = reverses | (size >= found.overshoot)
+    found.reversals[reverses] += 1
+    found.overshoot[further] = size[further]
+    nearer = further | (size < found.nearest_approach)
+    found.nearest_approach[nearer] = size[nearer]
+
+
+def _at(coefficients: Array, spin: Array) -> Array:
+    """The polynomials at a spin in units of the reach, shape (cells, 2)."""
+    value = np.zeros_like(coefficients[0])
+    for each in coefficients[::-1]:
+        value = value * spin[:, None] + each
+    return np.asarray(value)
+
+
+def _move(spin: Array, log_e: Array, r: Array, s: Array, step: Array) -> tuple[Array, Array]:
+    """Spin and log e after a step in which the modes grow at constant rates."""
+    growth = 2 * r * step[:, None]
     gained = step[:, None] * np.divide(np.expm1(growth), growth, out=np.ones_like(growth), where=growth != 0)
-    return spin - (slopes * e * gained).sum(axis=1), e * np.exp(growth)
+    return spin - (s * np.exp(log_e) * gained).sum(axis=1), log_e + growth

@@ -123,9 +123,11 @@ class Rattle:
         return _form(self.turning / (rates[:, :, None] + rates[:, None, :]), amplitudes)
 
 
-def growth_rates(constants: Constants, spin: Array) -> Array:
-    """Re λ of the two rocking modes at a spin, the one of lower frequency first, in sqrt(g/c), shape (cells, 2)."""
-    return _rocking(constants, spin)[0].real
+def slow_rates(constants: Constants, spin: Array) -> tuple[Array, Array, Array]:
+    """`rates`, `slopes` and `sound` of `Rattle` at a spin, without a rattle."""
+    rates, modes, sound = _rocking(constants, spin)
+    unit, turn = _unit_energies_and_turns(modes, -constants.I3 * spin, constants)
+    return rates, turn / (unit * constants.I3[:, None]), sound
 
 
 def bending(columns: Columns) -> Array:

@@ -1,0 +1,100 @@
+"""The margin of a count: how far in spin a trajectory was from one reversal more, and from one fewer.
+
+After its last reversal the averaged spin makes one more arc: away from zero, and then perhaps back.  Its largest size
+in this arc, the *overshoot*, is the margin to one reversal fewer; its smallest size after that, the *nearest approach*,
+is the margin to one more.  Where a count begins, the overshoot of the cells above and the nearest approach of the cells
+below fall to zero, nearly along one straight line: the overshoot above, and below the nearest approach with the sign
+changed, are a smooth function of the parameters, whose root is the boundary.
+
+Of a trajectory that settles, the slow equations tell what its spin does from then on (`resting_spin`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.kernels.layout import Layout, Table
+from sweep.kernels.measures.measurement import Measurement, measured
+from sweep.kernels.measures.resting_spin import endings
+from sweep.kernels.status import SETTLED
+from sweep.models.model import COUNT, Array
+
+EXTREMES = ("overshoot", "nearest_approach")
+"""The quantities that hold the margins, as far as the trajectory has come."""
+
+
+class Margin(Measurement):
+    name = "margin"
+    summary = "how far in spin each trajectory is from one reversal more, and from one fewer"
+    asks = COUNT
+    needs = ("reversals",)
+    by_default = True
+    quantities = (*EXTREMES, "counted", "window_time", "window_size", "window_time_before", "window_size_before")
+
+    variables = {
+        "margin_more": measured(
+            "float64",
+            "smallest averaged spin after the largest since the last reversal: zero where one more begins, "
+            "missing where the count is not final, in sqrt(g/c)",
+        ),
+        "margin_fewer": measured(
+            "float64",
+            "largest averaged spin since the last reversal: zero where this reversal begins, missing without one, "
+            "in sqrt(g/c)",
+        ),
+    }
+
+    def make_look(self, layout: Layout) -> Any:
+        OVERSHOOT, NEAREST, COUNTED, TIME, SIZE, TIME_BEFORE, SIZE_BEFORE = map(layout.at, self.quantities)
+        CLOSED, PERIOD, COUNT = map(layout.at, ("closed_window", "period", "reversals"))
+        DONE, STEP, PHASE, SHIFTED = map(layout.at, ("done", "step", "phase", "shifted"))
+
+        @inline
+        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
+            period, count = group[PERIOD + lane], group[COUNT + lane]
+            size = abs(group[CLOSED + lane]) / period
+            # When the window closed; if half a window has closed since then, `shifted` is 0.
+            since = group[PHASE + lane] + (0.0 if group[SHIFTED + lane] != 0.0 else 0.5 * period)
+            time = group[DONE + lane] * group[STEP + lane] - since
+            first, middle, size1, size2 = group[TIME_BEFORE + lane], group[TIME + lane], size, group[SIZE + lane]
+            size3 = group[SIZE_BEFORE + lane]
+            if running & (time > middle + 0.5 * period):
+                new = count != group[COUNTED + lane]
+                overshoot, nearest = group[OVERSHOOT + lane], group[NEAREST + lane]
+                # The vertex of the parabola through the last three, if the middle one is an extreme.
+                turns = (not new) & (first > 0.0) & ((size1 - size2) * (size2 - size3) < 0.0)
+                vertex = _vertex(time - middle, size1 - size2, first - middle, size3 - size2) if turns else 0.0
+                extreme = size2 + vertex
+                overshoot = extreme if turns & (extreme > overshoot) else overshoot
+                nearest = extreme if turns & (extreme < nearest) & (extreme > 0.0) else nearest
+                further = new | (size >= overshoot)
+                group[OVERSHOOT + lane] = size if further else overshoot
+                group[NEAREST + lane] = size if further | (size < nearest) else nearest
+                group[TIME_BEFORE + lane], group[SIZE_BEFORE + lane] = (0.0, 0.0) if new else (middle, size2)
+                group[TIME + lane], group[SIZE + lane], group[COUNTED + lane] = time, size, count
+
+        return look
+
+    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
+        settled = table["status"] == SETTLED
+        overshoot, nearest = table["overshoot"], table["nearest_approach"]
+        # Where the slow equations do not apply, the spin hardly changes any more.
+        left = endings(table, settled)
+        further = left.overshoot > overshoot
+        nearest = np.where(further, left.nearest_approach, np.fmin(nearest, left.nearest_approach))
+        return {
+            "margin_more": np.where(settled, nearest, np.nan),
+            "margin_fewer": np.where(table["reversals"] > 0, np.fmax(overshoot, left.overshoot), np.nan),
+        }
+
+
+@inline
+def _vertex(t1: float, v1: float, t2: float, v2: float) -> float:
+    """The extreme of the parabola through (0, 0), (t1, v1) and (t2, v2)."""
+    a = (v1 / t1 - v2 / t2) / (t1 - t2)
+    b = v1 / t1 - a * t1
+    return -b * b / (4.0 * a)

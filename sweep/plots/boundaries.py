@@ -1,0 +1,78 @@
+"""The curves of a dataset of `sweep boundaries`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from sweep.grid import Array
+from sweep.plots import labels, lines, scales
+from sweep.plots.axis import Axis
+from sweep.plots.figure import RATIO, Picture, arrangement, set_scale
+from sweep.plots.panels import MAX_PANELS, heading
+from sweep.results.margins import OPEN, smoothed
+
+
+def draw(dataset: xr.Dataset) -> Figure:
+    """The curves of a dataset of `sweep boundaries`, each with the count that begins on it, and their open points."""
+    x, y = dataset.attrs["x"], dataset.attrs["y"]
+    panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [("no count changes between the cells", dataset)]
+    rows, columns = arrangement(len(panels), 1)
+    figure = Picture(5.2 * columns + 0.6, 1.2 + 5.2 * RATIO * rows)
+    figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
+    scale = scales.counts(dataset["level"].values if dataset.sizes["point"] else np.zeros(1, int), None, None)
+    for k, (words, part) in enumerate(panels):
+        axes = figure.add_subplot(rows, columns, k + 1)
+        axes.set_title(words, fontsize=9)
+        set_scale(axes, "x", _axis(dataset, x).values)
+        set_scale(axes, "y", _axis(dataset, y).values)
+        for level, xs, ys in curves(part, x, y):
+            axes.plot(xs, ys, color=scale.rgba(np.array(level)).tolist(), linewidth=1.4, gid=f"level{level}")
+            lines.number(axes, level, xs, ys)
+        open_ = part.isel(point=(part["outcome"] == OPEN).values)
+        axes.plot(open_[x], open_[y], linestyle="none", marker="o", markersize=3, color="none", markeredgecolor="0.3")
+        axes.tick_params(labelsize=8)
+        axes.set(xlabel=labels.label(dataset, x), ylabel=labels.label(dataset, y))
+        axes.set(xlim=dataset[x].attrs["actual_range"], ylim=dataset[y].attrs["actual_range"])
+    count = int((dataset["outcome"] == OPEN).sum())
+    words = f"not found: a cell failed, or did not end ({count} of {dataset.sizes['point']})"
+    handle = Line2D(
+        [], [], linestyle="none", marker="o", markersize=4, color="none", markeredgecolor="0.3", label=words
+    )
+    figure.explain([handle] if count else [])
+    return figure
+
+
+def curves(dataset: xr.Dataset, x: str, y: str) -> Iterator[tuple[int, Array, Array]]:
+    """The level of each curve, and smooth x and y through those of its points that were found."""
+    axes = [_axis(dataset, name) for name in (x, y)]
+    for number in np.unique(dataset["curve"]):
+        part = dataset.isel(point=((dataset["curve"] == number) & (dataset["outcome"] != OPEN)).values)
+        if not part.sizes["point"]:
+            continue
+        places = [axis.straight(part[axis.name].values) for axis in axes]
+        spans = [float(np.ptp(axis.straight(axis.values))) for axis in axes]
+        closed = bool((part["closed"] == 1).all()) and len(part.point) == int((dataset["curve"] == number).sum())
+        xs, ys = smoothed(*(place / span for place, span in zip(places, spans, strict=True)), closed=closed)
+        yield int(part["level"][0]), axes[0].bent(xs * spans[0]), axes[1].bent(ys * spans[1])
+
+
+def _axis(dataset: xr.Dataset, name: str) -> Axis:
+    """An axis as long as the searched one, and spaced like it."""
+    ends = np.asarray(dataset[name].attrs["actual_range"], float)
+    return Axis(name, np.geomspace(ends[0], ends[1], 3) if dataset[name].attrs["spacing"] == "log" else ends)
+
+
+def _panels(dataset: xr.Dataset, across: set[str]) -> Iterator[tuple[str, xr.Dataset]]:
+    """The values of the other axes in words, and the points that have them."""
+    others = [str(n) for n, c in dataset.coords.items() if c.dims == ("point",) and n not in across]
+    cells = (
+        np.stack([dataset[name].values for name in others], axis=1) if others else np.zeros((dataset.sizes["point"], 1))
+    )
+    for cell in np.unique(cells, axis=0):
+        words = ", ".join(labels.measured(dataset, name, float(v)) for name, v in zip(others, cell, strict=False))
+        yield words, dataset.isel(point=(cells == cell).all(axis=1))

@@ -1,0 +1,36 @@
+"""Says where counts change between the cells of a map, by their margins.
+
+From the dataset alone, and without any library that draws.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from sweep.kernels.status import SETTLED, TIME_LIMIT
+from sweep.plots.axis import Axis
+from sweep.plots.theory import Line
+from sweep.results.margins import Counts, contours
+
+NEEDED = ["reversals", "margin_more", "margin_fewer", "status"]
+"""The variables of a dataset from which boundaries are drawn."""
+
+
+def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
+    """The boundaries over a map with these axes, for which all other axes of the dataset are fixed: one for each count.
+
+    None if the dataset has no margins.
+    """
+    if not set(NEEDED) <= set(dataset.data_vars) or min(len(x.values), len(y.values)) < 2:
+        return []
+    count, more, fewer, status = (dataset[name].transpose(y.name, x.name).values for name in NEEDED)
+    counts = Counts(count.astype(float), more, fewer, np.isin(status, (SETTLED, TIME_LIMIT)))
+    found = []
+    for level in counts.levels():
+        curves = contours(counts.distance(level), x.straight(x.values), y.straight(y.values))
+        if parts := [(x.bent(xs), y.bent(ys)) for xs, ys in curves]:
+            found.append(
+                Line("boundary", "from here on so many reversals, by the margins of the cells", parts, f"{level}")
+            )
+    return found

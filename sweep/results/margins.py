@@ -1,0 +1,103 @@
+"""Says where counts change between the cells of a grid, from their margins and without another trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from contourpy import contour_generator
+
+from sweep.grid import Array
+from sweep.variables import Variable
+
+FOUND, OPEN, UNCERTAIN = range(3)
+
+POINTS = {
+    "level": Variable("int16", "1", "number of spin reversals that begins at the point"),
+    "curve": Variable("int32", "1", "number of the curve to which the point belongs; points are in order along it"),
+    "closed": Variable("int8", "1", "whether the curve is closed", {0: "ends_at_an_edge", 1: "closed"}),
+    "end_fewer": Variable("float64", "1", "place along the bracket's axis of its simulated cell that reverses less"),
+    "end_more": Variable("float64", "1", "place along the bracket's axis of its simulated cell that reverses more"),
+    "reversals_fewer": Variable("int16", "1", "spin reversals of the cell at end_fewer"),
+    "reversals_more": Variable("int16", "1", "spin reversals of the cell at end_more"),
+    "outcome": Variable(
+        "int8", "1", "whether the bracket is as narrow as asked; if not, a cell in it failed or met the time limit; "
+        "uncertain if one of its ends is nearer to the other count than ten times its error",
+        {FOUND: "found", OPEN: "open", UNCERTAIN: "uncertain"},
+    ),
+}  # fmt: skip
+"""The variables over the points of a dataset, beside `bracket`, the axis along which each bracket lies."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Counts of cells and their margins, arrays of one shape."""
+
+    reversals: Array
+    more: Array
+    """Margin to one reversal more, in spin; NaN where it is not known."""
+    fewer: Array
+    """The same to one fewer."""
+    known: Array
+    """Whether there is a count at all."""
+
+    def distance(self, level: int) -> Array:
+        """How far in spin each cell is from where `level` reversals begin: negative where it counts fewer.
+
+        NaN where that is not known.  For a cell whose count is farther away than by one, it is a guess: as if each
+        count between took as much spin as its own.
+        """
+        count = self.reversals
+        width = np.nan_to_num(self.more) + np.nan_to_num(self.fewer)
+        found = np.where(
+            count >= level, self.fewer + (count - level) * width, -(self.more + (level - 1 - count) * width)
+        )
+        return np.where(self.known, found, np.nan)
+
+    def at(self, place: Any) -> Counts:
+        """One cell, with arrays of shape (1,)."""
+        return Counts(*(np.atleast_1d(each[place]) for each in vars(self).values()))
+
+    def levels(self) -> range:
+        """The counts that begin somewhere between the cells."""
+        found = self.reversals[self.known]
+        return range(int(found.min()) + 1, int(found.max()) + 1) if found.size else range(0)
+
+
+def contours(distance: Array, x: Array, y: Array) -> Iterator[tuple[Array, Array]]:
+    """Where `distance`, of shape (y, x), is zero: the x and y of each curve, in order."""
+    for part in contour_generator(x, y, np.ma.masked_invalid(distance), corner_mask=False).lines(0.0):
+        points = np.asarray(part)
+        yield points[:, 0], points[:, 1]
+
+
+def smoothed(x: Array, y: Array, *, closed: bool, parts: int = 8) -> tuple[Array, Array]:
+    """A smooth curve through points in order: cubic between two points, with the slopes of parabolas at them.
+
+    Parameters
+    ----------
+    x, y : in units in which the distances of points across and upwards can be compared, shape (points,)
+    closed : whether the curve goes on from the last point to the first
+    parts : straight lines that are drawn between two points
+    """
+    points = np.stack([x, y], axis=1)
+    if len(points) < 3:
+        return x, y
+    if closed:
+        points = np.concatenate([points[-2:], points, points[:3]])
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    points, steps = points[np.append(True, steps > 0)], steps[steps > 0]
+    chords = np.diff(points, axis=0) / steps[:, None]
+    inner = (chords[:-1] * steps[1:, None] + chords[1:] * steps[:-1, None]) / (steps[:-1] + steps[1:])[:, None]
+    slopes = np.concatenate([2 * chords[:1] - inner[:1], inner, 2 * chords[-1:] - inner[-1:]])
+    t, h = np.arange(parts)[:, None, None] / parts, steps[:, None]
+    curve = (
+        (1 + 2 * t) * (1 - t) ** 2 * points[:-1] + t * (1 - t) ** 2 * h * slopes[:-1]
+        + t**2 * (3 - 2 * t) * points[1:] + t**2 * (t - 1) * h * slopes[1:]
+    )  # fmt: skip
+    whole = np.concatenate([curve.swapaxes(0, 1).reshape(-1, 2), points[-1:]])
+    if closed:
+        whole = whole[2 * parts : -2 * parts]
+    return whole[:, 0], whole[:, 1]

@@ -1,0 +1,100 @@
+"""Narrows brackets around the roots of functions that simulations evaluate, for many roots at once.
+
+What counts is only the sign.  The value proposes where to look next: near a root it is smooth, so that interpolation
+through the nearest values finds it within a few evaluations (inverse interpolation; Brent 1973, chapter 4).  The next
+two places are just below and above the proposed one, as far apart as the proposals differ, so that both ends of a
+bracket close in.  Where that fails, the bracket is cut into equal parts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+# Half the distance of the last two places, in widths: a little less than the half.
+_HALF = 0.45
+
+# How far on each side of a proposed root the next places are, in units of its uncertainty; and the factor by which they
+# are farther in each round after the root was on neither side.
+_BESIDE, _FARTHER = 2.0, 10.0
+
+# Equal parts into which a bracket is cut where no value tells better.
+_PARTS = 4
+
+# Uncertainty of the first proposal, from the two ends alone, relative to their distance.
+_FIRST = 0.05
+
+
+@dataclass
+class Root:
+    """A search: two places with values of opposite sign, which close in on a root."""
+
+    low: float
+    high: float
+    width: float
+    """The distance of the two at which the search ends."""
+    values: dict[float, float]
+    """What is known: the function by place."""
+    smooth: dict[float, float] = field(default_factory=dict)
+    """Of these, the values that belong to the one smooth function that passes through the root."""
+    unknown: bool = False
+    """True once a place was met at which the function has no value; that ends the search."""
+    _pair: list[float] = field(default_factory=list)
+    """The places proposed last around a root; empty if the bracket was cut."""
+    _missed: int = 0
+    """Rounds since the root was last between these."""
+
+    @property
+    def ended(self) -> bool:
+        return self.unknown or self.high - self.low <= self.width
+
+    def wanted(self) -> list[float]:
+        """The places to evaluate next."""
+        inside = not self._pair or (self._pair[0] <= self.low and self.high <= self._pair[-1])
+        self._missed = 0 if inside else self._missed + 1
+        root, off = self._proposed()
+        off = max(_BESIDE * _FARTHER**self._missed * off, _HALF * self.width)
+        self._pair = [place for place in (root - off, root + off) if self.low < place < self.high]
+        if self.low < root < self.high and _PARTS * off < self.high - self.low:
+            return self._pair
+        self._pair = []
+        return [self.low + (self.high - self.low) * part / _PARTS for part in range(1, _PARTS)]
+
+    def learn(self, place: float, value: float, *, smooth: bool) -> None:
+        """Take in the value at a place; NaN where there is none."""
+        if np.isnan(value):
+            self.unknown = True
+            return
+        self.values[place] = value
+        if smooth:
+            self.smooth[place] = value
+        if not self.low < place < self.high:
+            return
+        if (value > 0) == (self.values[self.low] > 0):
+            self.low = place
+        else:
+            self.high = place
+
+    def _proposed(self) -> tuple[float, float]:
+        """Where the root is, as far as the values tell, and how uncertain that is."""
+        distinct = {value: (place, value) for place, value in self.smooth.items()}
+        known = sorted(distinct.values(), key=lambda pair: abs(pair[1]))[:4]
+        if len(known) < 2:
+            return self._secant(), _FIRST * (self.high - self.low)
+        best = [_inverse(known[:n]) for n in range(2, len(known) + 1)]
+        off = abs(best[-1] - best[-2]) if len(best) > 1 else _FIRST * (self.high - self.low)
+        return best[-1], off
+
+    def _secant(self) -> float:
+        """The root of the straight line between the ends."""
+        low, high = self.values[self.low], self.values[self.high]
+        return self.low - low * (self.high - self.low) / (high - low)
+
+
+def _inverse(known: list[tuple[float, float]]) -> float:
+    """The place at which the polynomial place(value) has the value zero."""
+    found = 0.0
+    for i, (place, value) in enumerate(known):
+        found += place * float(np.prod([other / (other - value) for j, (_, other) in enumerate(known) if j != i]))
+    return found

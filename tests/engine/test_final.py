@@ -1,0 +1,56 @@
+"""Cells run until their counts are final, if no end of the time is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from support.runs import in_sittings, same_numbers
+
+import sweep
+from sweep.kernels.status import SETTLED, TIME_LIMIT
+
+Write = Callable[..., Path]
+
+SCENE = """\
+cases: cells.csv
+body: {a: 10.0, delta: 0.03}
+start: {n0: 0.05, x0: 0.01, y0: 0.01}
+measure: [reversals, margin, energy_error]
+"""
+CELLS = "mu,b\n106.09,2.322\n130,9.8\n75,3\n"
+"""The first reverses once more after t = 30 000, the second is nearly round, the third settles early."""
+
+
+@pytest.fixture
+def run(write: Write) -> xr.Dataset:
+    write(CELLS, "cells.csv")
+    return sweep.run(write(SCENE))
+
+
+def test_a_cell_goes_on_if_a_reversal_can_be_foreseen(run: xr.Dataset, write: Write) -> None:
+    ended = sweep.run(write(SCENE), t_end=30_000.0)
+    assert list(ended.status) == [TIME_LIMIT, TIME_LIMIT, SETTLED]
+    assert list(run.status) == [SETTLED, TIME_LIMIT, SETTLED]
+    assert list((run.reversals - ended.reversals).values) == [1, 0, 0]
+    assert float(run.t_last_reversal[0]) > 30_000
+    assert float(run.t_stop[1]) == pytest.approx(30_000, rel=1e-4)
+    assert list(run.decided) == [1, 0, 1]
+
+
+def test_to_have_paused_changes_no_count(run: xr.Dataset, write: Write) -> None:
+    """The time of the late reversal is not firm: its rattle grows from round-off."""
+    whole = sweep.run(write(SCENE), t_end=1e6, method="adams")
+    np.testing.assert_array_equal(run.reversals[[0, 2]], whole.reversals[[0, 2]])
+    np.testing.assert_allclose(run.margin_more[[0, 2]], whole.margin_more[[0, 2]], rtol=1e-4)
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, write: Write) -> None:
+    config = write(SCENE)
+    found, interruptions, _ = in_sittings(60, config, config.parent / "out")
+    assert interruptions > 1
+    same_numbers(found, run)

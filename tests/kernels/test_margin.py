@@ -1,0 +1,69 @@
+"""The margins of counts, and what is made of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import sweep
+from sweep.kernels.status import SETTLED, TIME_LIMIT
+
+SCENE = {
+    "body": {"a": 10.0, "b": 3.0, "delta": 0.03},
+    "friction": {"mu": 82.0},
+    "start": {"n0": 0.05, "x0": 0.01, "y0": 0.01},
+    "measure": ["reversals", "energy_error", "margin"],
+    "integrator": {"t_end": 20_000.0},
+}
+"""The fourth reversal begins near mu = 82.3."""
+
+
+def averaged(one: xr.Dataset) -> np.ndarray:
+    """The ripple-free spin of a trajectory, averaged over windows of about three periods."""
+    spin = one.ripple_free_spin.values
+    width = int(20 / float(one.time[1] - one.time[0]))
+    return np.convolve(spin[np.isfinite(spin)], np.full(width, 1 / width), "valid")
+
+
+@pytest.mark.parametrize(("mu", "t_end"), [(66.0, 1e5), (71.0, 2e4), (84.0, 2e4)])
+def test_margins_are_extremes_of_the_averaged_spin(mu: float, t_end: float) -> None:
+    """The sweep leaves the first two before their nearest approach; the trajectories go on."""
+    swept = sweep.run(SCENE, mu=mu)
+    spin = averaged(sweep.trajectory(SCENE, mu=mu, t_end=t_end, every=1.0).isel(trajectory=0))
+    (changes,) = np.nonzero(spin[1:] * spin[:-1] < 0)
+    assert len(changes) == int(swept.reversals)
+    arc = np.abs(spin[changes[-1] + 1 :])
+    assert float(swept.margin_fewer) == pytest.approx(arc.max(), rel=1e-2)
+    assert float(swept.margin_more) == pytest.approx(arc[arc.argmax() :].min(), rel=1e-2)
+    assert swept.decided == 1
+
+
+def test_margins_on_both_sides_lie_on_one_line() -> None:
+    found = sweep.run(SCENE, mu=[80.0, 81.0, 82.0, 83.0, 84.0])
+    assert list(found.reversals) == [3, 3, 3, 4, 4]
+    distance = xr.where(found.reversals == 3, -found.margin_more, found.margin_fewer)
+    line = np.polynomial.Polynomial.fit(found.mu, distance, 2)
+    np.testing.assert_allclose(line(found.mu.values), distance, atol=1e-2 * float(abs(distance).max()))
+
+
+def test_margins_that_are_not_known_are_missing() -> None:
+    found = sweep.run(SCENE, t_end=3000.0)
+    assert found.status == TIME_LIMIT
+    assert np.isnan(found.margin_more)
+    assert found.margin_fewer > 0
+    assert found.decided == 0
+    none = sweep.run(SCENE, n0=0.001)
+    assert (int(none.reversals), bool(np.isnan(none.margin_fewer)), bool(none.margin_more > 0)) == (0, True, True)
+
+
+def test_what_the_slow_equations_settle_stays_as_it_is() -> None:
+    """Cells that have come to the time limit: most are final already, and what is called so is."""
+    axes = {"mu": np.linspace(60, 200, 8), "b": np.linspace(1.6, 8.0, 8)}
+    ended, later = (sweep.run(SCENE, **axes, t_end=t_end, estimate_errors=False) for t_end in (5000.0, 1e5))
+    shown = ((ended.status == SETTLED) & (ended.t_stop == 5000)).values
+    assert shown.sum() >= 5
+    assert ((later.status == SETTLED).values[shown]).all()
+    np.testing.assert_array_equal(ended.reversals.values[shown], later.reversals.values[shown])
+    np.testing.assert_allclose(ended.margin_more.values[shown], later.margin_more.values[shown], rtol=0.05)
+    assert (later.reversals > ended.reversals).values[~shown].any()

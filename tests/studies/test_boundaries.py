@@ -1,0 +1,160 @@
+"""Boundaries: curves on which a count changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+from support.cli import invoke, refused
+from support.runs import Stop, same_numbers
+
+import sweep
+from sweep.plots import levels as drawn
+from sweep.plots import picture
+from sweep.plots.axis import Axis
+from sweep.results.margins import FOUND, OPEN, Counts, smoothed
+from sweep.studies.roots import Root
+
+AXES: dict[str, Any] = {"mu": [60.0, 72.0, 84.0], "b": [3.0, 4.0]}
+SCENE = {
+    "body": {"a": 10.0, "delta": 0.03},
+    "start": {"n0": 0.05, "x0": 0.01, "y0": 0.01},
+    "measure": ["reversals", "energy_error", "margin"],
+}
+
+
+@pytest.fixture(scope="module")
+def found() -> xr.Dataset:
+    return sweep.boundaries(SCENE, **AXES)
+
+
+def narrowed(function: Any, low: float, high: float, width: float) -> tuple[Root, int]:
+    root = Root(low, high, width, {p: function(p) for p in (low, high)}, {p: function(p) for p in (low, high)})
+    calls = 0
+    while not root.ended:
+        for place in root.wanted():
+            root.learn(place, function(place), smooth=True)
+            calls += 1
+    return root, calls
+
+
+@given(st.floats(0.01, 0.99), st.floats(0.3, 30), st.floats(-0.9, 0.9), st.booleans())
+def test_a_smooth_root_takes_few_evaluations(at: float, steep: float, bent: float, falls: bool) -> None:
+    def function(x: float) -> float:
+        return (-1 if falls else 1) * float(np.sinh(steep * (x - at) * (1 + bent * (x - at) / 2)))
+
+    root, calls = narrowed(function, 0.0, 1.0, 1e-6)
+    assert root.low <= at <= root.high <= root.low + 1e-6
+    assert calls <= 24
+    assert steep > 2 or abs(bent) > 0.5 or calls <= 9
+
+
+@given(st.floats(0.01, 0.99))
+def test_a_step_is_bracketed_too(at: float) -> None:
+    root, calls = narrowed(lambda x: 1.0 if x > at else -1.0, 0.0, 1.0, 1e-6)
+    assert root.low <= at <= root.high <= root.low + 1e-6
+    assert calls <= 60
+
+
+def test_a_place_without_a_value_ends_the_search() -> None:
+    root, _ = narrowed(lambda x: np.nan if 0.2 < x < 0.9 else x - 0.5, 0.0, 1.0, 1e-6)
+    assert root.unknown
+
+
+def test_distances_are_of_the_level_asked_for() -> None:
+    counts = Counts(
+        np.array([2.0, 3.0, 5.0]), np.array([0.1, np.nan, 0.2]), np.array([0.3, 0.4, 0.5]), np.ones(3, bool)
+    )
+    np.testing.assert_allclose(counts.distance(3), [-0.1, 0.4, 0.5 + 2 * 0.7])
+    np.testing.assert_allclose(counts.distance(4), [-0.5, np.nan, 0.5 + 0.7])
+    assert list(counts.levels()) == [3, 4, 5]
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_smooth_curves_pass_through_their_points_and_near_a_circle(closed: bool) -> None:
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    x, y = smoothed(np.cos(angle), np.sin(angle), closed=closed)
+    inner = slice(None) if closed else slice(8, -8)
+    np.testing.assert_allclose(np.hypot(x, y)[inner], 1, atol=3e-4)
+    assert min(np.hypot(x - 1, y)) < 1e-12
+    assert np.hypot(x[-1] - x[0], y[-1] - y[0]) < (1e-9 if closed else 0.3)
+
+
+def test_both_ends_of_each_bracket_count_what_another_method_counts(found: xr.Dataset, tmp_path: Path) -> None:
+    assert (found.outcome == FOUND).all()
+    assert found.sizes["point"] >= 4
+    width = np.abs(found.end_more - found.end_fewer) / np.minimum(found.end_more, found.end_fewer)
+    assert float(width.max()) <= 1e-6
+    assert (found.reversals_more - found.reversals_fewer == 1).all()
+    assert (found.reversals_more == found.level).all()
+    for end, counted in (("end_fewer", "reversals_fewer"), ("end_more", "reversals_more")):
+        mu, b = (xr.where(found.bracket == name, found[end], found[name]).values for name in ("mu", "b"))
+        np.savetxt(tmp_path / "ends.csv", np.column_stack([mu, b]), "%.17g", ",", header="mu,b", comments="")
+        (tmp_path / "ends.yaml").write_text(
+            "cases: ends.csv\nbody: {a: 10.0, delta: 0.03}\nstart: {n0: 0.05, x0: 0.01, y0: 0.01}\n"
+        )
+        again = sweep.run(tmp_path / "ends.yaml", method="dopri5")
+        np.testing.assert_array_equal(again.reversals.values, found[counted].values)
+
+
+def test_margins_of_a_grid_draw_the_curves_without_a_search(found: xr.Dataset) -> None:
+    grid = sweep.run(SCENE, **AXES)
+    axes = [Axis(name, np.array(AXES[name])) for name in ("b", "mu")]
+    lines = {int(line.symbol): np.concatenate(line.parts, axis=1) for line in drawn.lines(grid, *axes)}
+    assert set(lines) == set(found.level.values)
+    off = [
+        np.hypot(*((lines[int(p.level)].T - [p.b.item(), p.mu.item()]) / [1.0, 12.0]).T).min()
+        for p in (found.isel(point=i) for i in range(found.sizes["point"]))
+    ]
+    assert np.median(off) < 0.15
+    assert max(off) < 0.5
+    assert "by the margins" in " ".join(
+        t.get_text() for k in picture.plot(grid, x="b", y="mu").legends for t in k.get_texts()
+    )
+    assert not drawn.lines(grid.drop_vars("margin_more"), *axes)
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> None:
+    done, sittings = None, 0
+    while done is None:
+        try:
+            done = sweep.boundaries(SCENE, output=tmp_path, reporter=Stop(120), **AXES)
+        except KeyboardInterrupt:
+            sittings += 1
+    assert sittings > 1
+    same_numbers(done, found)
+    picture.plot(tmp_path / "sweep_boundaries.nc", output=tmp_path / "again.svg")
+    assert (tmp_path / "sweep_boundaries.png").exists()
+    assert "level4" in (tmp_path / "again.svg").read_text()
+    said = invoke("info", tmp_path / "sweep_boundaries.nc").output
+    assert f"{found.sizes['point']} points" in said
+    assert f"found {found.sizes['point']}, within" in said
+
+
+def test_what_does_not_end_is_open() -> None:
+    early = sweep.boundaries(SCENE, **AXES, t_end=4500.0)
+    assert (early.outcome == OPEN).any()
+    assert "did not end" in " ".join(t.get_text() for k in picture.plot(early).legends for t in k.get_texts())
+
+
+def test_a_map_without_boundaries_has_an_empty_picture(tmp_path: Path) -> None:
+    none = sweep.boundaries(SCENE, output=tmp_path, **AXES, t_end=100.0)
+    assert none.sizes["point"] == 0
+    assert "no count changes" in picture.plot(none).axes[0].get_title()
+    assert "0 points" in invoke("info", tmp_path / "sweep_boundaries.nc").output
+
+
+def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "one.yaml").write_text("friction: {mu: [60, 70]}\n")
+    refused(invoke("boundaries", tmp_path / "one.yaml"), "boundaries need two axes")
+    refused(invoke("boundaries", tmp_path / "one.yaml", "--x", "c"), "x: c is no axis of more than one value", "mu")
+    (tmp_path / "two.yaml").write_text("friction: {mu: [60, 70]}\nbody: {b: [2, 3]}\n")
+    assert "for each point" in invoke("boundaries", tmp_path / "two.yaml", "--dry-run").output
+    both = invoke("boundaries", tmp_path / "two.yaml", "--workers", "2", "--scheduler", "tcp://x")
+    refused(both, "cannot be combined with --scheduler")
