@@ -138,6 +138,7 @@ def critical(
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
+    cluster: Cluster | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Critical spins over all axes of `config` except n0: by formulas, and n_c1 by eigenvalues, n_c2 by simulation.
@@ -148,7 +149,7 @@ def critical(
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, overrides : as for `run`
+    config, output, fresh, progress, reporter, cluster, overrides : as for `run`
     width : of the brackets of n_c2, relative to the spin
 
     Returns
@@ -166,9 +167,9 @@ def critical(
     from sweep.progress import shown
     from sweep.studies.critical import critical
 
-    with shown(progress, reporter, "bodies") as told:
+    with shown(progress, reporter) as told:
         checked = load_config(config, overrides, announce=told.note)
-        return critical(checked, width, output, fresh=fresh, reporter=told)
+        return critical(checked, width, output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def trajectory(

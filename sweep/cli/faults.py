@@ -110,11 +110,11 @@ class Commands(click.Group):
 
 
 @contextmanager
-def resumable(terminal: Terminal, work: str, unit: str) -> Iterator[None]:
+def resumable(terminal: Terminal, work: str) -> Iterator[None]:
     """End an interrupted command with what is kept."""
     try:
         yield
     except KeyboardInterrupt:
-        done = f"{terminal.last.done:.0f} of {terminal.last.cells} {unit}" if terminal.last else f"no {unit}"
+        done = f"{terminal.last.done:.0f} of {terminal.last.cells} cells" if terminal.last else "no cells"
         terminal.note(f"interrupted: {done} finished and kept; the same command resumes the {work}")
         sys.exit(INTERRUPTED)

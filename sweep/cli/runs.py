@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +14,11 @@ from sweep import interrupt
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, resumable, say
 from sweep.cli.options import CONFIG, OUTPUT, QUIET, SETTINGS, begun_parameters, cells_of, loaded
 from sweep.parameters import PARAMETERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from sweep.config import Config
 
 _TIMES = {"paper": "sqrt(c/g)", "SI": "s", "own": "of time"}
 """The unit in which a progress bar counts time, by the `units` of a configuration."""
@@ -41,20 +48,25 @@ def _parameter_help() -> str:
     return "\n".join(lines)
 
 
+DRY_RUN = click.option(
+    "--dry-run", is_flag=True, help="Print how much would be simulated, and about how long it takes; compute nothing."
+)
+FRESH = click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")
+
+
 @click.command(epilog=_parameter_help())
 @CONFIG
 @OUTPUT
 @SETTINGS
-@click.option("--dry-run", is_flag=True, help="Print cells, steps, memory and estimated time; compute nothing.")
-@click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")
+@DRY_RUN
+@FRESH
 @click.option("--rerun", type=click.Choice(["failed", "limit"]),
               help="Simulate again only those cells of the dataset that failed, or that reached t_end.")  # fmt: skip
 @WORKERS
 @SCHEDULER
 @QUIET
 def run(
-    config: Path, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool,
-    rerun: str | None, workers: int | None, scheduler: str | None, quiet: bool,
+    config: Path, settings: tuple[str, ...], dry_run: bool, fresh: bool, rerun: str | None, **how: Any
 ) -> None:  # fmt: skip
     """Run the sweep that CONFIG describes.
 
@@ -63,28 +75,15 @@ def run(
     got more values along an axis, or a later t_end, only what the dataset lacks is simulated.
     """
     checked = loaded(config, settings)
-    folder = output or Path("runs") / checked.name
     if dry_run:
         from sweep.engine.estimate import estimate
 
         click.echo(estimate(checked))
         return
-    from sweep.engine.cluster import connected
     from sweep.engine.run import run as run_sweep
-    from sweep.progress import Terminal
-    from sweep.results.summary import failed_fraction, summarize
+    from sweep.results.summary import failed_fraction
 
-    interrupt.raise_again()
-    before = _stamps(folder, checked.name)
-    with (
-        Terminal(quiet) as terminal,
-        resumable(terminal, "run", "cells"),
-        connected(workers, scheduler) as cluster,
-    ):
-        result = run_sweep(checked, folder, fresh=fresh, rerun=rerun, reporter=terminal, cluster=cluster)
-    if not quiet:
-        click.echo(summarize(result))
-        say(_written(folder, checked.name, before))
+    result = _written(checked, "run", partial(run_sweep, checked, fresh=fresh, rerun=rerun), **how)
     failed = failed_fraction(result)
     if failed > checked.max_failed_fraction:
         most = f"max_failed_fraction allows {checked.max_failed_fraction:.2%}"
@@ -100,7 +99,7 @@ def run(
               help="End when neither spin nor count can change any more, as a sweep does, not at t_end.")  # fmt: skip
 @OUTPUT
 @SETTINGS
-@click.option("--dry-run", is_flag=True, help="Print trajectories, steps and estimated time; compute nothing.")
+@DRY_RUN
 @QUIET
 def trajectory(
     config: Path,
@@ -146,14 +145,14 @@ def trajectory(
               help="Relative distance of the two simulated cells between which a count changes.")  # fmt: skip
 @OUTPUT
 @SETTINGS
-@click.option("--dry-run", is_flag=True, help="Print cells, steps, memory and estimated time; compute nothing.")
-@click.option("--fresh", is_flag=True, help="Discard what an earlier search left instead of resuming it.")
+@DRY_RUN
+@FRESH
 @WORKERS
 @SCHEDULER
 @QUIET
 def boundaries(
-    config: Path, x: str | None, y: str | None, width: float, output: Path | None, settings: tuple[str, ...],
-    dry_run: bool, fresh: bool, workers: int | None, scheduler: str | None, quiet: bool,
+    config: Path, x: str | None, y: str | None, width: float, settings: tuple[str, ...], dry_run: bool, fresh: bool,
+    **how: Any,
 ) -> None:  # fmt: skip
     """Find the curves over two axes of CONFIG on which the number of reversals changes.
 
@@ -162,28 +161,13 @@ def boundaries(
     and the same command resumes the search.
     """
     checked = loaded(config, settings)
-    if dry_run:
-        from sweep.studies.boundaries import estimate
-
-        click.echo(estimate(checked, x, y))
-        return
-    from sweep.engine.cluster import connected
-    from sweep.progress import Terminal
-    from sweep.results.summary import describe
     from sweep.studies.boundaries import boundaries as search
+    from sweep.studies.boundaries import estimate
 
-    folder, name = output or Path("runs") / checked.name, f"{checked.name}_boundaries"
-    before = _stamps(folder, name)
-    interrupt.raise_again()
-    with (
-        Terminal(quiet) as terminal,
-        resumable(terminal, "search", "cells"),
-        connected(workers, scheduler) as cluster,
-    ):
-        found = search(checked, x, y, width, folder, fresh=fresh, reporter=terminal, cluster=cluster)
-    if not quiet:
-        click.echo(describe(found))
-        say(_written(folder, name, before))
+    if dry_run:
+        click.echo(estimate(checked, x, y))
+    else:
+        _written(checked, "boundaries", partial(search, checked, x, y, width, fresh=fresh), **how)
 
 
 @click.command()
@@ -192,12 +176,14 @@ def boundaries(
               help="Relative width of the brackets of n_c2.")  # fmt: skip
 @OUTPUT
 @SETTINGS
-@click.option("--dry-run", is_flag=True, help="Print bodies, simulations and estimated time; compute nothing.")
-@click.option("--fresh", is_flag=True, help="Discard what an earlier search left instead of resuming it.")
+@DRY_RUN
+@FRESH
+@WORKERS
+@SCHEDULER
 @QUIET
 def critical(
-    config: Path, width: float, output: Path | None, settings: tuple[str, ...], dry_run: bool, fresh: bool, quiet: bool
-) -> None:
+    config: Path, width: float, settings: tuple[str, ...], dry_run: bool, fresh: bool, **how: Any
+) -> None:  # fmt: skip
     """Find the critical spins over all axes of CONFIG but n0.
 
     They come from the paper's formulas, n_c1 also from the model's eigenvalues, and n_c2 from simulation.
@@ -205,34 +191,41 @@ def critical(
     same command resumes the search.
     """
     checked = loaded(config, settings)
-    if dry_run:
-        from sweep.studies.critical import estimate
-
-        click.echo(estimate(checked))
-        return
-    from sweep.progress import Terminal
     from sweep.studies.critical import critical as search
-    from sweep.studies.critical import remarks
+    from sweep.studies.critical import estimate
 
-    folder = output or Path("runs") / checked.name
-    name = f"{checked.name}_critical"
+    if dry_run:
+        click.echo(estimate(checked))
+    else:
+        _written(checked, "critical", partial(search, checked, width, fresh=fresh), **how)
+
+
+def _written(
+    config: Config, verb: str, work: Callable[..., xr.Dataset], *,
+    output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
+) -> xr.Dataset:  # fmt: skip
+    """Carry out `work`, show its progress, and say what it found and wrote."""
+    from sweep.engine.cluster import connected
+    from sweep.progress import Terminal
+    from sweep.results.summary import describe
+
+    folder, name = output or Path("runs") / config.name, config.name if verb == "run" else f"{config.name}_{verb}"
     before = _stamps(folder, name)
     interrupt.raise_again()
-    with Terminal(quiet, "bodies") as terminal, resumable(terminal, "search", "bodies"):
-        result = search(checked, width, folder, fresh=fresh, reporter=terminal)
-    if found := remarks(result):
-        say("\n".join(found), err=quiet)
+    with (
+        Terminal(quiet) as terminal,
+        resumable(terminal, "run" if verb == "run" else "search"),
+        connected(workers, scheduler) as cluster,
+    ):
+        result = work(output=folder, reporter=terminal, cluster=cluster)
     if not quiet:
-        say(_written(folder, name, before))
+        click.echo(describe(result))
+        new = [suffix for suffix, stamp in _stamps(folder, name).items() if stamp != before.get(suffix)]
+        say(f"wrote {folder / name}{' and '.join(new)}" if new else "nothing was written")
+    return result
 
 
 def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:
     """Return marks, by suffix, that change when the results `name` in `folder` are written anew."""
     stats = {suffix: path.stat() for suffix in (".nc", ".png") if (path := folder / f"{name}{suffix}").exists()}
     return {suffix: (stat.st_ino, stat.st_mtime_ns) for suffix, stat in stats.items()}
-
-
-def _written(folder: Path, name: str, before: dict[str, tuple[int, int]]) -> str:
-    """Say which results were written since `_stamps` returned `before`."""
-    new = [suffix for suffix, stamp in _stamps(folder, name).items() if stamp != before.get(suffix)]
-    return f"wrote {folder / name}{' and '.join(new)}" if new else "nothing was written"

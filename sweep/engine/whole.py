@@ -58,7 +58,7 @@ class Whole:
         for i in range(len(self.tiles)):
             arrays = self.store.load(i)
             tails |= {name: values.shape[1:] for name, values in arrays.items()}
-            apart.append(_apart(arrays))
+            apart.append(apart_from(arrays))
         first = dict(zip(self.grid.dims, self.tiles[0], strict=True))
         empty, sizes = dict[str, Array](), dict[str, tuple[int, ...]]()
         for name, (over, spec) in dataset.layout(self.grid, tails).items():
@@ -68,6 +68,12 @@ class Whole:
         pieces = (piece for tile, arrays in loaded for piece in dataset.pieces(self.grid, tile, arrays))
         netcdf.write(path, self._frame(empty, apart), sizes, pieces)
 
+    def _cut(self, cells: int, tile_size: Callable[[int], int]) -> bool:
+        """Simulate so many cases more, in tiles of their own; False if there are none."""
+        first, step = self.tiles[-1][0].stop if self.tiles else 0, tile_size(cells)
+        self.tiles += [(slice(i, min(i + step, first + cells)),) for i in range(first, first + cells, step)]
+        return cells > 0
+
     def _gather(self) -> tuple[dict[str, Array], list[Apart]]:
         """Arrays over all simulated cells (or bodies), and what the tiles hold apart from them."""
         apart: list[Apart] = []
@@ -75,7 +81,7 @@ class Whole:
         def read() -> Iterator[tuple[Tile, dict[str, Array]]]:
             for i, tile in enumerate(self.tiles):
                 arrays = self.store.load(i)
-                apart.append(_apart(arrays))
+                apart.append(apart_from(arrays))
                 yield tile, arrays
 
         return dataset.assemble(Grid.of(self.simulated()), read()), apart
@@ -120,11 +126,8 @@ class Some(Whole):
 
     def _add(self, cells: Array, tile_size: Callable[[int], int]) -> bool:
         """Simulate these cells too, in tiles of their own; False if there are none."""
-        first, step = len(self.cells), tile_size(len(cells))
         self.cells = np.concatenate([self.cells, cells])
-        last = len(self.cells)
-        self.tiles += [(slice(i, min(i + step, last)),) for i in range(first, last, step)]
-        return last > first
+        return self._cut(len(cells), tile_size)
 
     def _place(self, cells: Array, found: Mapping[str, Array], arrays: dict[str, Array]) -> None:
         """Write what was `found` for `cells`, as cases, into `arrays` over all cells or bodies, undefined elsewhere."""
@@ -136,5 +139,6 @@ class Some(Whole):
             arrays[name][body[cells] if spec.per_body else cells] = found[name]
 
 
-def _apart(arrays: Mapping[str, Array]) -> Apart:
+def apart_from(arrays: Mapping[str, Array]) -> Apart:
+    """Pick what the arrays of a tile hold apart from its cells."""
     return {n: values for n, values in arrays.items() if n in ("seconds", "cpu") or n.startswith("verified_")}

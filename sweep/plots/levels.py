@@ -5,10 +5,8 @@ From the dataset alone, and without any library that draws.
 
 from __future__ import annotations
 
-import numpy as np
 import xarray as xr
 
-from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.plots.axis import Axis
 from sweep.plots.theory import Line
 from sweep.results.margins import Counts, contours
@@ -20,12 +18,11 @@ NEEDED = ["reversals", "margin_more", "margin_fewer", "status"]
 def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
     """The boundaries over a map with these axes, for which all other axes of the dataset are fixed: one for each count.
 
-    None if the dataset has no margins.
+    There are none if the dataset has no margins.
     """
     if not set(NEEDED) <= set(dataset.data_vars) or min(len(x.values), len(y.values)) < 2:
         return []
-    count, more, fewer, status = (dataset[name].transpose(y.name, x.name).values for name in NEEDED)
-    counts = Counts(count.astype(float), more, fewer, np.isin(status, (SETTLED, TIME_LIMIT)))
+    counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in NEEDED})
     found = []
     for level in counts.levels():
         curves = contours(counts.distance(level), x.straight(x.values), y.straight(y.values))

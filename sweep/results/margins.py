@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from contourpy import contour_generator
 
 from sweep.grid import Array
+from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.variables import Variable
 
 FOUND, OPEN, UNCERTAIN = range(3)
@@ -43,9 +44,16 @@ class Counts:
     known: Array
     """Whether there is a count at all."""
 
-    def distance(self, level: int) -> Array:
+    @classmethod
+    def of(cls, found: Mapping[str, Array]) -> Counts:
+        """Take them from the variables of a dataset."""
+        known = np.isin(found["status"], (SETTLED, TIME_LIMIT))
+        return cls(found["reversals"].astype(float), found["margin_more"], found["margin_fewer"], known)
+
+    def distance(self, level: Any) -> Array:
         """How far in spin each cell is from where `level` reversals begin: negative where it counts fewer.
 
+        One level for all, or one for each.
         NaN where that is not known.  For a cell whose count is farther away than by one, it is a guess: as if each
         count between took as much spin as its own.
         """
@@ -56,9 +64,9 @@ class Counts:
         )
         return np.where(self.known, found, np.nan)
 
-    def at(self, place: Any) -> Counts:
-        """One cell, with arrays of shape (1,)."""
-        return Counts(*(np.atleast_1d(each[place]) for each in vars(self).values()))
+    def borders(self, level: Any) -> Array:
+        """Tell whether the distance from where `level` reversals begin is the measured one, not a guess."""
+        return np.isin(self.reversals - level, (0, -1))
 
     def levels(self) -> range:
         """The counts that begin somewhere between the cells."""

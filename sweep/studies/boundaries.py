@@ -1,18 +1,16 @@
 """The curves on which a count changes: cells of a grid tell where they pass, and simulations how exactly.
 
 On each edge of the grid whose ends count differently, the distance in spin from the boundary (`sweep.results.margins`)
-has a root.  All roots are narrowed side by side, until two simulated cells on either side are as near as is asked.  The
-simulated cells are a table of cases that grows, so that a search is checkpointed, interrupted, and spread over a
-cluster as a run is.
+has a root.  All roots are narrowed side by side, until two simulated cells on either side are as near as is asked.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -20,14 +18,10 @@ import xarray as xr
 from sweep.config import Config, ConfigError
 from sweep.config.faults import Fault
 from sweep.engine.cluster import Cluster
-from sweep.engine.errors import ROUND_OFF
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import carry_out
-from sweep.engine.whole import Whole
 from sweep.grid import Array
 from sweep.interrupt import deferred
-from sweep.kernels.measures import possible
-from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models.model import COUNT
 from sweep.plots.axis import Axis
 from sweep.results.dataset import described
@@ -36,19 +30,14 @@ from sweep.results.margins import FOUND, OPEN, POINTS, UNCERTAIN, Counts, contou
 from sweep.results.store import Store
 from sweep.studies.kept import identified, kept
 from sweep.studies.roots import Root
+from sweep.studies.search import Search, measuring
 from sweep.studies.trajectory import require_simulated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MEASURED = ("reversals", "margin", "energy_error")
-
-_FINER = 1e-4
-"""Tolerance of the simulations that narrow a bracket, relative to its width: near a boundary a spin is that small."""
-
 _EACH = 8
 """Simulations that narrow a bracket from a cell of a grid to `WIDTH`, as a rule."""
-
 
 WIDTH = 1e-6
 """Relative distance of the two simulated cells between which a count changes."""
@@ -68,12 +57,12 @@ def boundaries(
 ) -> xr.Dataset:
     """As `sweep.api.boundaries`; what there is to tell goes to `reporter` alone."""
     across, reporter = _across(config, x, y), reporter or Reporter()
-    config = _measuring(config)
+    config = measuring(config)
     identity = identified(config, f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}")
     files = None if output is None else RunFiles(Path(output), f"{config.name}_boundaries")
 
     def search(store: Store) -> xr.Dataset:
-        found = Search(config, store, across, width)
+        found = Boundaries(config, store, across, width)
         carry_out(found, store, reporter, cluster)
         return found.labelled().assign_attrs(vars(identity))
 
@@ -92,13 +81,7 @@ def estimate(config: Config, x: str | None = None, y: str | None = None) -> str:
 
     across = _across(config, x, y)
     words = f"then:   about {_EACH} simulations for each point where a curve crosses a line of the grid"
-    return f"{of_run(_measuring(config))}\n{words}, over {across[0]} and {across[1]}"
-
-
-def _measuring(config: Config) -> Config:
-    """`config` with what a search needs to know of a cell, and no more."""
-    measure = tuple(name for name in _MEASURED if name in possible(config.equations))
-    return replace(config, measure=measure, verify=0.0, refine=0)
+    return f"{of_run(measuring(config))}\n{words}, over {across[0]} and {across[1]}"
 
 
 def _across(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
@@ -119,6 +102,15 @@ def _across(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
     return right, up
 
 
+class Cell(NamedTuple):
+    """What is known of a cell on an edge."""
+
+    distance: float
+    """From the boundary, in spin; NaN where there is no count."""
+    reversals: int
+    decided: bool
+
+
 @dataclass
 class Point:
     """A point of a curve, on an edge of the grid, that is being narrowed."""
@@ -132,71 +124,53 @@ class Point:
     """The other parameters of the edge."""
     root: Root
     """In the straight coordinate of the axis (`Axis.straight`)."""
-    counts: dict[float, int]
-    """The counts that are known along the edge, by place."""
-    decided: set[float]
-    """The places whose counts are certain."""
+    cells: dict[float, Cell]
+    """What is known along the edge, by place."""
 
 
-class Search(Whole):
-    """The simulations of a search: first the cells of the grid, then those that the roots ask for."""
+class Boundaries(Search):
+    """A search whose first round are the cells of the grid."""
 
     def __init__(self, config: Config, store: Store, across: tuple[str, str], width: float) -> None:
-        super().__init__(config, store)
-        self.across, self.width = across, width
+        super().__init__(config, store, width)
+        self.across = across
         self.axes = {name: Axis(name, np.array(sorted(config.axes[name]))) for name in across}
         self.points: list[Point] = []
-        self.asked: list[tuple[Point, float]] = []
+        self._asked: list[tuple[Point, float]] = []
         """The points and places of the cells that were asked for last."""
-        self.rows: list[dict[str, float]] = []
-        """The parameters of the cells beyond the grid."""
-        self._learned = 0
-        self._sure = np.empty(0, bool)
-        """Whether the counts of the cells of `asked` are certain; taken for granted where no errors are estimated."""
 
-    def simulated(self) -> Config:
-        """The configuration whose cases are all simulated cells."""
-        columns = self.grid.columns()
-        varying = dict.fromkeys([*self.config.axes, *(self.config.cases or {})])
-        cases = {name: (*columns[name].tolist(), *(row[name] for row in self.rows)) for name in varying}
-        constants = {name: v for name, v in self.config.parameters.items() if name not in cases}
-        integrator = self.config.integrator
-        if self.rows:
-            finer = max(_FINER * self.width, ROUND_OFF)
-            integrator = integrator.model_copy(update={"tolerance": min(integrator.tolerance, finer)})
-        return replace(self.config, parameters=constants, cases=cases, integrator=integrator)
+    def ask(self) -> Mapping[str, Array]:
+        if not self.rounds:
+            columns = self.grid.columns()
+            return {name: columns[name] for name in self.config.axes}
+        self.narrows = True
+        self._asked = [(point, place) for point in self.points if not point.root.ended for place in point.root.wanted()]
+        rows = [{**point.cell, point.along: self._bent(point, place)} for point, place in self._asked]
+        return {name: np.array([row[name] for row in rows]) for name in self.config.axes}
 
-    def grow(self, tile_size: Callable[[int], int]) -> bool:
-        """Add the cells to simulate next, judging by all results so far; False if every search has ended."""
-        if not self.tiles:
-            return self._add(self.grid.size, tile_size)
-        found = self._learn()
-        if not self.points:
-            self.points = list(self._points(found))
-        else:
-            for (point, place), count, sure in zip(self.asked, _each(found), self._sure, strict=True):
-                distance = float(count.distance(point.level)[0])
-                point.root.learn(place, distance, smooth=_is_smooth(count, point.level))
-                point.counts[place] = int(count.reversals[0])
-                if sure:
-                    point.decided.add(place)
-        self.asked = [(point, place) for point in self.points if not point.root.ended for place in point.root.wanted()]
-        bent = {name: axis.bent for name, axis in self.axes.items()}
-        self.rows += [
-            {**point.cell, point.along: float(bent[point.along](np.array(place)))} for point, place in self.asked
-        ]
-        return self._add(len(self.asked), tile_size)
+    def learn(self, found: Mapping[str, Array]) -> None:
+        counts = Counts.of(found)
+        if len(self.rounds) == 1:
+            self.points = list(self._points(counts, found.get("decided", counts.known)))
+            return
+        levels = np.array([point.level for point, _ in self._asked])
+        cells = map(Cell, counts.distance(levels), counts.reversals, found.get("decided", counts.known))
+        for (point, place), cell, smooth in zip(self._asked, cells, counts.borders(levels), strict=True):
+            point.root.learn(place, cell.distance, smooth=smooth)
+            point.cells[place] = cell
+
+    def _bent(self, point: Point, place: float) -> float:
+        return float(self.axes[point.along].bent(np.array(place)))
 
     def labelled(self) -> xr.Dataset:
         """The points, with what their search has cost."""
-        _, apart = self._gather()
         columns = {name: np.array(values) for name, values in self._columns().items()}
         head: dict[str, Any] = {
             "Conventions": "CF-1.11",
             "title": f"{self.config.name}: boundaries ({self.config.model} model)",
         }
         head |= {"x": self.across[0], "y": self.across[1], "relative_width": self.width}
-        head |= {"trajectories": self.tiles[-1][0].stop} | self._attributes(self.tiles[-1][0].stop, apart)
+        head |= {"trajectories": self.simulations} | self._attributes(self.simulations, self.apart)
         own = {name: xr.Variable("point", columns[name].astype(spec.dtype), described(spec))
                for name, spec in POINTS.items()}  # fmt: skip
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})
@@ -213,82 +187,64 @@ class Search(Whole):
         """The variables and coordinates of all points, by name."""
         columns: dict[str, list[Any]] = {name: [] for name in (*POINTS, "bracket", *self.config.axes)}
         for point in self.points:
-            axis, root = self.axes[point.along], point.root
+            root = point.root
             ends = sorted((root.low, root.high), key=lambda place: root.values[place])
-            fewer, more = (float(axis.bent(np.array(place))) for place in ends)
+            fewer, more = (self._bent(point, place) for place in ends)
+            cells = [point.cells[place] for place in ends]
+            sure = FOUND if all(cell.decided for cell in cells) else UNCERTAIN
             row: dict[str, Any] = {"level": point.level, "curve": point.curve, "closed": point.closed}
-            sure = FOUND if point.decided >= {*ends} else UNCERTAIN
             row |= {"end_fewer": fewer, "end_more": more, "outcome": OPEN if root.unknown else sure}
-            row |= {"reversals_fewer": point.counts[ends[0]], "reversals_more": point.counts[ends[1]]}
+            row |= {"reversals_fewer": cells[0].reversals, "reversals_more": cells[1].reversals}
             row |= {"bracket": point.along, **point.cell, point.along: (fewer + more) / 2}
             for name, values in columns.items():
                 values.append(row[name])
         return columns
 
-    def _add(self, cells: int, tile_size: Callable[[int], int]) -> bool:
-        """Simulate so many cells more, in tiles of their own."""
-        first, step = self.tiles[-1][0].stop if self.tiles else 0, max(tile_size(cells), 1)
-        self.tiles += [(slice(i, min(i + step, first + cells)),) for i in range(first, first + cells, step)]
-        return cells > 0
-
-    def _learn(self) -> Counts:
-        """What the tiles say that were added last."""
-        new = [self.store.load(i) for i in range(self._learned, len(self.tiles))]
-        self._learned = len(self.tiles)
-        status, count, more, fewer = (
-            np.concatenate([tile[name] for tile in new])
-            for name in ("status", "reversals", "margin_more", "margin_fewer")
-        )
-        self._sure = (
-            np.concatenate([tile["decided"] for tile in new]).astype(bool) if "decided" in new[0] else count >= 0
-        )
-        return Counts(count.astype(float), more, fewer, np.isin(status, (SETTLED, TIME_LIMIT)))
-
-    def _points(self, found: Counts) -> Iterator[Point]:
+    def _points(self, found: Counts, decided: Array) -> Iterator[Point]:
         """The points that the cells of the grid tell of, curve by curve."""
         names, (x, y) = list(self.config.axes), self.across
-        order = [names.index(name) for name in (*(n for n in names if n not in self.across), y, x)]
-        tables = [np.transpose(each.reshape(self.grid.shape), order) for each in vars(found).values()]
         others = [name for name in names if name not in self.across]
+        order = [names.index(name) for name in (*others, y, x)]
+        tables = [np.transpose(each.reshape(self.grid.shape), order) for each in (*vars(found).values(), decided)]
         number = 0
         for at in product(*(range(len(self.config.axes[name])) for name in others)):
             cell = {name: self.config.axes[name][i] for name, i in zip(others, at, strict=True)}
-            counts = Counts(*(_sorted(each[at], self.config.axes[y], self.config.axes[x]) for each in tables))
+            *here, sure = (_sorted(each[at], self.config.axes[y], self.config.axes[x]) for each in tables)
+            counts = Counts(*here)
             for level in counts.levels():
-                for xs, ys in contours(_levelled(counts.distance(level)), *map(np.arange, counts.known.shape[::-1])):
+                distance = counts.distance(level)
+                known = distance, counts.reversals, sure, counts.borders(level)
+                for xs, ys in contours(_levelled(distance), *map(np.arange, distance.shape[::-1])):
                     places = list(zip(xs.tolist(), ys.tolist(), strict=True))
                     closed = places[0] == places[-1]
                     for place in places[: -1 if closed else None]:
-                        yield replace(self._point(level, cell, counts, place), curve=number, closed=closed)
+                        along, fixed, root, cells = self._edge(known, place)
+                        yield Point(level, number, closed, along, cell | fixed, root, cells)
                     number += 1
 
-    def _point(self, level: int, cell: dict[str, float], counts: Counts, at: tuple[float, float]) -> Point:
-        """The point of a curve at `at`, in indices along x and y, one of which is whole."""
+    def _edge(
+        self, known: tuple[Array, ...], at: tuple[float, float]
+    ) -> tuple[str, dict[str, float], Root, dict[float, Cell]]:
+        """The axis of the edge at `at`, in indices along x and y, one of which is whole; the other axis; and its ends.
+
+        `known` are the distances, counts, and whether they are decided and measured, of shape (y, x).
+        """
         x, y = self.across
         horizontal = abs(at[0] - round(at[0])) > abs(at[1] - round(at[1]))
         along, other = (x, y) if horizontal else (y, x)
-        first, fixed = int(np.floor(at[not horizontal])), round(at[horizontal])
+        first, whole = int(np.floor(at[not horizontal])), round(at[horizontal])
+        pair = (whole, slice(first, first + 2)) if horizontal else (slice(first, first + 2), whole)
         axis = self.axes[along]
-        places = axis.straight(axis.values[first : first + 2]).tolist()
-        ends = [counts.at((fixed, first + i) if horizontal else (first + i, fixed)) for i in (0, 1)]
-        values = [float(end.distance(level)[0]) for end in ends]
-        smooth = {p: v for p, v, end in zip(places, values, ends, strict=True) if _is_smooth(end, level)}
-        ends_ = np.abs(axis.values[first : first + 2])
-        size = 1.0 if axis.spacing == "log" else float(ends_.min() or ends_.max())
-        root = Root(places[0], places[1], self.width * size, dict(zip(places, values, strict=True)), smooth)
-        counted = {p: int(end.reversals[0]) for p, end in zip(places, ends, strict=True)}
-        return Point(
-            level, 0, False, along, cell | {other: float(self.axes[other].values[fixed])}, root, counted, set()
-        )
-
-
-def _each(found: Counts) -> Iterator[Counts]:
-    return (found.at(i) for i in range(len(found.known)))
-
-
-def _is_smooth(count: Counts, level: int) -> bool:
-    """Tell whether the distance of a cell is the measured one, not a guess."""
-    return bool(count.reversals[0] in (level - 1, level))
+        ends = axis.values[first : first + 2]
+        places = axis.straight(ends).tolist()
+        distance, count, sure, measured = (each[pair].tolist() for each in known)
+        size = 1.0 if axis.spacing == "log" else float(np.abs(ends).min() or np.abs(ends).max())
+        values = dict(zip(places, distance, strict=True))
+        smooth = {place: values[place] for place, exact in zip(places, measured, strict=True) if exact}
+        root = Root(places[0], places[1], self.width * size, values, smooth)
+        return along, {other: float(self.axes[other].values[whole])}, root, dict(
+            zip(places, map(Cell, distance, count, sure), strict=True)
+        )  # fmt: skip
 
 
 def _sorted(table: Array, y: tuple[float, ...], x: tuple[float, ...]) -> Array:

@@ -2,32 +2,45 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, Values
-from sweep.config.bodies import described_impossible
 from sweep.config.user_models import explained
-from sweep.engine.reporter import Progress, Reporter
+from sweep.engine.cluster import Cluster
+from sweep.engine.estimate import estimate as of_run
+from sweep.engine.reporter import Reporter
+from sweep.engine.run import carry_out
 from sweep.grid import Array, Grid
 from sweep.interrupt import deferred
+from sweep.kernels.status import SETTLED
+from sweep.models.model import Columns
+from sweep.models.theory.stability import SPIN_LIMIT
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
-from sweep.results.dataset import EXISTS, NO_COUPLING, NO_FRICTION, NOT_FOUND
+from sweep.results.dataset import (
+    EXISTS,
+    FAILED,
+    NO_BODY,
+    NO_COUPLING,
+    NO_FRICTION,
+    NOT_FOUND,
+    REVERSES_AT_N_C1,
+    UNDECIDED,
+)
 from sweep.results.folder import RunFiles
-from sweep.results.identity import Identity
-from sweep.results.provenance import provenance
+from sweep.results.margins import Counts
+from sweep.results.memory import Memory
 from sweep.results.store import Store
-from sweep.studies import bracket
 from sweep.studies.kept import identified, kept
-from sweep.studies.reversing import USUAL, body_seconds, find_n_c2
-from sweep.studies.rounds import Rounds
+from sweep.studies.roots import Root
+from sweep.studies.search import Search, measuring
 from sweep.studies.trajectory import require_simulated
 
 if TYPE_CHECKING:
@@ -36,32 +49,19 @@ if TYPE_CHECKING:
 WIDTH = 1e-3
 """Relative width down to which simulation brackets n_c2."""
 
-# Searches for n_c2 that run together (about 100 MB of images).
-_GROUP = 8192
+RATIO = 1.25
+"""From one spin of the way outwards to the next."""
 
-# Bodies by which the time for all others is judged.
-_SAMPLE = 256
+# Spins of the way outwards that are simulated at once.
+_OUTWARDS = 5
 
-# Of what is left of a search, the share that a round of simulations brings, as a guess while the round goes on.
-_ROUND = 0.5
+# The search ends at this multiple of n_c1.  The paper's n_c2 is 2 n_c1; over 200 bodies (a = 1.5 … 50, |δ| <= 0.5,
+# μ = 0.1 … 5000) it was found at up to 7.7 n_c1, with a median of 2.01.  Beyond, fast spins take long to simulate, and
+# the body topples or leaves the plane instead: of 40 bodies searched up to a spin of 10, none reversed there.
+_FARTHEST = 8.0
 
-_REMARKS = {
-    NO_FRICTION: "without friction",
-    NO_COUPLING: "without coupling",
-    NOT_FOUND: "not found",
-    dataset.REVERSES_AT_N_C1: "reverse at n_c1 already",
-    dataset.UNDECIDED: "undecided at t_end",
-    dataset.FAILED: "failed",
-    dataset.NO_BODY: "impossible",
-}
-
-_REASON_OF = {
-    bracket.NOT_YET: NOT_FOUND,
-    bracket.HAPPENS: EXISTS,
-    bracket.AT_ONCE: dataset.REVERSES_AT_N_C1,
-    bracket.UNDECIDED: dataset.UNDECIDED,
-    bracket.FAILED: dataset.FAILED,
-}
+# Simulations that narrow a bracket from `RATIO` to `WIDTH`, as a rule.
+_EACH = 4
 
 
 @deferred()
@@ -72,19 +72,24 @@ def critical(
     *,
     fresh: bool = False,
     reporter: Reporter | None = None,
+    cluster: Cluster | None = None,
 ) -> xr.Dataset:
-    """As `sweep.api.critical`; what there is to tell goes to `reporter` alone, with progress counted in bodies."""
+    """As `sweep.api.critical`; what there is to tell goes to `reporter` alone."""
     config, reporter = _searchable(config), reporter or Reporter()
+    identity = identified(config, f"width of the brackets: {width!r}")
     files = None if output is None else RunFiles(Path(output), f"{config.name}_critical")
-    with explained(config.origin):
-        return kept(
-            files, _identify(config, width), lambda store: _search(config, width, store, reporter), _draw,
-            fresh=fresh, reporter=reporter,
-        )  # fmt: skip
+
+    def search(store: Store) -> xr.Dataset:
+        with explained(config.origin):
+            found = CriticalSpins(config, store, width)
+        carry_out(found, store, reporter, cluster)
+        return found.labelled().assign_attrs(vars(identity))
+
+    return kept(files, identity, search, _draw, fresh=fresh, reporter=reporter)
 
 
 def estimate(config: Config) -> str:
-    """Bodies, simulations and time of a search, a line each, told from a sample of the bodies.
+    """Bodies, and cells, steps, memory and time of the first round of a search, told from a sample of its cells.
 
     Raises
     ------
@@ -96,25 +101,11 @@ def estimate(config: Config) -> str:
     axes = " × ".join(f"{name} {len(values)}" for name, values in grid.axes.items())
     if grid.cases is not None:
         axes = f"case {grid.size}"
-    usual, most = (grid.size * seconds for seconds in body_seconds(config, grid.sample(_SAMPLE).columns()))
-    return "\n".join(
-        [
-            f"bodies:      {grid.size} ({axes or 'one body'}), each with spins of both signs",
-            f"simulations: about {USUAL} for each n_c2, to t = {config.integrator.t_end:g} at most",
-            f"time:        about {usual:.3g} s; at most about {most:.3g} s, if every simulation runs to t_end",
-        ]
-    )
-
-
-def remarks(result: xr.Dataset) -> list[str]:
-    """For each critical spin that some bodies lack, or that is not to be trusted, a line: how many bodies, and why."""
-    lines = []
-    for name in ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus"):
-        codes = result[f"{name}_reason"].values
-        counts = {words: int((codes == code).sum()) for code, words in _REMARKS.items()}
-        if found := ", ".join(f"{count} {words}" for words, count in counts.items() if count):
-            lines.append(f"{name}: {found}, of {codes.size}")
-    return lines
+    bodies = f"bodies: {grid.size} ({axes or 'one body'}), each with spins of both signs"
+    then = f"then:   about {_EACH} simulations for each n_c2"
+    search = CriticalSpins(config, Memory(), WIDTH)
+    search.rounds.append(search.ask())
+    return "\n".join([bodies, of_run(search.simulated()), then])
 
 
 def _searchable(config: Config) -> Config:
@@ -130,11 +121,7 @@ def _searchable(config: Config) -> Config:
         )
     parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
-    return replace(config, parameters=parameters, cases=cases or None, integrator=config.integrator.patient)
-
-
-def _identify(config: Config, width: float) -> Identity:
-    return identified(config, f"width of the brackets: {width!r}")
+    return replace(measuring(config), parameters=parameters, cases=cases or None, integrator=config.integrator.patient)
 
 
 def _draw(result: xr.Dataset) -> Figure:
@@ -143,77 +130,155 @@ def _draw(result: xr.Dataset) -> Figure:
     return plots.draw(result)
 
 
-def _search(config: Config, width: float, store: Store, reporter: Reporter) -> xr.Dataset:
-    """Search n_c2 of all bodies; rounds that `store` has are not simulated again."""
-    if store.done or store.load_running():
-        reporter.note(f"resuming an earlier search, which finished {len(store.done)} rounds of simulations")
-    grid = Grid.of(config)
-    prediction = predict(config.equations, grid)
-    assert prediction.stability is not None  # it is a model
-    # Both signs one after the other: each is a search of its own.
-    n_c1, sign = np.concatenate(prediction.stability.n_c1), np.repeat([1.0, -1.0], grid.size)
-    bodies = {name: np.tile(values, 2) for name, values in grid.columns().items()}
-    stable = np.tile(prediction.stability.ranges, 2)
-    first = _reasons_of_n_c1(config, grid, prediction)
-    second, inner, outer = first.copy(), *np.full((2, len(n_c1)), np.nan)
-    searched = np.flatnonzero(first == EXISTS)
-    settled = _Settled(reporter, grid.size, grid.size - len(searched) / 2)
-    rounds = Rounds(store, settled.advance)
-    for begin in range(0, len(searched), _GROUP):
-        at = searched[begin : begin + _GROUP]
-        theirs = {name: values[at] for name, values in bodies.items()}
-        found = find_n_c2(config, theirs, n_c1[at], stable[:, at], width, rounds, settled.share)
-        inner[at], outer[at] = sign[at] * found.inner, sign[at] * found.outer
-        second[at] = [_REASON_OF[outcome] for outcome in found.outcome.tolist()]
-        settled.finish(len(at) / 2)
-    arrays: dict[str, Array] = dict(dataset.predicted(prediction))
-    arrays.pop("reversals_predicted", None)
-    for side, half in (("plus", slice(grid.size)), ("minus", slice(grid.size, None))):
-        arrays[f"n_c2_{side}_simulated"] = (inner[half] + outer[half]) / 2
-        arrays[f"n_c2_{side}_simulated_inner"], arrays[f"n_c2_{side}_simulated_outer"] = inner[half], outer[half]
-        arrays[f"n_c1_{side}_reason"], arrays[f"n_c2_{side}_reason"] = first[half], second[half]
-    four = np.concatenate([first, second]).reshape(4, -1)
-    arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(grid.size)]
-    origin = provenance(config, rounds.seconds, grid.size) | _identify(config, width).__dict__
-    attributes = {"relative_width": width, **origin, **described_impossible(config)}
-    return dataset.label(config, grid, arrays, attributes).drop_vars("n0")
+class Answer(NamedTuple):
+    """What a simulation says of a spin."""
+
+    place: float
+    """The logarithm of |spin|."""
+    distance: float
+    """How far in spin it is from n_c2: negative where it does not reverse, NaN where that is not known."""
+    measured: bool
+    """Whether the distance belongs to the one function that vanishes smoothly at n_c2."""
+    failed: bool
 
 
-def _reasons_of_n_c1(config: Config, grid: Grid, prediction: Prediction) -> Array:
-    """Why the eigenvalues have no n_c1, or that it exists: n_c1+ of all bodies, and then n_c1-."""
+@dataclass
+class Spin:
+    """A search for n_c2 of one body, for spins of one sign, outwards from n_c1."""
+
+    body: int
+    sign: float
+    width: float
+    left: list[float]
+    """The places of the way outwards that are still to be simulated."""
+    passed: list[Answer] = field(default_factory=list)
+    """What was found on the way outwards."""
+    reverses: float = np.inf
+    """The nearest place that is known to reverse."""
+    root: Root | None = None
+    """The bracket, once the way outwards has found one."""
+    reason: int | None = None
+    """What has come out; None as long as the search goes on."""
+
+    def wanted(self) -> list[float]:
+        """The places to simulate next."""
+        return self.root.wanted() if self.root else self.left[:_OUTWARDS]
+
+    def learn(self, answers: list[Answer]) -> None:
+        """Take in what simulations say of the places that were wanted."""
+        self.reverses = min([self.reverses, *(each.place for each in answers if each.distance > 0)])
+        if self.root:
+            for each in answers:
+                self.root.learn(each.place, each.distance, smooth=each.measured)
+        else:
+            self.left = self.left[len(answers) :]
+            self.reason = self._outwards(answers)
+        if self.root and self.root.unknown:
+            self.reason = FAILED if any(each.failed for each in answers) else UNDECIDED
+        elif self.root and self.root.ended:
+            self.reason = EXISTS
+
+    def _outwards(self, answers: list[Answer]) -> int | None:
+        """Go on until one reverses: then there is a bracket, or a reason why there is none."""
+        for each in answers:
+            if each.failed:
+                return FAILED
+            self.passed.append(each)
+            if each.distance > 0:
+                return self._bracketed()
+        if self.left:
+            return None
+        return UNDECIDED if np.isnan(self.passed[-1].distance) else NOT_FOUND
+
+    def _bracketed(self) -> int | None:
+        """Make a bracket of the last two places."""
+        if len(self.passed) == 1:
+            return REVERSES_AT_N_C1
+        low, high = self.passed[-2:]
+        if np.isnan(low.distance):
+            return UNDECIDED
+        values = {each.place: each.distance for each in (low, high)}
+        smooth = {each.place: each.distance for each in self.passed if each.measured}
+        self.root = Root(low.place, high.place, -np.log1p(-self.width), values, smooth)
+        return None
+
+
+class CriticalSpins(Search):
+    """A search for n_c2 of both signs of all bodies."""
+
+    def __init__(self, config: Config, store: Store, width: float) -> None:
+        super().__init__(config, store, width)
+        self.prediction = predict(config.equations, self.grid)
+        assert self.prediction.stability is not None  # it is a model
+        self.columns = self.grid.columns()
+        self.first = _reasons_of_n_c1(config, self.columns, self.prediction)
+        limit = SPIN_LIMIT * config.equations.spin_unit(self.columns)
+        self.spins = [
+            Spin(body, (1.0, -1.0)[side], width, _way(abs(n_c1[body]), limit[body]))
+            for side, n_c1 in enumerate(self.prediction.stability.n_c1)
+            for body in np.flatnonzero(self.first[side] == EXISTS).tolist()
+        ]
+        self._asked: list[tuple[Spin, list[float]]] = []
+
+    def ask(self) -> Mapping[str, Array]:
+        spins = [spin for spin in self.spins if spin.reason is None]
+        outwards = [spin for spin in spins if not spin.root]
+        self.narrows = not outwards
+        self._asked = [(spin, spin.wanted()) for spin in outwards or spins]
+        body = np.array([spin.body for spin, places in self._asked for _ in places], int)
+        n0 = np.array([spin.sign * np.exp(place) for spin, places in self._asked for place in places])
+        varying = (*self.config.axes, *(self.config.cases or {}))
+        return {name: self.columns[name][body] for name in varying} | {"n0": n0}
+
+    def learn(self, found: Mapping[str, Array]) -> None:
+        counts, reversed_ = Counts.of(found), found["reversals"] > 0
+        final = (found["status"] == SETTLED) | reversed_
+        distance = np.where(final, counts.distance(1), np.nan)
+        # A trajectory that fails after a reversal has reversed, but has no arc that could be measured.
+        size = np.exp([place for _, places in self._asked for place in places])
+        distance = np.where(reversed_ & ~(distance > 0), size, distance)
+        failed = ~counts.known & ~reversed_
+        answers = zip(distance.tolist(), counts.borders(1).tolist(), failed.tolist(), strict=True)
+        for spin, places in self._asked:
+            spin.learn([Answer(place, *next(answers)) for place in places])
+
+    def labelled(self) -> xr.Dataset:
+        """Critical spins by formulas, eigenvalues and simulation, with what the search has cost."""
+        second, inner, outer = self.first.copy(), *np.full((2, *self.first.shape), np.nan)
+        for spin in self.spins:
+            at = (int(spin.sign < 0), spin.body)
+            second[at] = spin.reason
+            if spin.reason == EXISTS and spin.root:
+                inner[at], outer[at] = (spin.sign * np.exp(end) for end in (spin.root.low, spin.root.high))
+            elif spin.reason in (UNDECIDED, REVERSES_AT_N_C1):
+                outer[at] = spin.sign * np.exp(spin.reverses) if np.isfinite(spin.reverses) else np.nan
+        arrays: dict[str, Array] = dict(dataset.predicted(self.prediction))
+        arrays.pop("reversals_predicted", None)
+        for half, side in enumerate(("plus", "minus")):
+            arrays[f"n_c2_{side}_simulated"] = (inner[half] + outer[half]) / 2
+            arrays[f"n_c2_{side}_simulated_inner"], arrays[f"n_c2_{side}_simulated_outer"] = inner[half], outer[half]
+            arrays[f"n_c1_{side}_reason"], arrays[f"n_c2_{side}_reason"] = self.first[half], second[half]
+        four = np.concatenate([self.first, second])
+        arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(self.grid.size)]
+        cost = {"trajectories": self.simulations} | self._attributes(self.simulations, self.apart)
+        attributes = {"relative_width": self.width, **cost}
+        return dataset.label(self.config, self.grid, arrays, attributes).drop_vars("n0")
+
+
+def _way(n_c1: float, limit: float) -> list[float]:
+    """The places of the way outwards from n_c1."""
+    farthest = min(_FARTHEST * n_c1, limit)
+    steps = int(np.ceil(np.log(farthest / n_c1) / np.log(RATIO)))
+    return [float(np.log(min(n_c1 * RATIO**i, farthest))) for i in range(steps + 1)]
+
+
+def _reasons_of_n_c1(config: Config, columns: Columns, prediction: Prediction) -> Array:
+    """Why the eigenvalues have no n_c1, or that it exists: n_c1+ and n_c1- of all bodies, shape (2, bodies)."""
     assert prediction.stability is not None
-    columns, formulas, linear = grid.columns(), prediction.formulas, np.array(prediction.stability.n_c1)
+    formulas, linear = prediction.formulas, np.array(prediction.stability.n_c1)
     unresisted = np.isnan(linear) | (columns["mu"] <= 0 if formulas else False)
     never = np.isinf(linear)
     uncoupled = never & (np.isnan(formulas.n_c1[0]) if formulas else False)
     impossible = np.broadcast_to(config.equations.impossible(columns), linear.shape)
-    reasons = [dataset.NO_BODY, NO_FRICTION, NO_COUPLING, NOT_FOUND]
-    return np.select([impossible, unresisted, uncoupled, never], reasons, EXISTS).ravel()
-
-
-class _Settled:
-    """Adds up the bodies that are settled, with parts of those that are being searched, for a reporter."""
-
-    def __init__(self, reporter: Reporter, bodies: int, finished: float) -> None:
-        """Count `bodies`, of which `finished` are settled from the start."""
-        self._reporter, self._bodies, self._finished, self._began = reporter, bodies, finished, time.perf_counter()
-        self._group = self._left = self._told = 0.0
-        self._before: float | None = None
-
-    def share(self, share: Array) -> None:
-        """Such a share of each search of a group is done; each is half a body."""
-        self._group, self._left = float(share.sum()) / 2, float((1 - share).sum()) / 2
-        self.advance(0.0)
-
-    def advance(self, share: float) -> None:
-        """Such a share of a round of simulations is done."""
-        # A round may bring less than was guessed.
-        self._told = max(self._told, self._finished + self._group + _ROUND * self._left * share)
-        self._before = self._told if self._before is None else self._before
-        seconds = max(time.perf_counter() - self._began, np.finfo(float).tiny)
-        self._reporter.chunk(Progress(self._bodies, self._told, 0, self._before, seconds))
-
-    def finish(self, bodies: float) -> None:
-        """A group of so many bodies is finished."""
-        self._finished += bodies
-        self.share(np.zeros(0))
+    reasons = [NO_BODY, NO_FRICTION, NO_COUPLING, NOT_FOUND]
+    return np.select([impossible, unresisted, uncoupled, never], reasons, EXISTS)

@@ -38,7 +38,6 @@ from sweep.models.model import Columns, Model
 from sweep.models.theory.linear import fastest_motion
 from sweep.results import dataset
 from sweep.results.provenance import provenance
-from sweep.studies.rounds import advanced
 from sweep.variables import Variable
 
 SAMPLES_A_RADIAN = 3
@@ -138,7 +137,8 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     t_end, settles, began = chosen.integrator.t_end, chosen.integrator.stop_when_settled, time.perf_counter()
 
     def report() -> None:
-        covered = advanced(kernel, images).sum() * t_end
+        table = kernel.table(images)
+        covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
         reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, time.perf_counter() - began))
 
     marks, steps = _run(kernel, images, settles, report), part.step.copy()

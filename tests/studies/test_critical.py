@@ -16,14 +16,13 @@ from support.kernels import kernel
 import sweep
 from sweep.engine.executor import execute
 from sweep.grid import Array
-from sweep.kernels.kernel import Kernel
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
 from sweep.models.model import Columns, Model, stack
 from sweep.models.theory import linear
 from sweep.results.dataset import REASONS
-from sweep.studies import rounds
-from sweep.studies.critical import critical, remarks
+from sweep.results.summary import describe
+from sweep.studies.critical import critical
 
 Write = Callable[..., Path]
 STANDARD = "name: standard\nfriction: {mu: 75}\nintegrator: {t_end: 12000}\n"
@@ -85,26 +84,25 @@ def test_n_c2_lies_beyond_n_c1(parameters: dict[str, Any], write: Write) -> None
     assert spins.n_c2_minus_simulated_outer < spins.n_c2_minus_simulated_inner <= spins.n_c1_minus_linear < 0
 
 
-@pytest.mark.campaign
-def test_brackets_are_as_narrow_as_asked(write: Write) -> None:
-    spins = critical(sweep.load_config(write(STANDARD), {"mu": [60.0, 75.0]}), width=1e-5)
-    assert spins.n_c2_plus_simulated.dims == ("mu",)
+@pytest.mark.parametrize("mu", [60.0, 75.0])
+def test_brackets_are_as_narrow_as_asked_and_another_method_says_the_same(mu: float, write: Write) -> None:
+    spins = critical(sweep.load_config(write(STANDARD), {"mu": mu}), width=1e-6)
     assert "n0" not in spins.coords
-    assert (spins.critical_reason == 0).all()
-    for side in ("plus", "minus"):
-        inner, outer = spins[f"n_c2_{side}_simulated_inner"], spins[f"n_c2_{side}_simulated_outer"]
-        assert (np.abs(outer / inner - 1) < 1.01e-5).all()
-        ratio = spins[f"n_c2_{side}_simulated"] / spins[f"n_c1_{side}_linear"]
-        assert ((ratio > 1.9) & (ratio < 2.1)).all()
-
-
-def test_runs_reverse_on_one_side_of_n_c2(write: Write) -> None:
-    config = sweep.load_config(write(STANDARD), {"mu": 60.0})
-    spins = critical(config, width=0.01)
+    assert spins.critical_reason == 0
     for side in ("plus", "minus"):
         ends = [float(spins[f"n_c2_{side}_simulated_{end}"]) for end in ("inner", "outer")]
-        counts = [int(sweep.run(write(STANDARD), mu=60.0, n0=end).reversals) for end in ends]
-        assert counts[0] == 0 < counts[1]
+        assert 0 < ends[1] / ends[0] - 1 < 1.01e-6
+        assert 1.9 < spins[f"n_c2_{side}_simulated"] / spins[f"n_c1_{side}_linear"] < 2.1
+        run = sweep.run(write(STANDARD), mu=mu, n0=ends, tolerance=1e-11, method="dopri5")
+        assert run.reversals.values.tolist() == [0, 1]
+
+
+def test_n_c2_is_the_first_boundary_along_n0(write: Write) -> None:
+    """The two searches begin elsewhere, one at a multiple of n_c1 and one at the cells of a grid."""
+    spins = critical(sweep.load_config(write(STANDARD), {"mu": [60.0, 75.0]}), width=1e-5)
+    curves = sweep.boundaries(write(STANDARD), x="n0", mu=[60.0, 75.0], n0=[0.003, 0.0045, 0.006], width=1e-5)
+    first = curves.where((curves.level == 1) & (curves.bracket == "n0"), drop=True).sortby("mu")
+    np.testing.assert_allclose(first.n0, spins.n_c2_plus_simulated, rtol=2e-5)
 
 
 def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
@@ -116,7 +114,7 @@ def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
         spins = critical(sweep.load_config(write(STANDARD), settings))
         assert [reasons(spins, name) for name in NAMES] == [[reason]] * 4
         assert np.isnan([spins.n_c2_plus_simulated, spins.n_c2_minus_simulated]).all()
-        assert remarks(spins)[0] == f"n_c1_plus: 1 {reason.replace('no_', 'without ')}, of 1"
+        assert f"n_c1_plus: 1 {reason.replace('_', ' ')}" in describe(spins)
         meanings = spins.critical_reason.attrs["flag_meanings"].split()
         assert dict(zip(spins.critical_reason.attrs["flag_values"], meanings, strict=True)) == REASONS
 
@@ -151,19 +149,3 @@ def test_where_n_c2_is_undecided_its_upper_bound_is_told(write: Write) -> None:
     assert np.isnan(short.n_c2_plus_simulated)
     assert np.isnan(short.n_c2_plus_simulated_inner)
     assert short.n_c2_plus_simulated_outer > 1.1 * long.n_c2_plus_simulated_outer
-
-
-def test_a_fixed_step_is_taken_by_its_own_method_alone(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With an automatic step the way outwards is simulated with the cheapest method; the ends of brackets never are."""
-    used = set[str]()
-    execute = rounds.executor.execute
-
-    def noted(kernel: Kernel, images: np.ndarray, **options: Any) -> None:
-        used.add(type(kernel).__name__)
-        execute(kernel, images, **options)
-
-    monkeypatch.setattr("sweep.studies.rounds.executor.execute", noted)
-    for step, kernels in ((0.02, {"RungeKuttaKernel"}), ("auto", {"RungeKuttaKernel", "AdamsKernel"})):
-        used.clear()
-        critical(sweep.load_config(write(STANDARD), {"mu": 2.0, "t_end": 500.0, "step": step}), width=0.1)
-        assert used == kernels

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import xarray as xr
 from support import nursery
@@ -21,7 +20,6 @@ from support.cli import invoke
 from support.runs import Stop, same_numbers
 
 import sweep
-from sweep.engine.reporter import Progress, Reporter
 from sweep.studies.critical import critical
 
 TEXT = """\
@@ -105,66 +103,17 @@ def test_a_stopped_search_goes_on(
         if with_signal == signal.SIGINT:
             (said,) = [line for line in process.log.read_text().splitlines() if "interrupted" in line]
             kept = "finished and kept; the same command resumes the search"
-            assert re.fullmatch(rf"interrupted: (no|\d of 6) bodies {kept}", said)
+            assert re.fullmatch(rf"interrupted: (no|\d+ of \d+) cells {kept}", said)
             assert "Traceback" not in process.log.read_text()
     assert stops >= 2
-    checkpoint_left, kept = checkpoint.exists(), rounds(checkpoint)
+    checkpoint_left = checkpoint.exists()
     process = start("critical")
     process.join(120)
     said = process.log.read_text()
     assert process.exitcode == 0, said
-    resumed = f"resuming an earlier search, which finished {kept} rounds of simulations"
-    assert (resumed if checkpoint_left else "already complete, nothing to compute") in said
+    assert ("resuming an earlier run: " if checkpoint_left else "already complete, nothing to compute") in said
     same_numbers(xr.load_dataset(tmp_path / "out" / "standard_critical.nc"), undisturbed)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"standard_critical.nc", "standard_critical.png"}
-
-
-class Within(Reporter):
-    """Interrupts a search within a round, once its images are saved."""
-
-    def __init__(self, checkpoint: Path, number: int) -> None:
-        self.checkpoint, self.number = checkpoint, number
-
-    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
-        if (running := self.checkpoint / "running.npz").exists() and np.load(running)["tiles"][0] == self.number:
-            raise KeyboardInterrupt
-
-
-def test_rounds_that_are_done_are_not_simulated_again(
-    config: Path, tmp_path: Path, undisturbed: xr.Dataset, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each resumed search begins with the round that was at work, from the images saved last."""
-    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.004)
-    simulated, checkpoint = list[tuple[int, float]](), tmp_path / "standard_critical.checkpoint"
-    execute = sweep.studies.rounds.executor.execute
-
-    def noted(kernel: Any, images: Any, **options: Any) -> None:
-        simulated.append((rounds(checkpoint), float(kernel.table(images)["done"].sum())))
-        execute(kernel, images, **options)
-
-    monkeypatch.setattr("sweep.studies.rounds.executor.execute", noted)
-    for number in (0, 1):  # on the way outwards, and inside a bracket
-        with pytest.raises(KeyboardInterrupt):
-            critical(sweep.load_config(config), output=tmp_path, reporter=Within(checkpoint, number))
-        simulated.clear()
-    same_numbers(critical(sweep.load_config(config), output=tmp_path), undisturbed)
-    assert simulated[0][0] == 1
-    assert simulated[0][1] > 0
-
-
-def test_answers_that_were_damaged_are_simulated_again(
-    config: Path, tmp_path: Path, undisturbed: xr.Dataset, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("sweep.engine.executor.CHUNK_SECONDS", 0.004)
-    with pytest.raises(KeyboardInterrupt):
-        critical(
-            sweep.load_config(config), output=tmp_path, reporter=Within(tmp_path / "standard_critical.checkpoint", 1)
-        )
-    answers = tmp_path / "standard_critical.checkpoint" / "000000.npz"
-    answers.write_bytes(answers.read_bytes()[:-100])
-    again = Stop(10**9)
-    same_numbers(critical(sweep.load_config(config), output=tmp_path, reporter=again), undisturbed)
-    assert "000000.npz: damaged" in again.notes[0]
 
 
 def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_path: Path) -> None:
@@ -187,7 +136,14 @@ def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkey
     out = tmp_path / "out"
     told = invoke("critical", config, "--dry-run", "--output", out)
     assert told.exit_code == 0
-    assert [line.split(":")[0] for line in told.stdout.splitlines()] == ["bodies", "simulations", "time"]
+    assert [line.split(":")[0] for line in told.stdout.splitlines()] == [
+        "bodies",
+        "cells",
+        "steps",
+        "memory",
+        "time",
+        "then",
+    ]
     assert "6 (mu 3 × b 2)" in told.stdout
     told = invoke("trajectory", config, "--at", "mu=60", "--at", "mu=75", "--dry-run", "--output", out)
     assert told.exit_code == 0
@@ -197,14 +153,12 @@ def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkey
 
 
 def test_progress_is_told(config: Path) -> None:
-    searching, following = Stop(10**9), Stop(10**9)
-    critical(sweep.load_config(config), reporter=searching)
+    following = Stop(10**9)
     sweep.trajectory(config, mu=[60, 75], reporter=following)
-    for seen, whole in ((searching.seen, 6), (following.seen, 24_000)):
-        done = [progress.done for progress in seen]
-        assert done == sorted(done)
-        assert done[0] < 0.2 * whole < done[-1] == whole == seen[-1].cells
-        assert len(set(done)) > 5
+    done = [progress.done for progress in following.seen]
+    assert done == sorted(done)
+    assert done[0] < 0.2 * 24_000 < done[-1] == 24_000 == following.seen[-1].cells
+    assert len(set(done)) > 5
 
 
 def test_an_interrupted_trajectory_says_so(start: Callable[..., Any], tmp_path: Path) -> None:

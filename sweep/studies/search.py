@@ -1,0 +1,84 @@
+"""Simulations that a search asks for in rounds, each of which depends on what the rounds before have found.
+
+They are a table of cases that grows, so that a search is checkpointed, interrupted, and spread over a cluster as a run
+is.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sweep.config import Config
+from sweep.engine.errors import ROUND_OFF
+from sweep.engine.whole import Apart, Whole, apart_from
+from sweep.grid import Array
+from sweep.kernels.measures import possible
+from sweep.results.store import Store
+
+# What is measured of a cell, where its model allows.
+_MEASURED = ("reversals", "margin", "energy_error")
+
+# Tolerance while brackets are narrowed, relative to their final width: near a boundary a spin is that small.
+_FINER = 1e-4
+
+
+def measuring(config: Config) -> Config:
+    """`config` with what a search needs to know of a cell, and no more."""
+    measure = tuple(name for name in _MEASURED if name in possible(config.equations))
+    return replace(config, measure=measure, verify=0.0, refine=0)
+
+
+class Search(Whole):
+    """A search, and the table of the cells that it has asked for."""
+
+    def __init__(self, config: Config, store: Store, width: float) -> None:
+        """Make a search whose brackets are to be as narrow as `width`, relative to a parameter."""
+        super().__init__(config, store)
+        self.width = width
+        self.rounds: list[Mapping[str, Array]] = []
+        """The parameters that vary, of the cells of each round."""
+        self.narrows = False
+        """Whether the cells that were asked for last narrow brackets, not only find them."""
+        self.apart: list[Apart] = []
+        """What the tiles that the search has learned from hold apart from their cells."""
+
+    @abstractmethod
+    def ask(self) -> Mapping[str, Array]:
+        """The parameters of the cells to simulate next, each of shape (cells,), in the same order in every round."""
+
+    @abstractmethod
+    def learn(self, found: Mapping[str, Array]) -> None:
+        """Take in what the tiles say of the cells that were asked for last: `status`, `reversals`, margins ..."""
+
+    @property
+    def simulations(self) -> int:
+        """The number of the cells so far."""
+        return self.tiles[-1][0].stop if self.tiles else 0
+
+    def simulated(self) -> Config:
+        """The configuration whose cases are all cells so far."""
+        cases = {n: tuple(np.concatenate([each[n] for each in self.rounds]).tolist()) for n in self.rounds[0]}
+        constants = {name: values for name, values in self.config.parameters.items() if name not in cases}
+        integrator = self.config.integrator
+        if self.narrows:
+            finer = max(_FINER * self.width, ROUND_OFF)
+            integrator = integrator.model_copy(update={"tolerance": min(integrator.tolerance, finer)})
+        return replace(self.config, parameters=constants, cases=cases, integrator=integrator)
+
+    def grow(self, tile_size: Callable[[int], int]) -> bool:
+        """Add the cells to simulate next, judging by all results so far; False if the search has ended."""
+        if self.tiles:
+            new = [self.store.load(i) for i in range(len(self.apart), len(self.tiles))]
+            self.apart += map(apart_from, new)
+            self.learn(
+                {name: np.concatenate([tile[name] for tile in new]) for name in new[0].keys() - {*self.apart[0]}}
+            )
+        asked = self.ask()
+        cells = len(next(iter(asked.values())))
+        if cells:
+            self.rounds.append(asked)
+        return self._cut(cells, tile_size)
