@@ -19,9 +19,9 @@ import numpy as np
 import xarray as xr
 
 import sweep
+from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED
-from sweep.plots.axis import Axis
 from sweep.plots.boundaries import curves
 from sweep.plots.levels import lines
 from sweep.results.margins import FOUND

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, Spinner
 
+from sweep.axis import Axis
 from sweep.explore.colours import CURVES
 from sweep.explore.controls import BARE, on
 from sweep.explore.runner import Curve
@@ -17,7 +18,6 @@ from sweep.explore.slices import Source
 from sweep.explore.state import MAX_CELLS, Cell
 from sweep.parameters import Parameter
 from sweep.plots import labels
-from sweep.plots.axis import Axis
 
 
 class CellControls:

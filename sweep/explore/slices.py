@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, marks, quantities, theory
-from sweep.plots.axis import Axis
 from sweep.plots.description import Map, along, describe, needed, table
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError

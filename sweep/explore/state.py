@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 from urllib.parse import urlencode
 
+from sweep.axis import Axis
 from sweep.config.faults import brief
 from sweep.explore.slices import Source
 from sweep.parameters import PARAMETERS, Parameter
-from sweep.plots.axis import Axis
 from sweep.plots.quantities import subject
 
 MAX_CELLS = 6

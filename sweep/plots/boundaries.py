@@ -9,9 +9,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, lines, scales
-from sweep.plots.axis import Axis
 from sweep.plots.figure import RATIO, Picture, arrangement, set_scale
 from sweep.plots.panels import MAX_PANELS, heading
 from sweep.results.margins import OPEN, smoothed

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, levels, scales, theory
-from sweep.plots.axis import Axis
 from sweep.plots.marks import BLANK, legend, marks
 from sweep.plots.quantities import DERIVED, field
 from sweep.plots.scales import Limits, Scale

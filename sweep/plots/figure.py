@@ -13,9 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels
-from sweep.plots.axis import Axis
 from sweep.plots.panels import Panel, heading, title
 
 PAGE = 14.0

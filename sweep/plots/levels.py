@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import xarray as xr
 
-from sweep.plots.axis import Axis
+from sweep.axis import Axis, contours
 from sweep.plots.theory import Line
-from sweep.results.margins import Counts, contours
+from sweep.results.margins import Counts
 
 NEEDED = ["reversals", "margin_more", "margin_fewer", "status"]
 """The variables of a dataset from which boundaries are drawn."""
@@ -20,14 +20,9 @@ def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
 
     There are none if the dataset has no margins.
     """
-    if not set(NEEDED) <= set(dataset.data_vars) or min(len(x.values), len(y.values)) < 2:
+    if not set(NEEDED) <= set(dataset.data_vars):
         return []
     counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in NEEDED})
-    found = []
-    for level in counts.levels():
-        curves = contours(counts.distance(level), x.straight(x.values), y.straight(y.values))
-        if parts := [(x.bent(xs), y.bent(ys)) for xs, ys in curves]:
-            found.append(
-                Line("boundary", "from here on so many reversals, by the margins of the cells", parts, f"{level}")
-            )
-    return found
+    words = "from here on so many reversals, by the margins of the cells"
+    curves = {level: list(contours(counts.distance(level), x, y)) for level in counts.levels()}
+    return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]

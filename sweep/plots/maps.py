@@ -14,8 +14,8 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from sweep.axis import Axis
 from sweep.plots import hatches, labels, lines
-from sweep.plots.axis import Axis
 from sweep.plots.description import Map, common_scale, describe
 from sweep.plots.figure import PAGE, RATIO, Picture, arrangement, set_scale
 from sweep.plots.marks import legend, of_all

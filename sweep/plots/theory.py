@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from contourpy import contour_generator
 
+from sweep.axis import Axis, contours
 from sweep.grid import Array
 from sweep.models.ladder.analytic import best_b
-from sweep.plots.axis import Axis
 
 REVERSALS = ("reversals", "reversals_predicted", "difference", "raw_reversals", "reversals_low", "reversals_high")
 """The variables that theory explains."""
@@ -132,9 +131,6 @@ def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
 
 def _contours(values: xr.DataArray, n0: float, x: Axis, y: Axis) -> list[Points]:
     """Where a critical spin equals the start spin of the map."""
-    if min(len(x.values), len(y.values)) < 2:
-        return []
     template = xr.DataArray(np.zeros((len(y.values), len(x.values))), dims=(y.name, x.name))
     field = values.drop_vars(values.coords).broadcast_like(template).transpose(y.name, x.name).values
-    found = contour_generator(x.straight(x.values), y.straight(y.values), np.ma.masked_invalid(field)).lines(n0)
-    return [(x.bent(part[:, 0]), y.bent(part[:, 1])) for part in map(np.asarray, found)]
+    return list(contours(field, x, y, n0))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from contourpy import contour_generator
 
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -72,13 +71,6 @@ class Counts:
         """The counts that begin somewhere between the cells."""
         found = self.reversals[self.known]
         return range(int(found.min()) + 1, int(found.max()) + 1) if found.size else range(0)
-
-
-def contours(distance: Array, x: Array, y: Array) -> Iterator[tuple[Array, Array]]:
-    """Where `distance`, of shape (y, x), is zero: the x and y of each curve, in order."""
-    for part in contour_generator(x, y, np.ma.masked_invalid(distance), corner_mask=False).lines(0.0):
-        points = np.asarray(part)
-        yield points[:, 0], points[:, 1]
 
 
 def smoothed(x: Array, y: Array, *, closed: bool, parts: int = 8) -> tuple[Array, Array]:

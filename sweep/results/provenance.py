@@ -24,17 +24,17 @@ from sweep.results.kind import OWN_BODY
 
 _PACKAGE = Path(__file__).parent.parent
 
-_RUN, _PICTURES = "sweep.engine.run", "sweep.plots"
-"""The module that makes datasets, and the room that only draws what it has made."""
+RUN, _PICTURES = "sweep.engine.run", "sweep.plots"
+"""The module that makes the datasets of runs, and the room that only draws what was made."""
 
 # To look for imports in the text of all files takes 15 ms; their syntax trees would take 0.2 s.
 _IMPORT = re.compile(r"^ *(?:from (sweep\.[\w.]+) import (\([^)]*\)|.*)|import (sweep\.[\w.]+))", re.MULTILINE)
 
 
-def decisive_sources() -> list[Path]:
-    """The files of the package on which the numbers of a dataset depend: those that a run imports, in any function."""
+def decisive_sources(maker: str = RUN) -> list[Path]:
+    """The files on which the numbers of a dataset depend: those that the module `maker` imports, in any function."""
     files = {module_of(path): path for path in _PACKAGE.rglob("*.py")}
-    found, waiting = set[Path](), [_RUN]
+    found, waiting = set[Path](), [maker]
     while waiting:
         module = waiting.pop()
         path = files.pop(module, None)
@@ -52,16 +52,16 @@ def module_of(path: Path) -> str:
     return ".".join(("sweep", *path.relative_to(_PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
 
 
-def identify(config: Config) -> Identity:
-    """The identity of a run of `config` by this program."""
-    return Identity(config.to_yaml(), config.fingerprint(), *sources())
+def identify(config: Config, maker: str = RUN) -> Identity:
+    """The identity of what this program, by its module `maker`, makes of `config`."""
+    return Identity(config.to_yaml(), config.fingerprint(), *sources(maker))
 
 
 @cache
-def sources() -> tuple[str, str]:
+def sources(maker: str = RUN) -> tuple[str, str]:
     """Hash of the decisive source files, and the versions of what compiles and runs them."""
     digest = hashlib.sha256()
-    for path in decisive_sources():
+    for path in decisive_sources(maker):
         digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     found = [f"{name} {_version(name)}" for name in ("numba", "llvmlite", "numpy")]
     versions = [f"sweep {_version('rattleback-sweep')}", f"Python {platform.python_version()}", *found]

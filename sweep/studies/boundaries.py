@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from sweep.axis import Axis, contours
 from sweep.config import Config, ConfigError
 from sweep.config.faults import Fault
 from sweep.engine.cluster import Cluster
@@ -23,10 +24,9 @@ from sweep.engine.run import carry_out
 from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.models.model import COUNT
-from sweep.plots.axis import Axis
 from sweep.results.dataset import described
 from sweep.results.folder import RunFiles
-from sweep.results.margins import FOUND, OPEN, POINTS, UNCERTAIN, Counts, contours
+from sweep.results.margins import FOUND, OPEN, POINTS, UNCERTAIN, Counts
 from sweep.results.store import Store
 from sweep.studies.kept import identified, kept
 from sweep.studies.roots import Root
@@ -58,7 +58,9 @@ def boundaries(
     """As `sweep.api.boundaries`; what there is to tell goes to `reporter` alone."""
     across, reporter = _across(config, x, y), reporter or Reporter()
     config = measuring(config)
-    identity = identified(config, f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}")
+    identity = identified(
+        config, __name__, f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}"
+    )
     files = None if output is None else RunFiles(Path(output), f"{config.name}_boundaries")
 
     def search(store: Store) -> xr.Dataset:
@@ -211,10 +213,11 @@ class Boundaries(Search):
             cell = {name: self.config.axes[name][i] for name, i in zip(others, at, strict=True)}
             *here, sure = (_sorted(each[at], self.config.axes[y], self.config.axes[x]) for each in tables)
             counts = Counts(*here)
+            rows, columns = (Axis(name, np.arange(length)) for name, length in zip((y, x), sure.shape, strict=True))
             for level in counts.levels():
                 distance = counts.distance(level)
                 known = distance, counts.reversals, sure, counts.borders(level)
-                for xs, ys in contours(_levelled(distance), *map(np.arange, distance.shape[::-1])):
+                for xs, ys in contours(_levelled(distance), columns, rows):
                     places = list(zip(xs.tolist(), ys.tolist(), strict=True))
                     closed = places[0] == places[-1]
                     for place in places[: -1 if closed else None]:

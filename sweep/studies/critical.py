@@ -76,7 +76,7 @@ def critical(
 ) -> xr.Dataset:
     """As `sweep.api.critical`; what there is to tell goes to `reporter` alone."""
     config, reporter = _searchable(config), reporter or Reporter()
-    identity = identified(config, f"width of the brackets: {width!r}")
+    identity = identified(config, __name__, f"width of the brackets: {width!r}")
     files = None if output is None else RunFiles(Path(output), f"{config.name}_critical")
 
     def search(store: Store) -> xr.Dataset:

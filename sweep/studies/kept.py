@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import xarray as xr
 
 from sweep.config import Config
 from sweep.engine.reporter import Reporter
-from sweep.jit import fingerprint
-from sweep.results import margins, netcdf
+from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity
@@ -24,16 +22,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def identified(config: Config, settings: str) -> Identity:
-    """Identify a search: what a run does, the search's own settings in words, and the sources of the searches."""
-    sources = [*sorted(Path(__file__).parent.glob("*.py")), Path(margins.__file__)]
-    run, search = identify(config), fingerprint(*map(str, sources))
-    return replace(
-        run,
-        config=f"{run.config}# {settings}\n",
-        config_hash=f"{run.config_hash}-{settings}",
-        source_hash=f"{run.source_hash}-{search}",
-    )
+def identified(config: Config, maker: str, settings: str) -> Identity:
+    """Identify a search by the module `maker`: as a run, and by its own settings in words."""
+    run = identify(config, maker)
+    return replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
 
 
 def kept(

@@ -245,7 +245,7 @@ def test_another_version_is_refused(
 
 @pytest.mark.usefixtures("forgets")
 def test_other_sources_are_refused(config: Path, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.results.provenance.decisive_sources", list)
+    monkeypatch.setattr("sweep.results.provenance.decisive_sources", lambda _maker: [])
     refuses(invoke("run", config, "--output", out), "other sources of the model or kernel")
 
 

@@ -25,14 +25,15 @@ def edit(path: Path, text: str = "# edited\n") -> None:
         source.write(text)
 
 
-def test_what_a_run_imports_decides() -> None:
+@pytest.mark.parametrize("maker", ["sweep.engine.run", "sweep.studies.boundaries", "sweep.studies.critical"])
+def test_what_the_maker_of_a_dataset_imports_decides(maker: str) -> None:
     """Found by another reader of imports."""
     graph = grimp.build_graph("sweep", cache_dir=None)
     for module in [name for name in graph.modules if name.startswith("sweep.plots")]:
         graph.remove_module(module)
-    imported = {"sweep.engine.run", *graph.find_upstream_modules("sweep.engine.run")}
+    imported = {maker, *graph.find_upstream_modules(maker)}
     packages = {name.rpartition(".")[0] for name in imported} - {"sweep"}
-    assert set(map(provenance.module_of, provenance.decisive_sources())) == imported | packages
+    assert set(map(provenance.module_of, provenance.decisive_sources(maker))) == imported | packages
 
 
 def test_an_edit_changes_the_hash_where_a_run_imports_it(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:

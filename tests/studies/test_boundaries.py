@@ -14,9 +14,9 @@ from support.cli import invoke, refused
 from support.runs import Stop, same_numbers
 
 import sweep
+from sweep.axis import Axis
 from sweep.plots import levels as drawn
 from sweep.plots import picture
-from sweep.plots.axis import Axis
 from sweep.results.margins import FOUND, OPEN, Counts, smoothed
 from sweep.studies.roots import Root
 

@@ -1,19 +1,21 @@
-"""An axis of a map: its values, how they follow one another, and where the cells around them end."""
+"""The axes of a map, and curves over two of them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from contourpy import contour_generator
 
 from sweep.grid import Array
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis, with its values in increasing order."""
+    """Its values in increasing order, how they follow one another, and where the cells around them end."""
 
     name: str
     values: Array
@@ -46,3 +48,15 @@ class Axis:
 
     def nearest(self, value: float) -> int:
         return int(np.abs(self.values - value).argmin())
+
+
+def contours(values: Array, x: Axis, y: Axis, level: float = 0.0) -> Iterator[tuple[Array, Array]]:
+    """Where `values`, of shape (y, x), pass through `level`: the x and y of each curve, in order, on lines of the grid.
+
+    There is no curve beside values that are NaN.
+    """
+    if min(values.shape) < 2:
+        return
+    grid = x.straight(x.values), y.straight(y.values), np.ma.masked_invalid(values)
+    for part in map(np.asarray, contour_generator(*grid, corner_mask=False).lines(level)):
+        yield x.bent(part[:, 0]), y.bent(part[:, 1])
