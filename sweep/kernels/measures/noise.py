@@ -32,12 +32,8 @@ DEPTH = 1e-14
 # the energy of the spin.
 SEEN = 1e-4
 
-# Spins at which the growth rates are fitted, in units of the fastest spin within reach.
-_NODES = np.array([0.0, -1.0, 1.0, -0.5, 0.5])
-_FIT = np.linalg.inv(_NODES[:, None] ** np.arange(len(_NODES)))
-
 _LOGS, _DEPTHS = ("log_amplitude0", "log_amplitude1"), ("depth0", "depth1")
-_RATES = tuple(f"rate{k}_{i}" for k in (0, 1) for i in range(len(_NODES)))
+_RATES = tuple(f"rate{k}_{i}" for k in (0, 1) for i in range(len(linear.NODES)))
 
 _BODY = ("a", "b", "c", "delta", *friction.PARAMETERS)
 _ZERO = 1e-300
@@ -71,7 +67,7 @@ class NoiseLimited(Measurement):
         """Follows the modes from one look to the next, as `Measurement.make_look`."""
         LOG0, LOG1, DEPTH0, DEPTH1 = map(layout.at, (*_LOGS, *_DEPTHS))
         TRACKED, SPIN, COUNTED, FLAG = map(layout.at, self.quantities[-4:])
-        RATE0, RATE1, terms = layout.at("rate0_0"), layout.at("rate1_0"), len(_NODES)
+        RATE0, RATE1, terms = layout.at("rate0_0"), layout.at("rate1_0"), len(linear.NODES)
         DONE, STEP, PERIOD, CLOSED, COUNT = map(layout.at, ("done", "step", "period", "closed_window", "reversals"))
         deep = float(np.log(DEPTH))
 
@@ -128,16 +124,14 @@ def growth_coefficients(columns: Columns) -> Array:
     """Coefficients c_i of Re λ(n) = Σ c_i n^i for the slower and the faster mode, shape (2, nodes, cells).
 
     The polynomial is fitted at five spins, in units of the fastest spin within reach; this is rounded up, so that
-    most starts of a body share a fit.  Five spins take 0.3 s for 4000 bodies.  With three the rates were off by half
-    at b = 6, where the modes nearly meet.
+    most starts of a body share a fit.  Five spins take 0.3 s for 4000 bodies.
     """
     reach = np.exp2(np.ceil(8 * np.log2(np.maximum(linear.fastest_spin(slip.MODEL, columns), 1e-6))) / 8)
     bodies, which = np.unique(stack((*(columns[name] for name in _BODY), reach)), axis=1, return_inverse=True)
     constants = slip.Constants.of(dict(zip(_BODY, bodies, strict=False)))
-    rates = np.stack([linear.rocking_rates(slip.MODEL, constants, node * bodies[-1]) for node in _NODES], axis=1)
-    # Not a matrix product: how BLAS rounds a column depends on how many other columns there are.
-    fit = [sum(w * rates[:, j] for j, w in enumerate(row)) / bodies[-1] ** i for i, row in enumerate(_FIT)]
-    return np.stack(fit, axis=1)[:, :, which.reshape(-1)]
+    fit = linear.through_nodes([linear.rocking_rates(slip.MODEL, constants, n * bodies[-1]) for n in linear.NODES])
+    powers = bodies[-1] ** np.arange(len(fit))[:, None, None]
+    return np.asarray((fit / powers).swapaxes(0, 1)[:, :, which.reshape(-1)])
 
 
 def _shares(columns: Columns) -> Array:

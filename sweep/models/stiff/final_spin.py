@@ -17,10 +17,9 @@ import numpy as np
 from sweep.models.model import Array, take
 from sweep.models.stiff.modes import Rattle, slow_rates
 from sweep.models.stiff.slip import Constants
+from sweep.models.theory.linear import NODES, through_nodes
 
-# Spins at which the rates are computed, in units of the fastest spin within reach, and what fits a polynomial to them.
-_NODES = np.array([0.0, -1.0, 1.0, -0.5, 0.5])
-_FIT = np.linalg.inv(_NODES[:, None] ** np.arange(len(_NODES)))
+# The fastest spin within reach, in units of the spin whose energy is there.
 _REACH = 1.02
 
 # Ratio of the difference of the two frequencies to the rates, below which the modes do not act each for itself: of
@@ -75,41 +74,42 @@ def ending(states: Array, constants: Constants) -> Ending:
 def _fits(constants: Constants, reach: Array) -> tuple[Array, Array, Array]:
     """Coefficients of r_k and s_k, powers of n / `reach` first, and whether the modes are apart, shape (cells,)."""
     apart, nodes = np.ones(len(reach), bool), []
-    for node in _NODES:
+    for node in NODES:
         rates, slopes, sound = slow_rates(constants, node * reach)
         gap = np.abs(np.diff(rates.imag, axis=1))[:, 0]
         apart &= sound & (gap > _APART * np.abs(rates.real).max(axis=1))
         nodes.append((rates.real, slopes))
-    # Not a matrix product: how BLAS rounds a cell depends on how many other cells there are.
-    fits = [np.stack([sum(w * each for w, each in zip(row, of, strict=True)) for row in _FIT])
-            for of in zip(*nodes, strict=True)]  # fmt: skip
-    return fits[0], fits[1], apart
+    fitted_rates, fitted_slopes = map(through_nodes, zip(*nodes, strict=True))
+    return fitted_rates, fitted_slopes, apart
 
 
 def _follow(spin: Array, e: Array, rates: Array, slopes: Array, reach: Array) -> Ending:
     """Follow the slow equations to their end; spins in units of `reach`, and e in its square."""
     slopes = slopes * reach[:, None]  # r' = s n' with n in units of reach
-    log_e, over = np.log(np.maximum(e, 1e-300)), np.zeros(len(spin), bool)
-    found = Ending(spin.copy(), np.zeros_like(spin), np.abs(spin), np.abs(spin))
+    log_e = np.log(np.maximum(e, 1e-300))
+    result, found = Ending(*np.full((4, len(spin)), np.nan)), Ending(spin, np.zeros_like(spin), *np.abs([spin, spin]))
+    left = np.arange(len(spin))
     for _ in range(_MOST_STEPS):
         r, s = _at(rates, spin), _at(slopes, spin)
         turns = np.abs(s) * np.exp(log_e)
         with np.errstate(divide="ignore", invalid="ignore"):
-            left = np.where(turns > 0, turns / np.abs(2 * r), 0.0).sum(axis=1)
-        over |= (r < 0).all(axis=1) & (left < _OVER * np.abs(spin))
-        if over.all():
+            rest = np.where(turns > 0, s * np.exp(log_e) / (2 * r), 0.0)
+        over = (r < 0).all(axis=1) & (np.abs(rest).sum(axis=1) < _OVER * np.abs(spin))
+        if over.any():
+            ended = Ending(*(each[over] for each in found._replace(spin=(spin + rest.sum(axis=1)))))
+            _account(ended, spin[over], ended.spin)
+            for whole, part in zip(result, ended, strict=True):
+                whole[left[over]] = part
+            left, spin, log_e, r, s, turns = (each[~over] for each in (left, spin, log_e, r, s, turns))
+            rates, slopes, found = rates[:, ~over], slopes[:, ~over], Ending(*(each[~over] for each in found))
+        if not len(left):
             break
-        step = np.where(over, 0.0, _step(r, s, turns, log_e))
+        step = _step(r, s, turns, log_e)
         middle, _ = _move(spin, log_e, r, s, step / 2)
         moved, log_e = _move(spin, log_e, _at(rates, middle), _at(slopes, middle), step)
         _account(found, spin, moved)
         spin = moved
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rest = spin + np.where(over, (s * np.exp(log_e) / (2 * r)).sum(axis=1), np.nan)
-    _account(found, spin, rest)
-    known = np.where(over, 1.0, np.nan)
-    overshoot, nearest = found.overshoot * reach * known, found.nearest_approach * reach * known
-    return Ending(rest * reach, found.reversals * known, overshoot, nearest)
+    return Ending(result.spin * reach, result.reversals, result.overshoot * reach, result.nearest_approach * reach)
 
 
 def _step(r: Array, s: Array, turns: Array, log_e: Array) -> Array:
