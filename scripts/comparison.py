@@ -37,10 +37,13 @@ def words(error: Array, told: Array, allowed: Any, sharp: Array) -> str:
     silent = sharp & ~says
     seen = sharp & (error > np.maximum(LEAST, 1e-3 * allowed)) & np.isfinite(told)
     ratio = told[seen] / error[seen]
-    spread = " ".join(f"{value:.2g}" for value in np.percentile(ratio, [5, 50, 95])) if seen.any() else "unknown"
+    spread = "unknown, as all errors are too small"
+    if seen.any():
+        spread = " ".join(f"{value:.2g}" for value in np.percentile(ratio, [5, 50, 95]))
+        spread += f", {np.mean(ratio < 0.1):.2%} ten times too small"
     kept = ", ".join(f"{np.mean(error[silent] <= k * allowed[silent]):.2%} within {k}" for k in (1, 3))
     return (
         f"{sharp.sum()} cells; of {silent.sum()} silent ones {kept}; "
         f"{says.sum()} say that they miss, {(error[says] > allowed[says]).sum()} rightly; "
-        f"estimate / error: {spread}, {np.mean(ratio < 0.1):.2%} ten times too small"
+        f"estimate / error: {spread}"
     )

@@ -43,10 +43,13 @@ LAWS: dict[str, dict[str, Any]] = {
     "viscous, rolling": {"mu": 30.0, "mu_rolling": 0.01, "radius": 0.01, "speed_rolling": 0.5},
     "viscous, spinning": {"mu": 30.0, "mu_spinning": 0.2, "radius_spinning": 1e-3, "speed_spinning": 0.5},
 }
+TAPPED = {"tapped, viscous": LAWS["viscous"], "tapped, coulomb": LAWS["coulomb tanh"]}
+"""Laws with starts by a hard tap: |ω1| up to 12 rad/s and |ω2| up to 8."""
+
 BODIES = 40
 
 
-def bodies(seed: int) -> Iterator[dict[str, Any]]:
+def bodies(seed: int, *, tapped: bool) -> Iterator[dict[str, Any]]:
     """Solid bodies of 5 to 20 cm, turned against their surface, with the spins and tilts of an experiment."""
     random = np.random.default_rng(seed)
     for _ in range(BODIES):
@@ -59,14 +62,15 @@ def bodies(seed: int) -> Iterator[dict[str, Any]]:
             "Iyy": first * sin**2 + second * cos**2, "Ixy": (first - second) * sin * cos,
             "omega3": random.uniform(1, 8) * random.choice([-1, 1]), "roll": random.uniform(0.001, 0.03),
             "pitch": random.uniform(0.001, 0.03),
+            **({"omega1": random.uniform(-12, 12), "omega2": random.uniform(-8, 8)} if tapped else {}),
         }  # fmt: skip
 
 
-def with_law(friction: dict[str, Any], seed: int = 7) -> xr.Dataset:
+def with_law(name: str, seed: int = 7) -> xr.Dataset:
     """The datasets of all bodies, one after another."""
-    runs = []
-    for each in bodies(seed):
-        start = {name: each[name] for name in ("omega3", "roll", "pitch")}
+    runs, friction = [], {**LAWS, **TAPPED}[name]
+    for each in bodies(seed, tapped=name in TAPPED):
+        start = {name: value for name, value in each.items() if name in ("omega1", "omega2", "omega3", "roll", "pitch")}
         body = {name: value for name, value in each.items() if name not in start}
         config = {"units": "SI", "body": body, "friction": friction, "start": start, "integrator": {"t_end": 20}}
         runs.append(compared(sweep.load_config(config)))
@@ -108,8 +112,8 @@ def report(label: str, found: xr.Dataset, tolerance: float) -> str:
 
 if __name__ == "__main__":
     if sys.argv[1] == "bodies":
-        for law in sys.argv[2:] or LAWS:
-            print(report(law, with_law(LAWS[law]), TOLERANCE), flush=True)
+        for law in sys.argv[2:] or [*LAWS, *TAPPED]:
+            print(report(law, with_law(law), TOLERANCE), flush=True)
     else:
         chosen = sweep.load_config(sys.argv[1])
         cells = compared(chosen, int(sys.argv[2]))

@@ -2,7 +2,7 @@
 
     python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
-A PIECE is `kernel`, or what else runs need: `images`, `approach` or `theory`.  A MODEL that a user brings is
+A PIECE is `kernel`, or what else runs need: `images`, `approach` or `endings`.  A MODEL that a user brings is
 "name@digest", and the record of its origin comes as a line of standard input.
 
 Processes, because the code that Numba executes right after compiling is not the code that it caches: functions that a
@@ -29,11 +29,10 @@ from sweep.jit import compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compile_approach, compiled_approach
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
-from sweep.kernels.quartic import has_fast_slip
-from sweep.kernels.stability import compile_search, compiled_search
 from sweep.models import find
-from sweep.models.model import Columns, Model
+from sweep.models.model import MODES, Columns, Model
 from sweep.models.origin import Origin
+from sweep.models.stiff.final_spin import compile_following, compiled_following
 from sweep.models.user import loading
 from sweep.models.user.blame import blamed
 from sweep.parameters import PAPER_PARAMETERS
@@ -41,7 +40,7 @@ from sweep.parameters import PAPER_PARAMETERS
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and where the model comes from."""
 
-_SECONDS = {"images": 4.0, "approach": 4.0, "theory": 4.0}
+_SECONDS = {"images": 4.0, "approach": 4.0, "endings": 3.0}
 """Time to compile a piece that is no kernel (`scripts/run_costs.py`)."""
 
 _POLL = 0.05
@@ -98,8 +97,8 @@ def _missing(kernel: Kernel) -> Iterator[tuple[str, ...]]:
         yield "images", kernel.method, model
     if compiled_approach(kernel.model).is_missing():
         yield "approach", PLAIN, model
-    if has_fast_slip(kernel.model) and compiled_search(kernel.model).is_missing():
-        yield "theory", PLAIN, model
+    if MODES in kernel.model.offers and compiled_following().is_missing():
+        yield "endings", PLAIN, model
 
 
 def _compile(jobs: list[Job]) -> None:
@@ -141,8 +140,8 @@ def main(piece: str, method: str, name: str, *measure: str) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if piece == "approach":
         compile_approach(model)
-    elif piece == "theory":
-        compile_search(model)
+    elif piece == "endings":
+        compile_following()
     else:
         kernel = make_kernel(method, model, measure)
         kernel.compile() if piece == "kernel" else kernel.images(_any_body(model), np.full(1, 0.1), 10.0)

@@ -47,7 +47,7 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
         ("kernel", "adams", "slip", "reversals"),
         ("images", "adams", "slip"),
         ("approach", "dopri5", "slip"),
-        ("theory", "dopri5", "slip"),
+        ("endings", "dopri5", "slip"),
         ("kernel", "dopri5", "slip", "reversals"),
     ]
 

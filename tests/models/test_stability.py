@@ -96,7 +96,8 @@ def test_without_friction_no_spin_is_stable() -> None:
     assert np.isnan(stability.stable_ranges(MODELS["noslip"], columns())).all()
 
 
-def test_stability_is_the_same_on_any_number_of_threads() -> None:
+def test_each_body_by_itself() -> None:
+    """The bits of a body depend neither on threads nor on the bodies beside it."""
     bodies = columns(mu=np.linspace(20, 200, 1201), b=np.linspace(1.2, 9.8, 1201), n0=0.3)
     found = []
     for number in (1, 2):
@@ -104,6 +105,7 @@ def test_stability_is_the_same_on_any_number_of_threads() -> None:
             stability_ = predict(slip.MODEL, Grid({}, {}, bodies)).stability
         assert stability_
         found.append(stability_.ranges)
-    np.testing.assert_array_equal(found[0], found[-1])
-    np.testing.assert_array_equal(found[0], stability.stable_ranges(slip.MODEL, bodies))
+    np.testing.assert_array_equal(found[0], found[1])
+    some = {name: values[::7] for name, values in bodies.items()}
+    np.testing.assert_array_equal(found[0][:, ::7], stability.stable_ranges(slip.MODEL, some))
     assert np.isfinite(found[0][2:]).any()

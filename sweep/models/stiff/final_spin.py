@@ -10,10 +10,12 @@ neglects is of the order of `bending` times n² + Σ e_k, and grows where the tw
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from sweep.jit import Cached, called, serial
 from sweep.models.model import Array, take
 from sweep.models.stiff.modes import Rattle, slow_rates
 from sweep.models.stiff.slip import Constants
@@ -29,6 +31,9 @@ _APART = 5.0
 # A step lasts half of what a mode takes to change by e, and turns the spin by no more than this share of what it can.
 # A mode that turns the spin by less than a share `_FAINT` of what the other does sets no step.
 _RATE, _TURN, _FAINT = 0.5, 0.02, 1e-4
+
+# Divides where there may be a zero.
+_TINY = 1e-300
 
 # It is over when both modes decay, and can change the spin by no more than this share.  That takes 100 to 1000 steps.
 _OVER, _MOST_STEPS = 1e-3, 5000
@@ -65,82 +70,94 @@ def ending(states: Array, constants: Constants) -> Ending:
     rates, slopes, apart = _fits(take(constants, known), reach[known])
     known = known[apart]
     unit = reach[known]
-    found = _follow(spin[known] / unit, e[known] / unit[:, None] ** 2, rates[:, apart], slopes[:, apart], unit)
-    for whole, part in zip(result, found, strict=True):
-        whole[known] = part
+    n, log_e = spin[known] / unit, np.log(np.maximum(e[known] / unit[:, None] ** 2, _TINY))
+    found = np.empty((len(known), 4))
+    compiled_following()(n, log_e, rates[apart], slopes[apart] * unit[:, None, None], found)
+    for whole, part, scale in zip(result, found.T, (unit, 1.0, unit, unit), strict=True):
+        whole[known] = part * scale
     return result
 
 
 def _fits(constants: Constants, reach: Array) -> tuple[Array, Array, Array]:
-    """Coefficients of r_k and s_k, powers of n / `reach` first, and whether the modes are apart, shape (cells,)."""
+    """Coefficients of r_k and s_k, shape (cells, powers of n / `reach`, 2), and whether the modes are apart."""
     apart, nodes = np.ones(len(reach), bool), []
     for node in NODES:
         rates, slopes, sound = slow_rates(constants, node * reach)
         gap = np.abs(np.diff(rates.imag, axis=1))[:, 0]
         apart &= sound & (gap > _APART * np.abs(rates.real).max(axis=1))
         nodes.append((rates.real, slopes))
-    fitted_rates, fitted_slopes = map(through_nodes, zip(*nodes, strict=True))
-    return fitted_rates, fitted_slopes, apart
+    fits = [np.ascontiguousarray(through_nodes(values).swapaxes(0, 1)) for values in zip(*nodes, strict=True)]
+    return fits[0], fits[1], apart
 
 
-def _follow(spin: Array, e: Array, rates: Array, slopes: Array, reach: Array) -> Ending:
-    """Follow the slow equations to their end; spins in units of `reach`, and e in its square."""
-    slopes = slopes * reach[:, None]  # r' = s n' with n in units of reach
-    log_e = np.log(np.maximum(e, 1e-300))
-    result, found = Ending(*np.full((4, len(spin)), np.nan)), Ending(spin, np.zeros_like(spin), *np.abs([spin, spin]))
-    left = np.arange(len(spin))
-    for _ in range(_MOST_STEPS):
-        r, s = _at(rates, spin), _at(slopes, spin)
-        turns = np.abs(s) * np.exp(log_e)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rest = np.where(turns > 0, s * np.exp(log_e) / (2 * r), 0.0)
-        over = (r < 0).all(axis=1) & (np.abs(rest).sum(axis=1) < _OVER * np.abs(spin))
-        if over.any():
-            ended = Ending(*(each[over] for each in found._replace(spin=(spin + rest.sum(axis=1)))))
-            _account(ended, spin[over], ended.spin)
-            for whole, part in zip(result, ended, strict=True):
-                whole[left[over]] = part
-            left, spin, log_e, r, s, turns = (each[~over] for each in (left, spin, log_e, r, s, turns))
-            rates, slopes, found = rates[:, ~over], slopes[:, ~over], Ending(*(each[~over] for each in found))
-        if not len(left):
-            break
-        step = _step(r, s, turns, log_e)
-        middle, _ = _move(spin, log_e, r, s, step / 2)
-        moved, log_e = _move(spin, log_e, _at(rates, middle), _at(slopes, middle), step)
-        _account(found, spin, moved)
-        spin = moved
-    return Ending(result.spin * reach, result.reversals, result.overshoot * reach, result.nearest_approach * reach)
+@called
+def _at(coefficients: Any, n: float) -> tuple[float, float]:
+    """The polynomials of both modes at a spin."""
+    first, second = 0.0, 0.0
+    for k in range(len(coefficients) - 1, -1, -1):
+        first, second = first * n + coefficients[k, 0], second * n + coefficients[k, 1]
+    return first, second
 
 
-def _step(r: Array, s: Array, turns: Array, log_e: Array) -> Array:
-    """Length of the next step, shape (cells,)."""
-    rate, turn = np.abs(r), turns.sum(axis=1)
-    way = np.exp(log_e / 2).sum(axis=1) + rate.min(axis=1) / np.maximum(np.abs(s).max(axis=1), 1e-300)
-    fastest = np.where(turns > _FAINT * turn[:, None], rate, 0.0).max(axis=1)
-    by_turn = _TURN * way / np.maximum(turn, 1e-300)
-    return np.asarray(np.minimum(_RATE / np.maximum(fastest, 1e-300), by_turn))
+@called
+def _change(e: float, r: float, s: float, step: float) -> Any:
+    """How much a mode lowers the spin in a step in which it grows at a constant rate."""
+    growth = 2.0 * r * step
+    return s * e * (step if growth == 0.0 else np.expm1(growth) / (2.0 * r))
 
 
-def _account(found: Ending, before: Array, after: Array) -> None:
-    """Take in a step, in place."""
-    size, reverses = np.abs(after), before * after < 0
-    further = reverses | (size >= found.overshoot)
-    found.reversals[reverses] += 1
-    found.overshoot[further] = size[further]
-    nearer = further | (size < found.nearest_approach)
-    found.nearest_approach[nearer] = size[nearer]
+@called
+def _step(r: tuple[float, float], s: tuple[float, float], e: tuple[float, float]) -> float:
+    """Length of the next step."""
+    turn0, turn1 = abs(s[0]) * e[0], abs(s[1]) * e[1]
+    turn, least = turn0 + turn1, _FAINT * (turn0 + turn1)
+    way = np.sqrt(e[0]) + np.sqrt(e[1]) + min(abs(r[0]), abs(r[1])) / max(abs(s[0]), abs(s[1]), _TINY)
+    fastest = max(abs(r[0]) if turn0 > least else 0.0, abs(r[1]) if turn1 > least else 0.0)
+    by_turn: float = _TURN * way / max(turn, _TINY)
+    return min(_RATE / max(fastest, _TINY), by_turn)
 
 
-def _at(coefficients: Array, spin: Array) -> Array:
-    """The polynomials at a spin in units of the reach, shape (cells, 2)."""
-    value = np.zeros_like(coefficients[0])
-    for each in coefficients[::-1]:
-        value = value * spin[:, None] + each
-    return np.asarray(value)
+def _follow(spin: Array, log_e: Array, rates: Array, slopes: Array, endings: Array) -> None:
+    """Follow the slow equations to their end, which is written to `endings`, of shape (cells, 4): NaN without one.
+
+    Spins are in units of the fastest within reach, and e in its square: its logarithm, because a mode may grow again
+    from less than a number can be.  The coefficients are of shape (cells, 5, 2).
+    """
+    for i in range(len(spin)):
+        endings[i] = np.nan
+        n, log0, log1 = spin[i], log_e[i, 0], log_e[i, 1]
+        reversals, overshoot, nearest = 0, abs(n), abs(n)
+        for _ in range(_MOST_STEPS):
+            r, s, e0, e1 = _at(rates[i], n), _at(slopes[i], n), np.exp(log0), np.exp(log1)
+            left0 = s[0] * e0 / (2.0 * r[0]) if s[0] * e0 != 0.0 else 0.0
+            left1 = s[1] * e1 / (2.0 * r[1]) if s[1] * e1 != 0.0 else 0.0
+            over = (r[0] < 0.0) & (r[1] < 0.0) & (abs(left0) + abs(left1) < _OVER * abs(n))
+            if over:
+                after = n + left0 + left1
+            else:
+                step = _step(r, s, (e0, e1))
+                middle = n - _change(e0, r[0], s[0], 0.5 * step) - _change(e1, r[1], s[1], 0.5 * step)
+                r, s = _at(rates[i], middle), _at(slopes[i], middle)
+                after = n - _change(e0, r[0], s[0], step) - _change(e1, r[1], s[1], step)
+                log0, log1 = log0 + 2.0 * r[0] * step, log1 + 2.0 * r[1] * step
+            size, reverses = abs(after), n * after < 0.0
+            further = reverses | (size >= overshoot)
+            reversals += reverses
+            overshoot = size if further else overshoot
+            nearest = size if further | (size < nearest) else nearest
+            n = after
+            if over:
+                endings[i, 0], endings[i, 1], endings[i, 2], endings[i, 3] = n, reversals, overshoot, nearest
+                break
 
 
-def _move(spin: Array, log_e: Array, r: Array, s: Array, step: Array) -> tuple[Array, Array]:
-    """Spin and log e after a step in which the modes grow at constant rates."""
-    growth = 2 * r * step[:, None]
-    gained = step[:, None] * np.divide(np.expm1(growth), growth, out=np.ones_like(growth), where=growth != 0)
-    return spin - (s * np.exp(log_e) * gained).sum(axis=1), log_e + growth
+@cache
+def compiled_following() -> Cached:
+    """`_follow`, compiled."""
+    return serial(_follow, "slow-equations")
+
+
+def compile_following() -> None:
+    """Compile `_follow`, or load it from disk."""
+    nothing = np.empty((0, 5, 2))
+    compiled_following()(np.empty(0), np.empty((0, 2)), nothing, nothing, np.empty((0, 4)))
