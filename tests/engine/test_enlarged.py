@@ -148,7 +148,7 @@ def test_no_result_is_lost(write: Write, tmp_path: Path, change: tuple[str, str]
 
 def test_nothing_is_taken_from_other_sources(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     grown(write, tmp_path / "out", ONE)
-    monkeypatch.setattr("sweep.results.provenance.sources", lambda: ("other", "versions"))
+    monkeypatch.setattr("sweep.results.provenance.sources", lambda _maker: ("other", "versions"))
     with pytest.raises(StoreError, match="not resumed"):
         grown(write, tmp_path / "out", MORE)
 
