@@ -234,7 +234,7 @@ def reach(states: Array, constants: Array) -> Array:
     at distance d from its critical spin.
     """
     _, rattle, inertia = slip.energy(states.astype(float), slip.Constants(*constants.astype(float)))
-    return np.asarray(np.sqrt(2 * rattle / inertia))
+    return np.asarray(np.sqrt(np.maximum(2 * rattle / inertia, 0)))
 
 
 def have_settled(states: Array, constants: Array) -> Array:
