@@ -46,7 +46,7 @@ def wide(random: np.random.Generator, cells: int) -> dict[str, Array]:
     columns = {"a": a, "b": b, "c": c, "delta": random.uniform(-0.5, 0.5, cells)}
     columns |= {"mu": 0.1 * (MOST_FRICTION / 0.1) ** random.random(cells)}
     columns |= {"n0": random.choice([-1, 1], cells) * 0.005 * 40 ** random.random(cells)}
-    return columns | {"x0": a * random.uniform(-0.1, 0.1, cells), "y0": b * random.uniform(-0.1, 0.1, cells)}
+    return columns | {name: b * random.uniform(-0.15, 0.15, cells) for name in ("x0", "y0")}
 
 
 def compare(label: str, columns: dict[str, Array]) -> None:

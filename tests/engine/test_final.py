@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from support import ROOT
 from support.runs import in_sittings, same_numbers
 
 import sweep
@@ -54,3 +55,14 @@ def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, write: Write) -> 
     found, interruptions, _ = in_sittings(60, config, config.parent / "out")
     assert interruptions > 1
     same_numbers(found, run)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    "name",
+    ["kane_levinson_coulomb", "kane_levinson_viscous", "mu", "pebble", "plastic_toy", "taps", "tippe_top", "wooden"],
+)
+def test_shipped_configurations_end_decided(name: str) -> None:
+    """Of the others, two go to a published time, two have nearly round bodies, and two reverse for ever."""
+    found = sweep.run(ROOT / "configs" / f"{name}.yaml", verify=0.0)
+    assert float(found.decided.mean()) >= 0.98
