@@ -261,7 +261,8 @@ class CriticalSpins(Search):
         four = np.concatenate([self.first, second])
         arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(self.grid.size)]
         cost = {"trajectories": self.simulations} | self._attributes(self.simulations, self.apart)
-        attributes = {"relative_width": self.width, **cost}
+        title = f"{self.config.name}: critical spins ({self.config.model} model)"
+        attributes = {"title": title, "relative_width": self.width, **cost}
         return dataset.label(self.config, self.grid, arrays, attributes).drop_vars("n0")
 
 
