@@ -161,11 +161,11 @@ def boundaries(
     and the same command resumes the search.
     """
     checked = loaded(config, settings)
+    from sweep.studies import estimates
     from sweep.studies.boundaries import boundaries as search
-    from sweep.studies.boundaries import estimate
 
     if dry_run:
-        click.echo(estimate(checked, x, y))
+        click.echo(estimates.of_boundaries(checked, x, y))
     else:
         _written(checked, "boundaries", partial(search, checked, x, y, width, fresh=fresh), **how)
 
@@ -191,11 +191,11 @@ def critical(
     same command resumes the search.
     """
     checked = loaded(config, settings)
+    from sweep.studies import estimates
     from sweep.studies.critical import critical as search
-    from sweep.studies.critical import estimate
 
     if dry_run:
-        click.echo(estimate(checked))
+        click.echo(estimates.of_critical(checked))
     else:
         _written(checked, "critical", partial(search, checked, width, fresh=fresh), **how)
 

@@ -24,7 +24,7 @@ POINTS = {
     "reversals_more": Variable("int16", "1", "spin reversals of the cell at end_more"),
     "outcome": Variable(
         "int8", "1", "whether the bracket is as narrow as asked; if not, a cell in it failed or met the time limit; "
-        "uncertain if one of its ends is nearer to the other count than ten times its error",
+        "uncertain if the count of one of its ends is not decided",
         {FOUND: "found", OPEN: "open", UNCERTAIN: "uncertain"},
     ),
 }  # fmt: skip

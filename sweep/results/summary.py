@@ -60,7 +60,7 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
     if open_:
         yield f"open {open_}: a cell near them failed, or did not end before the time limit"
     if uncertain := int((dataset["outcome"] == UNCERTAIN).sum()):
-        yield f"uncertain {uncertain}: as near to the other count as ten times the error; ask for a larger width"
+        yield f"uncertain {uncertain}: the count of an end is not decided; it may be as near to the other as its error"
 
 
 def _trajectories(dataset: xr.Dataset) -> Iterator[str]:

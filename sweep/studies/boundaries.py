@@ -20,24 +20,18 @@ from sweep.config import Config, ConfigError
 from sweep.config.faults import Fault
 from sweep.engine.cluster import Cluster
 from sweep.engine.reporter import Reporter
-from sweep.engine.run import carry_out
 from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.models.model import COUNT
 from sweep.results.dataset import described
-from sweep.results.folder import RunFiles
 from sweep.results.margins import FOUND, OPEN, POINTS, UNCERTAIN, Counts
 from sweep.results.store import Store
-from sweep.studies.kept import identified, kept
+from sweep.studies.kept import kept
 from sweep.studies.roots import Root
-from sweep.studies.search import Search, measuring
-from sweep.studies.trajectory import require_simulated
+from sweep.studies.search import Search, measuring, require_simulated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_EACH = 8
-"""Simulations that narrow a bracket from a cell of a grid to `WIDTH`, as a rule."""
 
 WIDTH = 1e-6
 """Relative distance of the two simulated cells between which a count changes."""
@@ -56,37 +50,18 @@ def boundaries(
     cluster: Cluster | None = None,
 ) -> xr.Dataset:
     """As `sweep.api.boundaries`; what there is to tell goes to `reporter` alone."""
-    across, reporter = _across(config, x, y), reporter or Reporter()
-    config = measuring(config)
-    identity = identified(
-        config, __name__, f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}"
+    across = chosen_axes(config, x, y)
+    config, settings = (
+        measuring(config),
+        f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}",
     )
-    files = None if output is None else RunFiles(Path(output), f"{config.name}_boundaries")
-
-    def search(store: Store) -> xr.Dataset:
-        found = Boundaries(config, store, across, width)
-        carry_out(found, store, reporter, cluster)
-        return found.labelled().assign_attrs(vars(identity))
-
-    return kept(files, identity, search, _draw, fresh=fresh, reporter=reporter)
+    return kept(
+        config, __name__, settings, lambda store: Boundaries(config, store, across, width), _draw, output,
+        fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
+    )  # fmt: skip
 
 
-def estimate(config: Config, x: str | None = None, y: str | None = None) -> str:
-    """Cells, steps, memory and time of a search, a line each, told from a sample of its grid.
-
-    Raises
-    ------
-    ConfigError
-        as `boundaries`.
-    """
-    from sweep.engine.estimate import estimate as of_run
-
-    across = _across(config, x, y)
-    words = f"then:   about {_EACH} simulations for each point where a curve crosses a line of the grid"
-    return f"{of_run(measuring(config))}\n{words}, over {across[0]} and {across[1]}"
-
-
-def _across(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
+def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
     """The axes over which boundaries are curves: those named, or else the first two."""
     require_simulated(config)
     if COUNT not in config.equations.offers:
@@ -171,8 +146,7 @@ class Boundaries(Search):
             "Conventions": "CF-1.11",
             "title": f"{self.config.name}: boundaries ({self.config.model} model)",
         }
-        head |= {"x": self.across[0], "y": self.across[1], "relative_width": self.width}
-        head |= {"trajectories": self.simulations} | self._attributes(self.simulations, self.apart)
+        head |= {"x": self.across[0], "y": self.across[1]} | self.told()
         own = {name: xr.Variable("point", columns[name].astype(spec.dtype), described(spec))
                for name, spec in POINTS.items()}  # fmt: skip
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})
@@ -256,7 +230,8 @@ def _sorted(table: Array, y: tuple[float, ...], x: tuple[float, ...]) -> Array:
 
 def _levelled(distance: Array) -> Array:
     """Numbers of the same signs, so much alike that a contour passes through the middle part of each edge."""
-    return np.asarray(np.sign(distance) * (2 + np.tanh(np.abs(distance) / np.nanmax(np.abs(distance)))))
+    side = np.where(distance > 0, 1, -1)  # a cell may be on the boundary itself
+    return np.asarray(side * (2 + np.tanh(np.abs(distance) / np.nanmax(np.abs(distance), initial=1e-300))))
 
 
 def _draw(result: xr.Dataset) -> Figure:

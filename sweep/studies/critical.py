@@ -11,14 +11,10 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, Values
-from sweep.config.user_models import explained
 from sweep.engine.cluster import Cluster
-from sweep.engine.estimate import estimate as of_run
 from sweep.engine.reporter import Reporter
-from sweep.engine.run import carry_out
-from sweep.grid import Array, Grid
+from sweep.grid import Array
 from sweep.interrupt import deferred
-from sweep.kernels.status import SETTLED
 from sweep.models.model import Columns
 from sweep.models.theory.stability import SPIN_LIMIT
 from sweep.parameters import START
@@ -34,14 +30,11 @@ from sweep.results.dataset import (
     REVERSES_AT_N_C1,
     UNDECIDED,
 )
-from sweep.results.folder import RunFiles
 from sweep.results.margins import Counts
-from sweep.results.memory import Memory
 from sweep.results.store import Store
-from sweep.studies.kept import identified, kept
+from sweep.studies.kept import kept
 from sweep.studies.roots import Root
 from sweep.studies.search import Search, measuring
-from sweep.studies.trajectory import require_simulated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,9 +53,6 @@ _OUTWARDS = 5
 # the body topples or leaves the plane instead: of 40 bodies searched up to a spin of 10, none reversed there.
 _FARTHEST = 8.0
 
-# Simulations that narrow a bracket from `RATIO` to `WIDTH`, as a rule.
-_EACH = 4
-
 
 @deferred()
 def critical(
@@ -75,42 +65,16 @@ def critical(
     cluster: Cluster | None = None,
 ) -> xr.Dataset:
     """As `sweep.api.critical`; what there is to tell goes to `reporter` alone."""
-    config, reporter = _searchable(config), reporter or Reporter()
-    identity = identified(config, __name__, f"width of the brackets: {width!r}")
-    files = None if output is None else RunFiles(Path(output), f"{config.name}_critical")
-
-    def search(store: Store) -> xr.Dataset:
-        with explained(config.origin):
-            found = CriticalSpins(config, store, width)
-        carry_out(found, store, reporter, cluster)
-        return found.labelled().assign_attrs(vars(identity))
-
-    return kept(files, identity, search, _draw, fresh=fresh, reporter=reporter)
+    config = searchable(config)
+    return kept(
+        config, __name__, f"width of the brackets: {width!r}", lambda store: CriticalSpins(config, store, width), _draw,
+        output, fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
+    )  # fmt: skip
 
 
-def estimate(config: Config) -> str:
-    """Bodies, and cells, steps, memory and time of the first round of a search, told from a sample of its cells.
-
-    Raises
-    ------
-    ConfigError
-        as `critical`.
-    """
-    config = _searchable(config)
-    grid = Grid.of(config)
-    axes = " × ".join(f"{name} {len(values)}" for name, values in grid.axes.items())
-    if grid.cases is not None:
-        axes = f"case {grid.size}"
-    bodies = f"bodies: {grid.size} ({axes or 'one body'}), each with spins of both signs"
-    then = f"then:   about {_EACH} simulations for each n_c2"
-    search = CriticalSpins(config, Memory(), WIDTH)
-    search.rounds.append(search.ask())
-    return "\n".join([bodies, of_run(search.simulated()), then])
-
-
-def _searchable(config: Config) -> Config:
+def searchable(config: Config) -> Config:
     """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
-    require_simulated(config)
+    config = measuring(config)
     if not config.of_rattlebacks:
         raise ConfigError([config.fault(("model",), "no rattleback; critical spins are asked of: slip, noslip")])
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
@@ -121,7 +85,7 @@ def _searchable(config: Config) -> Config:
         )
     parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
-    return replace(measuring(config), parameters=parameters, cases=cases or None, integrator=config.integrator.patient)
+    return replace(config, parameters=parameters, cases=cases or None, integrator=config.integrator.patient)
 
 
 def _draw(result: xr.Dataset) -> Figure:
@@ -232,13 +196,13 @@ class CriticalSpins(Search):
 
     def learn(self, found: Mapping[str, Array]) -> None:
         counts, reversed_ = Counts.of(found), found["reversals"] > 0
-        final = (found["status"] == SETTLED) | reversed_
-        distance = np.where(final, counts.distance(1), np.nan)
+        distance = counts.distance(1)
+        measured = counts.borders(1) & ~np.isnan(distance)
         # A trajectory that fails after a reversal has reversed, but has no arc that could be measured.
         size = np.exp([place for _, places in self._asked for place in places])
         distance = np.where(reversed_ & ~(distance > 0), size, distance)
         failed = ~counts.known & ~reversed_
-        answers = zip(distance.tolist(), counts.borders(1).tolist(), failed.tolist(), strict=True)
+        answers = zip(distance.tolist(), measured.tolist(), failed.tolist(), strict=True)
         for spin, places in self._asked:
             spin.learn([Answer(place, *next(answers)) for place in places])
 
@@ -260,10 +224,8 @@ class CriticalSpins(Search):
             arrays[f"n_c1_{side}_reason"], arrays[f"n_c2_{side}_reason"] = self.first[half], second[half]
         four = np.concatenate([self.first, second])
         arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(self.grid.size)]
-        cost = {"trajectories": self.simulations} | self._attributes(self.simulations, self.apart)
         title = f"{self.config.name}: critical spins ({self.config.model} model)"
-        attributes = {"title": title, "relative_width": self.width, **cost}
-        return dataset.label(self.config, self.grid, arrays, attributes).drop_vars("n0")
+        return dataset.label(self.config, self.grid, arrays, {"title": title, **self.told()}).drop_vars("n0")
 
 
 def _way(n_c1: float, limit: float) -> list[float]:

@@ -4,42 +4,61 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import xarray as xr
 
 from sweep.config import Config
+from sweep.config.user_models import explained
+from sweep.engine.cluster import Cluster
 from sweep.engine.reporter import Reporter
+from sweep.engine.run import carry_out
 from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
-from sweep.results.identity import Identity
 from sweep.results.memory import Memory
 from sweep.results.provenance import identify
 from sweep.results.store import Store
+from sweep.studies.search import Search
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def identified(config: Config, maker: str, settings: str) -> Identity:
-    """Identify a search by the module `maker`: as a run, and by its own settings in words."""
-    run = identify(config, maker)
-    return replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
-
-
 def kept(
-    files: RunFiles | None,
-    identity: Identity,
-    search: Callable[[Store], xr.Dataset],
+    config: Config,
+    maker: str,
+    settings: str,
+    make: Callable[[Store], Search],
     draw: Callable[[xr.Dataset], Figure],
+    output: str | Path | None,
     *,
     fresh: bool,
     reporter: Reporter,
+    cluster: Cluster | None,
 ) -> xr.Dataset:
-    """The dataset that `search` finds, or what an earlier search of the same identity has left in `files`."""
-    if files is None:
+    """The dataset that a search finds, or what an earlier search of the same identity has left in the folder `output`.
+
+    Parameters
+    ----------
+    maker : module of the search, by which it is identified beside the configuration, and after which files are named
+    settings : its own settings, in words
+    make : makes the search, by its store
+    draw : draws the dataset
+    """
+    run = identify(config, maker)
+    identity = replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
+
+    def search(store: Store) -> xr.Dataset:
+        with explained(config.origin):
+            found = make(store)
+        carry_out(found, store, reporter, cluster)
+        return found.labelled().assign_attrs(vars(identity))
+
+    if output is None:
         return search(Memory())
+    files = RunFiles(Path(output), f"{config.name}_{maker.rpartition('.')[2]}")
     with files.locked():
         if fresh:
             files.discard()

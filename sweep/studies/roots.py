@@ -36,10 +36,10 @@ class Root:
     """The distance of the two at which the search ends."""
     values: dict[float, float]
     """What is known: the function by place."""
-    smooth: dict[float, float] = field(default_factory=dict)
+    smooth: dict[float, float]
     """Of these, the values that belong to the one smooth function that passes through the root."""
-    unknown: bool = False
-    """True once a place was met at which the function has no value; that ends the search."""
+    blank: list[float] = field(default_factory=list)
+    """The places at which it has no value."""
     _pair: list[float] = field(default_factory=list)
     """The places proposed last around a root; empty if the bracket was cut."""
     _missed: int = 0
@@ -47,7 +47,13 @@ class Root:
 
     @property
     def ended(self) -> bool:
-        return self.unknown or self.high - self.low <= self.width
+        rounding = 4 * float(np.spacing(max(abs(self.low), abs(self.high))))
+        return self.unknown or self.high - self.low <= max(self.width, rounding)
+
+    @property
+    def unknown(self) -> bool:
+        """True if the function has no value somewhere in the bracket; that ends the search."""
+        return any(self.low < place < self.high for place in self.blank)
 
     def wanted(self) -> list[float]:
         """The places to evaluate next."""
@@ -64,7 +70,7 @@ class Root:
     def learn(self, place: float, value: float, *, smooth: bool) -> None:
         """Take in the value at a place; NaN where there is none."""
         if np.isnan(value):
-            self.unknown = True
+            self.blank.append(place)
             return
         self.values[place] = value
         if smooth:

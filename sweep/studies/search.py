@@ -9,14 +9,18 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from sweep.config import Config
+from sweep.config import Config, ConfigError
+from sweep.config.faults import either
 from sweep.engine.errors import ROUND_OFF
 from sweep.engine.whole import Apart, Whole, apart_from
 from sweep.grid import Array
 from sweep.kernels.measures import possible
+from sweep.models import MODELS
 from sweep.results.store import Store
 
 # What is measured of a cell, where its model allows.
@@ -27,9 +31,24 @@ _FINER = 1e-4
 
 
 def measuring(config: Config) -> Config:
-    """`config` with what a search needs to know of a cell, and no more."""
+    """`config` with what a search needs to know of a cell, and no more; margins are those of cells that settle.
+
+    Raises
+    ------
+    ConfigError
+        if the model is a formula.
+    """
+    require_simulated(config)
     measure = tuple(name for name in _MEASURED if name in possible(config.equations))
-    return replace(config, measure=measure, verify=0.0, refine=0)
+    integrator = config.integrator.model_copy(update={"stop_when_settled": True})
+    return replace(config, measure=measure, verify=0.0, refine=0, integrator=integrator)
+
+
+def require_simulated(config: Config) -> None:
+    """Raise a `ConfigError` if the model is a formula, which takes no steps."""
+    if not config.simulated:
+        message = f"the {config.model} model is a formula and cannot be simulated; choose {either(MODELS)}"
+        raise ConfigError([config.fault(("model",), message)])
 
 
 class Search(Whole):
@@ -54,19 +73,16 @@ class Search(Whole):
     def learn(self, found: Mapping[str, Array]) -> None:
         """Take in what the tiles say of the cells that were asked for last: `status`, `reversals`, margins ..."""
 
-    @property
-    def simulations(self) -> int:
-        """The number of the cells so far."""
-        return self.tiles[-1][0].stop if self.tiles else 0
+    @abstractmethod
+    def labelled(self) -> xr.Dataset:
+        """What the search has found."""
 
     def simulated(self) -> Config:
         """The configuration whose cases are all cells so far."""
         cases = {n: tuple(np.concatenate([each[n] for each in self.rounds]).tolist()) for n in self.rounds[0]}
         constants = {name: values for name, values in self.config.parameters.items() if name not in cases}
-        integrator = self.config.integrator
-        if self.narrows:
-            finer = max(_FINER * self.width, ROUND_OFF)
-            integrator = integrator.model_copy(update={"tolerance": min(integrator.tolerance, finer)})
+        tolerance = self._finer() if self.narrows else self.config.integrator.tolerance
+        integrator = self.config.integrator.model_copy(update={"tolerance": tolerance})
         return replace(self.config, parameters=constants, cases=cases, integrator=integrator)
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
@@ -82,3 +98,12 @@ class Search(Whole):
         if cells:
             self.rounds.append(asked)
         return self._cut(cells, tile_size)
+
+    def _finer(self) -> float:
+        return min(self.config.integrator.tolerance, max(_FINER * self.width, ROUND_OFF))
+
+    def told(self) -> dict[str, Any]:
+        """The attributes of a dataset: how exact it is, where it comes from, what it has cost."""
+        simulations = self.tiles[-1][0].stop if self.tiles else 0
+        exact = {"relative_width": self.width, "bracket_tolerance": self._finer(), "trajectories": simulations}
+        return exact | self._attributes(simulations, self.apart)

@@ -14,7 +14,7 @@ import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
 from sweep.config.bodies import misplaced, unfit
-from sweep.config.faults import either, suggestion
+from sweep.config.faults import suggestion
 from sweep.config.schema import FOREVER
 from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
@@ -33,11 +33,11 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.kernels.status import RUNNING, TIME_LIMIT
-from sweep.models import MODELS
 from sweep.models.model import Columns, Model
 from sweep.models.theory.linear import fastest_motion
 from sweep.results import dataset
 from sweep.results.provenance import provenance
+from sweep.studies.search import require_simulated
 from sweep.variables import Variable
 
 SAMPLES_A_RADIAN = 3
@@ -213,13 +213,6 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     if beyond := unfit(chosen) or misplaced(chosen):
         raise ConfigError([Fault("", None, None, (), beyond)])
     return chosen
-
-
-def require_simulated(config: Config) -> None:
-    """Raise a `ConfigError` if the model is a formula, which takes no steps."""
-    if not config.simulated:
-        message = f"the {config.model} model is a formula and cannot be simulated; choose {either(MODELS)}"
-        raise ConfigError([config.fault(("model",), message)])
 
 
 def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:

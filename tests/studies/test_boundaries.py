@@ -66,6 +66,34 @@ def test_a_place_without_a_value_ends_the_search() -> None:
     assert root.unknown
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_place_without_a_value_outside_the_bracket_does_not_matter(order: int) -> None:
+    root = Root(0.0, 1.0, 1e-6, {0.0: -0.1, 1.0: 0.9}, {})
+    for place, value in [(0.25, 0.15), (0.5, np.nan)][::order]:
+        root.learn(place, value, smooth=True)
+    assert not root.unknown
+
+
+def test_a_bracket_ends_where_no_number_lies_between_its_ends() -> None:
+    root, _ = narrowed(lambda x: x - 1 / 3, 0.0, 1.0, 0.0)
+    assert 0 <= root.high - root.low < 1e-15
+
+
+def test_a_cell_on_the_boundary_itself_is_on_one_of_its_sides() -> None:
+    """A body at rest has no margin at all."""
+    found = sweep.boundaries(
+        {"body": {"a": 10.0, "delta": 0.03}, "start": {"n0": 0.05, "y0": 0.0}, "friction": {"mu": 75.0}},
+        x="x0", x0=[0.0, 0.01, 0.3], n0=[0.0, 0.02, 0.05], width=0.01, progress=False,
+    )  # fmt: skip
+    assert found.sizes["point"] > 0
+
+
+def test_margins_are_those_of_cells_that_settle() -> None:
+    settings: dict[str, Any] = {"width": 1e-3, "progress": False, "mu": [60.0, 72.0], "b": [3.0, 4.0]}
+    usual, endless = (sweep.boundaries(SCENE, stop_when_settled=stops, **settings) for stops in (True, False))
+    same_numbers(endless, usual)
+
+
 def test_distances_are_of_the_level_asked_for() -> None:
     counts = Counts(
         np.array([2.0, 3.0, 5.0]), np.array([0.1, np.nan, 0.2]), np.array([0.3, 0.4, 0.5]), np.ones(3, bool)

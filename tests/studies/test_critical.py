@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import wide_bodies
+from support.cli import invoke
 from support.kernels import kernel
 
 import sweep
@@ -106,6 +107,8 @@ def test_n_c2_is_the_first_boundary_along_n0(write: Write) -> None:
 
 
 def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
+    told = invoke("critical", write(STANDARD), "--set", "mu=0", "--dry-run")
+    assert told.stdout == "bodies: 1 (one body), each with spins of both signs; none has an n_c1 from which to search\n"
     for settings, reason in (
         ({"mu": 0.0}, "no_friction"),
         ({"model": "noslip"}, "no_friction"),
