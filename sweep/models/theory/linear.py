@@ -85,7 +85,7 @@ _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
 
 
 def through_nodes(values: Sequence[Array]) -> Array:
-    """Coefficients of the polynomials through values at `NODES`, lowest power first; shape (nodes, *that of a value).
+    """Coefficients of the polynomials through values at `NODES`, lowest power first, along a first axis.
 
     Not a matrix product: how BLAS rounds a cell depends on how many other cells there are.
     """
