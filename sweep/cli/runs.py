@@ -54,17 +54,18 @@ DRY_RUN = click.option(
 FRESH = click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")
 
 
+def _resumed(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a command whose simulations are kept, resumed, and spread over processes."""
+    for option in (QUIET, SCHEDULER, WORKERS, FRESH, DRY_RUN, SETTINGS, OUTPUT):
+        command = option(command)
+    return command
+
+
 @click.command(epilog=_parameter_help())
 @CONFIG
-@OUTPUT
-@SETTINGS
-@DRY_RUN
-@FRESH
 @click.option("--rerun", type=click.Choice(["failed", "limit"]),
               help="Simulate again only those cells of the dataset that failed, or that reached t_end.")  # fmt: skip
-@WORKERS
-@SCHEDULER
-@QUIET
+@_resumed
 def run(
     config: Path, settings: tuple[str, ...], dry_run: bool, fresh: bool, rerun: str | None, **how: Any
 ) -> None:  # fmt: skip
@@ -143,13 +144,7 @@ def trajectory(
 @click.option("--y", help="Parameter along the vertical axis.")
 @click.option("--width", type=click.FloatRange(1e-12, 0.5), default=1e-6, show_default=True,
               help="Relative distance of the two simulated cells between which a count changes.")  # fmt: skip
-@OUTPUT
-@SETTINGS
-@DRY_RUN
-@FRESH
-@WORKERS
-@SCHEDULER
-@QUIET
+@_resumed
 def boundaries(
     config: Path, x: str | None, y: str | None, width: float, settings: tuple[str, ...], dry_run: bool, fresh: bool,
     **how: Any,
@@ -174,13 +169,7 @@ def boundaries(
 @CONFIG
 @click.option("--width", type=click.FloatRange(1e-12, 0.5), default=1e-3, show_default=True,
               help="Relative width of the brackets of n_c2.")  # fmt: skip
-@OUTPUT
-@SETTINGS
-@DRY_RUN
-@FRESH
-@WORKERS
-@SCHEDULER
-@QUIET
+@_resumed
 def critical(
     config: Path, width: float, settings: tuple[str, ...], dry_run: bool, fresh: bool, **how: Any
 ) -> None:  # fmt: skip

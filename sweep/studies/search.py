@@ -31,14 +31,7 @@ _FINER = 1e-4
 
 
 def measuring(config: Config) -> Config:
-    """`config` with what a search needs to know of a cell, and no more; margins are those of cells that settle.
-
-    Raises
-    ------
-    ConfigError
-        if the model is a formula.
-    """
-    require_simulated(config)
+    """`config` with what a search needs to know of a cell, and no more; margins are those of cells that settle."""
     measure = tuple(name for name in _MEASURED if name in possible(config.equations))
     integrator = config.integrator.model_copy(update={"stop_when_settled": True})
     return replace(config, measure=measure, verify=0.0, refine=0, integrator=integrator)
