@@ -91,6 +91,18 @@ def test_a_missed_tolerance_is_repeated(cells: Cells, monkeypatch: pytest.Monkey
     assert int(once.step_rule[0]) == MISSED
 
 
+def test_spins_alike_by_chance_are_not_believed(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Here run and companion are both off by 7e-5, and their spins differ by 1e-7."""
+    body = {"a": 10.3419, "b": 1.03272, "c": 0.75863, "delta": 0.201271}
+    start = {"mu": 31.895, "n0": 0.123607, "x0": 0.683495, "y0": 0.00321463}
+    true = -0.006283033589318104  # Taylor series at 1e-16: `scripts/reference_wide.py`.
+    found = cells([body | start], method="adams", tolerance=1e-6)
+    assert abs(float(found.spin_final[0]) - true) < 1e-6
+    assert int(found.step_rule[0]) == REPEAT
+    monkeypatch.setattr(errors, "DOUBTFUL", np.inf)
+    assert abs(float(cells([body | start], method="adams", tolerance=1e-6).spin_final[0]) - true) > 1e-5
+
+
 def test_what_nobody_asked_for_is_not_run(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(errors, "companions", None)
     found = cells([BODY], method="adams", estimate_errors=False)

@@ -50,9 +50,9 @@ METHOD = Method(
     kernel=_kernel,
     accurate_step=accurate_step,
     runs=lambda model: forms.of(model) is not None,
-    # On one thread start-up takes 4.6 to 6.4 µs, and a step of dopri5 22 ns.
+    # On one thread start-up takes 8 to 11 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
-    start_up_cost=390.0,
+    start_up_cost=650.0,
     compile_seconds=14.0,
     companion=1.35,
     error_order=4,

@@ -39,10 +39,11 @@ from sweep.models.model import Array
 from sweep.models.stiff.form import StiffForm
 
 # Steps of dopri5, in widths of the layer, and their number.  A step is at least half as long as that, unless the final
-# one is shorter: the slip then differs from its slow value by e^-14 of what it did at first.  Every second one of the
-# last steps is a point of the history.  BDF5 would lose more accuracy in one such step than dopri5 does in all of them:
-# with half as many, errors at a tolerance of 1e-10 were about ten times as large in wide cells without leaps.
-_SHARE, _DOPRI5_STEPS = 0.5, 56
+# one is shorter.  Every second one of the last steps is a point of the history.  The slip has forgotten how it began
+# after a quarter of them, but while it has not, BDF5 would lose more accuracy in one step than dopri5 does in all of
+# them, and such an error hardly depends on the step: no companion tells it.  With half as many, one of 278 wide cells
+# was off by more than 3 times a tolerance of 1e-10 unawares; with a quarter, hard taps left 5 to 20 times the error.
+_SHARE, _DOPRI5_STEPS = 0.5, 224
 
 # A level is the part of start-up before each doubling of the step.  While the slip still decays, a level takes extra
 # steps, so that the decay does not show in the next one.  With them the floor of the error in spin at t = 400 is below
