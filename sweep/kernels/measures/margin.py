@@ -62,7 +62,8 @@ class Margin(Measurement):
             time = group[DONE + lane] * group[STEP + lane] - since
             first, middle, size1, size2 = group[TIME_BEFORE + lane], group[TIME + lane], size, group[SIZE + lane]
             size3 = group[SIZE_BEFORE + lane]
-            if running & (time > middle + 0.5 * period):
+            # The first window counts however early the look: a run may settle there, with no other.
+            if running & (size > 0.0) & ((time > middle + 0.5 * period) | (size2 == 0.0)):
                 new = count != group[COUNTED + lane]
                 overshoot, nearest = group[OVERSHOOT + lane], group[NEAREST + lane]
                 # The vertex of the parabola through the last three, if the middle one is an extreme.
