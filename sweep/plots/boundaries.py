@@ -14,6 +14,7 @@ from sweep.grid import Array
 from sweep.plots import labels, lines, scales
 from sweep.plots.figure import RATIO, Picture, arrangement, set_scale
 from sweep.plots.panels import MAX_PANELS, heading
+from sweep.plots.theory import Line
 from sweep.results.margins import OPEN, smoothed
 
 
@@ -30,9 +31,11 @@ def draw(dataset: xr.Dataset) -> Figure:
         axes.set_title(words, fontsize=9)
         set_scale(axes, "x", _axis(dataset, x).values)
         set_scale(axes, "y", _axis(dataset, y).values)
-        for level, xs, ys in curves(part, x, y):
+        drawn = list(curves(part, x, y))
+        for level, xs, ys in drawn:
             axes.plot(xs, ys, color=scale.rgba(np.array(level)).tolist(), linewidth=1.4, gid=f"level{level}")
-            lines.number(axes, level, xs, ys)
+        each = [Line("boundary", "", [(xs, ys)], f"{level}") for level, xs, ys in drawn]
+        lines.number(axes, each, _axis(dataset, x), _axis(dataset, y))
         open_ = part.isel(point=(part["outcome"] == OPEN).values)
         axes.plot(open_[x], open_[y], linestyle="none", marker="o", markersize=3, color="none", markeredgecolor="0.3")
         axes.tick_params(labelsize=8)

@@ -1,18 +1,25 @@
-"""Says where counts change between the cells of a map, by their margins.
+"""Says where counts change between the cells of a map, by their margins, and where the counts are written.
 
 From the dataset alone, and without any library that draws.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
+import numpy as np
 import xarray as xr
 
 from sweep.axis import Axis, contours
+from sweep.grid import Array
 from sweep.plots.theory import Line
 from sweep.results.margins import Counts
 
 NEEDED = ["reversals", "margin_more", "margin_fewer", "status"]
 """The variables of a dataset from which boundaries are drawn."""
+
+_APART, _LARGE = 0.06, 0.25
+"""How far numbers are from each other at least, and how large parts of lines are that need one, as shares of a map."""
 
 
 def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
@@ -26,3 +33,25 @@ def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
     words = "from here on so many reversals, by the margins of the cells"
     curves = {level: list(contours(counts.distance(level), x, y)) for level in counts.levels()}
     return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]
+
+
+def numbers(drawn: Iterable[Line], x: Axis, y: Axis) -> Iterator[tuple[float, float, str]]:
+    """Where on the boundaries among these lines their counts are written: near the middle of each part.
+
+    Small parts have none, unless they are the largest of their line, and neither have parts without room for one.
+    """
+    taken = np.empty((0, 2))
+    for line in (each for each in drawn if each.name == "boundary"):
+        paths = [np.stack([_shares(x, xs), _shares(y, ys)], axis=1) for xs, ys in line.parts]
+        sizes = [np.ptp(path, axis=0).max() for path in paths]
+        for (xs, ys), path, size in zip(line.parts, paths, sizes, strict=True):
+            free = np.flatnonzero((np.abs(path[:, None] - taken).max(axis=2) > _APART).all(axis=1))
+            if size >= min(_LARGE, max(sizes)) and free.size:
+                at = free[np.abs(free - len(path) // 2).argmin()]
+                taken = np.vstack([taken, path[at]])
+                yield float(xs[at]), float(ys[at]), line.symbol
+
+
+def _shares(axis: Axis, values: Array) -> Array:
+    """The values along the drawn axis, of which the whole is as long as 1."""
+    return np.asarray(axis.straight(values) / np.ptp(axis.straight(axis.values)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import Stroke, withStroke
 
-from sweep.grid import Array
+from sweep.axis import Axis
+from sweep.plots import levels
 from sweep.plots.description import Map
 from sweep.plots.theory import Line
 
@@ -37,18 +39,17 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
     axes.axis(box)
     for line in shown.lines:
         # Over n0 the lines of n_c1 are too close to those of n_c2 for a symbol of their own.
-        if labelled and line.symbol and not (over_n0 and line.name == "n_c1"):
-            if line.name == "boundary":
-                number(axes, int(line.symbol), *max(line.parts, key=lambda part: len(part[0])))
-            else:
-                _label(axes, shown, line)
+        if labelled and line.symbol and line.name != "boundary" and not (over_n0 and line.name == "n_c1"):
+            _label(axes, shown, line)
+    if labelled:
+        number(axes, shown.lines, shown.x, shown.y)
     return {line.name: entry(line.name, line.words) for line in shown.lines}
 
 
-def number(axes: Axes, level: int, x: Array, y: Array) -> None:
-    """Write the count that begins on a line into the line itself; neighbours have theirs at other places."""
-    at = int((0.8 - 0.07 * (level % 6)) * (len(x) - 1))
-    axes.annotate(f"{level}", (x[at], y[at]), fontsize=7, ha="center", va="center", path_effects=_halo(2))
+def number(axes: Axes, drawn: Iterable[Line], x: Axis, y: Axis) -> None:
+    """Write the counts that begin on boundaries into the lines themselves."""
+    for at_x, at_y, count in levels.numbers(drawn, x, y):
+        axes.annotate(count, (at_x, at_y), fontsize=7, ha="center", va="center", path_effects=_halo(2))
 
 
 def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:

@@ -35,13 +35,13 @@ class Line:
     """A line over a map or, at some values of x, over curves."""
 
     name: str
-    """What decides its style: `n_c1`, `n_c2`, or `best` for the shape of the largest form factor."""
+    """What decides its style: `n_c1`, `n_c2`, `boundary`, or `best` for the shape of the largest form factor."""
     words: str
     """What a legend says of it, with symbols such as n_c1."""
     parts: list[Points]
     """Over curves, y is empty."""
     symbol: str = ""
-    """What stands beside it, such as n_c1⁺."""
+    """What stands beside it, such as n_c1⁺, or on it: the count that begins on a boundary."""
 
 
 def critical_spins(dataset: xr.Dataset, name: str) -> Iterator[tuple[str, xr.DataArray, str]]:
