@@ -27,7 +27,7 @@ from sweep.explore.colours import is_logarithmic, mapping
 from sweep.explore.patterns import TILES
 from sweep.explore.slices import PlacedAxis, Source, plain
 from sweep.grid import Array
-from sweep.plots import labels, scales
+from sweep.plots import labels, levels, scales
 from sweep.plots.description import Map, common_scale
 from sweep.plots.scales import Scale
 
@@ -40,11 +40,8 @@ _SHORT = {"reversals": "simulated", "reversals_predicted": "predicted", "differe
 _TICKS = 12
 """On an axis whose values are listed one by one, at most."""
 
-DASHES = {"n_c1": "dotted", "n_c2": "solid", "best": "dashed", "boundary": "solid"}
-"""Of the lines over a map."""
-
-_WIDTHS = {"boundary": 0.7}
-"""Of those that are many; the others are 1.5 wide."""
+LINES = {"n_c1": ("dotted", 1.5), "n_c2": ("solid", 1.5), "best": ("dashed", 1.5), "boundary": ("solid", 0.7)}
+"""How the lines over a map are dashed, and how wide they are."""
 
 _BAR = {
     "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": "#1b2733",
@@ -91,7 +88,8 @@ class MapFigure:
         ]
         overlay = ColumnDataSource({"image": [np.zeros((2, 2), "uint32")], **self._place}, syncable=False)
         plot.image_rgba(image="image", x="x", y="y", dw="dw", dh="dh", source=overlay)
-        self._lines = {name: _line(plot, dash, _WIDTHS.get(name, 1.5)) for name, dash in DASHES.items()}
+        self._lines = {name: _line(plot, *style) for name, style in LINES.items()}
+        self._numbers = _numbers(plot)
         self.cursor, self.pins = _cursor(plot), _pins(plot)
         self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
@@ -121,6 +119,12 @@ class MapFigure:
         for name, source in self._lines.items():
             parts = [points for line in part.lines if line.name == name for points in line.parts]
             source.data = {"xs": [self._x.place(x) for x, _ in parts], "ys": [self._y.place(y) for _, y in parts]}
+        numbers = list(levels.numbers(part.lines, part.x, part.y))
+        self._numbers.data = {
+            "x": [self._x.place(x) for x, _, _ in numbers],
+            "y": [self._y.place(y) for _, y, _ in numbers],
+            "count": [count for *_, count in numbers],
+        }
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]
@@ -142,6 +146,14 @@ def _line(plot: Any, dash: str, width: float) -> ColumnDataSource:
     source = ColumnDataSource({"xs": [], "ys": []})
     plot.multi_line("xs", "ys", source=source, color="white", width=2.5 * width)
     plot.multi_line("xs", "ys", source=source, color="black", width=width, dash=dash)
+    return source
+
+
+def _numbers(plot: Any) -> ColumnDataSource:
+    """The counts on the boundaries."""
+    source = ColumnDataSource({"x": [], "y": [], "count": []}, name="numbers")
+    plot.text("x", "y", "count", source=source, text_font_size="11px", text_align="center", text_baseline="middle",
+              background_fill_color="white", border_radius=3, padding=2)  # fmt: skip
     return source
 
 
