@@ -200,11 +200,29 @@ const sweep = (() => {
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000)
   }
 
-  /** The figures that can be seen, one below the other, with the page's title over them, as one PNG. */
+  /** The legend of the map as an image: an SVG may hold HTML. */
+  async function legend(scale) {
+    const view = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name("legend"))
+    const text = view.shadow_el.querySelector(".bk-clearfix")
+    const {width, height} = text.getBoundingClientRect()
+    const {color, font} = getComputedStyle(text)
+    const copy = Object.assign(text.cloneNode(true), {style: `color: ${color}; font: ${font}; margin-left: 12px`})
+    const html = new XMLSerializer().serializeToString(copy)
+    const [across, down] = [width + 12, height + 16]
+    const svg = `<svg xmlns="http://www.w3.org/2000/svg" width="${scale * across}" height="${scale * down}">
+      <foreignObject width="${across}" height="${down}" transform="scale(${scale})">${html}</foreignObject></svg>`
+    const image = new Image()
+    image.src = `data:image/svg+xml,${encodeURIComponent(svg)}`
+    await image.decode()
+    return image
+  }
+
+  /** The figures that can be seen, one below the other, with the page's title and the map's legend, as one PNG. */
   async function picture(figures, name) {
     const views = figures.map((figure) => Bokeh.index.find_one(figure)).filter((view) => view?.el.offsetParent)
     const layers = views.map((view) => view.export("png", true).canvas)
     const scale = window.devicePixelRatio
+    layers.splice(1, 0, await legend(scale))
     const canvas = document.createElement("canvas")
     const head = 56 * scale
     canvas.width = Math.max(...layers.map((layer) => layer.width))

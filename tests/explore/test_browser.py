@@ -497,6 +497,8 @@ def test_what_is_seen_is_saved(visit: Callable[..., Page], opened: xr.Dataset, t
     shown = opened["reversals"].isel(n0=N0).values[1, 0]
     for colour in (colour_in_palette(page, int(shown)), [0, 0x72, 0xB2]):
         assert colour in colours
+    legend = picture[56 + round(model(page, "map figure", "m.outer_height")) :][:20]
+    assert [0x21, 0x91, 0x8C] in legend.reshape(-1, 3).tolist()  # the ground of its patterns
 
 
 def test_a_map_is_one_file_that_needs_no_network(browser: Browser, opened: xr.Dataset, tmp_path: Path) -> None:
