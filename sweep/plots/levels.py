@@ -44,9 +44,10 @@ def numbers(drawn: Iterable[Line], x: Axis, y: Axis) -> Iterator[tuple[float, fl
     for line in (each for each in drawn if each.name == "boundary"):
         paths = [np.stack([_shares(x, xs), _shares(y, ys)], axis=1) for xs, ys in line.parts]
         sizes = [np.ptp(path, axis=0).max() for path in paths]
+        least = min(_LARGE, max(sizes))
         for (xs, ys), path, size in zip(line.parts, paths, sizes, strict=True):
             free = np.flatnonzero((np.abs(path[:, None] - taken).max(axis=2) > _APART).all(axis=1))
-            if size >= min(_LARGE, max(sizes)) and free.size:
+            if size >= least and free.size:
                 at = free[np.abs(free - len(path) // 2).argmin()]
                 taken = np.vstack([taken, path[at]])
                 yield float(xs[at]), float(ys[at]), line.symbol
