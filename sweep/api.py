@@ -10,6 +10,7 @@ from importlib import import_module
 TYPE_CHECKING = False  # as in `sweep`
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
     from pathlib import Path
     from typing import Any
 
@@ -20,11 +21,12 @@ if TYPE_CHECKING:
     from sweep.engine.reporter import Reporter
     from sweep.plots.picture import plot
     from sweep.results.store import StoreError
+    from sweep.studies.film import Film
     from sweep.studies.predictions import predict
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "boundaries", "critical", "load_config", "open", "plot", "predict", "run",
-    "trajectory",
+    "Config", "ConfigError", "StoreError", "boundaries", "critical", "fit", "load_config", "open", "plot", "predict",
+    "run", "trajectory",
 ]  # fmt: skip
 
 _HOMES = {
@@ -216,6 +218,48 @@ def trajectory(
     with shown(progress, reporter, "sqrt(c/g)") as told:
         checked = load_config(config, {n: v for n, v in values.items() if n not in known}, announce=told.note)
         return trajectory(checked, every=every, stop_when_settled=stop_when_settled, reporter=told, **cells)
+
+
+def fit(
+    config: ConfigLike,
+    film: str | Path | Film,
+    free: Sequence[str],
+    *,
+    progress: bool | None = None,
+    reporter: Reporter | None = None,
+    **overrides: Any,
+) -> xr.Dataset:
+    """Find the body, friction and start that reproduce a film of one body.
+
+    The trajectory begins with the film, whose times are in the unit of the configuration: s with `units: SI`.
+
+    Parameters
+    ----------
+    config, progress, reporter, overrides : as for `run`.  A free parameter that has several values is sought between
+        the least and the largest; one that has a single value, from a fifth to five times it, or within half of it
+        where it may be negative.  All others have one value
+    film : a table of numbers with a header: a time, and a spin ("Gyroscope z (rad/s)") or a heading ("angle (deg)");
+        with a column "error", intervals follow from that, and else from the residuals.  Or a
+        `sweep.studies.film.Film`
+    free : names of the parameters to find
+
+    Returns
+    -------
+    Dataset over (parameter): the `value` that fits best, and the ends of its intervals of 68 and 95 %.  Over (time):
+        the film and the fit.  Over (rank): all minima that were found.  The attribute `undetermined` says what the film
+        does not tell, and `config` runs the fitted body.
+
+    Raises
+    ------
+    ConfigError
+        if the configuration or the film cannot be used, or the configuration is not of one body.
+    """
+    from sweep.config import load_config
+    from sweep.progress import shown
+    from sweep.studies.fit import fit
+
+    with shown(progress, reporter) as told:
+        return fit(load_config(config, overrides, announce=told.note), film, free, told)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:

@@ -11,7 +11,7 @@ import click
 from sweep.cli.faults import Commands
 from sweep.cli.reports import bench, reproduce
 from sweep.cli.results import explore, info, plot
-from sweep.cli.runs import boundaries, critical, run, trajectory
+from sweep.cli.runs import boundaries, critical, fit, run, trajectory
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -27,5 +27,5 @@ def main() -> None:
     """
 
 
-for _command in (run, trajectory, boundaries, critical, reproduce, bench, plot, info, explore):
+for _command in (run, trajectory, boundaries, critical, fit, reproduce, bench, plot, info, explore):
     main.add_command(_command)

@@ -1,4 +1,4 @@
-"""The commands that simulate: `run`, `trajectory`, `boundaries` and `critical`."""
+"""The commands that simulate: `run`, `trajectory`, `boundaries`, `critical` and `fit`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import click
 
 from sweep import interrupt
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, resumable, say
-from sweep.cli.options import CONFIG, OUTPUT, QUIET, SETTINGS, begun_parameters, cells_of, loaded
+from sweep.cli.options import CONFIG, OUTPUT, PATH, QUIET, SETTINGS, begun_parameters, cells_of, loaded
 from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
@@ -187,6 +187,39 @@ def critical(
         click.echo(estimates.of_critical(checked))
     else:
         _written(checked, "critical", partial(search, checked, width, fresh=fresh), **how)
+
+
+@click.command()
+@CONFIG
+@click.argument("film", type=PATH)
+@click.option("--free", required=True, metavar="NAME,NAME", help="The parameters to find, e.g. mu,sigma,n0,x0,y0.")
+@OUTPUT
+@SETTINGS
+@QUIET
+def fit(
+    config: Path, film: Path, free: str, output: Path | None, settings: tuple[str, ...], quiet: bool
+) -> None:  # fmt: skip
+    """Find the parameters of the body in CONFIG that reproduce FILM.
+
+    FILM is a table with a header: a time, and a spin or a heading, such as "Time (s), Gyroscope z (rad/s)".  A free
+    parameter with several values in CONFIG is sought between the least and the largest.  Writes NAME_fit.nc and .png,
+    and NAME_fit.yaml, which runs the fitted body.
+    """
+    checked = loaded(config, settings)
+    from sweep.plots import fit as plots
+    from sweep.progress import Terminal
+    from sweep.results.folder import RunFiles
+    from sweep.results.summary import describe
+    from sweep.studies.fit import fit as find
+
+    interrupt.raise_again()
+    with Terminal(quiet) as terminal, of_option("--free", checked.table):
+        result = find(checked, film, [name.strip() for name in free.split(",")], terminal)
+    files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_fit")
+    files.save_result(result, plots.draw(result))
+    files.configuration.write_text(result.attrs["config"], encoding="utf-8")
+    if not quiet:
+        say(f"{describe(result)}\nwrote {files.dataset}, .png and .yaml")
 
 
 def _written(

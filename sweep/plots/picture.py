@@ -10,11 +10,11 @@ import matplotlib as mpl
 import xarray as xr
 from matplotlib.figure import Figure
 
-from sweep.plots import boundaries, critical, curves, maps, panels, scales, trajectories
+from sweep.plots import boundaries, critical, curves, fit, maps, panels, scales, trajectories
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import subject
 from sweep.plots.scales import Limits
-from sweep.results.kind import BOUNDARIES, CRITICAL, TRAJECTORY, kind
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
@@ -37,7 +37,7 @@ def plot(
     cmap: str | None = None,
     output: str | Path | None = None,
 ) -> Figure:
-    """Draw a dataset of a sweep, of single trajectories, of critical spins or of boundaries.
+    """Draw a dataset of a sweep, of single trajectories, of critical spins, of boundaries or of a fit.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ def plot(
 
     Returns
     -------
-    The figure.  Boundaries have figures of their own, as the command draws them that finds them, and so have critical
-    spins and trajectories of which no `variable` is named.
+    The figure.  Boundaries and fits have figures of their own, as the command draws them that finds them, and so have
+    critical spins and trajectories of which no `variable` is named.
 
     Raises
     ------
@@ -83,18 +83,20 @@ def _drawn(datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any
     """The figure of datasets, of whatever kind they are."""
     kinds = {kind(each) for each in datasets}
     if len(datasets) != 1:
-        if not datasets or kinds & {BOUNDARIES, CRITICAL, TRAJECTORY}:
+        if not datasets or kinds & {BOUNDARIES, CRITICAL, FIT, TRAJECTORY}:
             raise ValueError("several datasets can be drawn side by side only if each is of a run")
         common = variable or subject(datasets[0])
         return maps.draw_beside([panels.choose(each, common, **axes) for each in datasets], **colours)
     (dataset,), (found,) = datasets, kinds
-    if found == BOUNDARIES and variable is not None:
-        raise ValueError(f"variable: not for a figure of {found}, which draws its curves; leave it out")
-    if found in (TRAJECTORY, BOUNDARIES) or (found == CRITICAL and variable is None):
+    if found in (BOUNDARIES, FIT) and variable is not None:
+        raise ValueError(f"variable: not for a figure of {found}, which draws what it is; leave it out")
+    if found in (TRAJECTORY, BOUNDARIES, FIT) or (found == CRITICAL and variable is None):
         if given := [name for name, value in {**axes, **colours}.items() if value]:
             raise ValueError(f"{given[0]}: not for a figure of {found}; name it for the maps of a run alone")
         if found == TRAJECTORY:
             return trajectories.draw(dataset, variable)
+        if found == FIT:
+            return fit.draw(dataset)
         return boundaries.draw(dataset) if found == BOUNDARIES else critical.draw(dataset)
     chosen = panels.choose(dataset, variable, **axes)
     return maps.draw(chosen, **colours) if len(chosen.across) == 2 else curves.draw(chosen, colours["limits"])

@@ -38,6 +38,10 @@ class RunFiles:
         return self.folder / f"{self.name}.png"
 
     @property
+    def configuration(self) -> Path:
+        return self.folder / f"{self.name}.yaml"
+
+    @property
     def checkpoint(self) -> Path:
         return self.folder / f"{self.name}.checkpoint"
 

@@ -1,4 +1,4 @@
-"""Says what a dataset is of: a run, single trajectories, critical spins, or boundaries."""
+"""Says what a dataset is of: a run, single trajectories, critical spins, boundaries, or a fit."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 
 RUN, TRAJECTORY, CRITICAL, BOUNDARIES = "a run", "single trajectories", "critical spins", "boundaries"
+FIT = "a fit"
 
 
 OWN_BODY = "a model"
@@ -25,7 +26,7 @@ def parameters(dataset: xr.Dataset) -> list[str]:
 
 
 def kind(dataset: xr.Dataset) -> str | None:
-    """Which of the four, told by the variables alone; None if it is of another program.
+    """Which of the five, told by the variables alone; None if it is of another program.
 
     Predictions count as a run, and so does a part of one.
     """
@@ -35,4 +36,6 @@ def kind(dataset: xr.Dataset) -> str | None:
         return CRITICAL
     if {"level", "curve", "end_more"} <= set(dataset.variables):
         return BOUNDARIES
+    if {"seen", "fitted", "correlation"} <= set(dataset.variables):
+        return FIT
     return RUN if set(VARIABLES) & set(dataset.data_vars) else None

@@ -10,7 +10,7 @@ import xarray as xr
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import EXISTS, REASONS, STATUSES
-from sweep.results.kind import BOUNDARIES, CRITICAL, TRAJECTORY, kind, parameters
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, TRAJECTORY, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 
 
@@ -33,6 +33,8 @@ def describe(dataset: xr.Dataset) -> str:
         return "\n".join(_critical(dataset))
     if found == BOUNDARIES:
         return "\n".join(_boundaries(dataset))
+    if found == FIT:
+        return "\n".join(_fit(dataset))
     if "status" in dataset:
         return summarize(dataset)
     return "no status: predictions, or a part of a run"
@@ -61,6 +63,22 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
         yield f"open {open_}: a cell near them failed, or did not end before the time limit"
     if uncertain := int((dataset["outcome"] == UNCERTAIN).sum()):
         yield f"uncertain {uncertain}: the count of an end is not decided; it may be as near to the other as its error"
+
+
+def _fit(dataset: xr.Dataset) -> Iterator[str]:
+    """The values and their intervals, what the film does not determine, and how well the curve fits."""
+    yield f"{'':12} {'value':>12}   {'68 %':^25}   {'95 %':^25}"
+    for name in dataset["parameter"].values:
+        one = dataset.sel(parameter=name)
+        ends = (f"{one[f'lower_{n}'].item():11.5g} … {one[f'upper_{n}'].item():<11.5g}" for n in (68, 95))
+        yield f"{name:12} {one['value'].item():12.6g}   {'   '.join(ends)}"
+    yield from filter(None, dataset.attrs["undetermined"].split("; "))
+    if others := int((dataset["misfit"][1:] < 1.05 * dataset["misfit"][0]).sum()):
+        yield f"{others} other minima fit as well, within 5 % of the misfit: see the variable minimum"
+    yield (
+        f"residuals {dataset.attrs['root_mean_square']:.4g}, root mean square; Akaike's criterion "
+        f"{dataset.attrs['akaike']:.6g}; {dataset.attrs['trajectories']} trajectories"
+    )
 
 
 def _trajectories(dataset: xr.Dataset) -> Iterator[str]:

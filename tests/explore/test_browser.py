@@ -206,7 +206,7 @@ def test_the_map_shows_the_dataset(visit: Callable[..., Page], opened: xr.Datase
         if (i, j) == (0, 0):  # failed
             assert share == 0
         elif (i, j) in [(2, 0), (3, 0)]:  # a lower bound, and limited by round-off
-            assert 0.5 < share < 0.95
+            assert 0.5 < share < 0.95  # a boundary runs through both
         elif opened["status"].values[i, j, N0] == 1:
             assert share > 0.8, (i, j)  # a line may run through the cell
     legend = text(page, "legend")

@@ -1,0 +1,75 @@
+"""Samples the spins of many trajectories at instants that they share, as a film does: no images, no looks, no counts.
+
+The steps are dopri5's, and a whole number of them leads from one instant to the next.  Trajectories side by side take
+the same number, so that those which differ little, as the columns of a Jacobian do, differ smoothly.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import Cached, exactly_compiled, full_width, parallel
+from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.layout import LANES, Layout
+from sweep.kernels.runge_kutta import make_step
+from sweep.kernels.tableau import DOPRI5
+from sweep.models.model import Array, Columns, Model, stack
+
+
+def sampled(model: Model, columns: Columns, step: Array, interval: float, count: int) -> Array:
+    """Spins at the times 0, `interval`, …, shape (cells, count); NaN from where a body lifts off or a run diverges.
+
+    Parameters
+    ----------
+    columns : physical parameters by name, each of shape (cells,)
+    step : the longest steps wanted, shape (cells,)
+    interval : from one instant to the next, in the model's unit of time, as `step`
+    count : number of instants
+    """
+    if not len(step):
+        return np.empty((0, count))
+    needed = np.ceil(interval / step).astype(np.int64)
+    order = np.argsort(needed, kind="stable")
+    groups = -(-len(order) // LANES)
+    # Idle lanes of the last group follow its last cell once more.
+    filled = order[np.minimum(np.arange(groups * LANES), len(order) - 1)]
+    steps = needed[filled].reshape(groups, LANES).max(axis=1)
+    rows = np.concatenate([stack(model.start(columns)), stack(tuple(model.constants.of(columns)))])[:, filled]
+    lanes = np.ascontiguousarray(rows.reshape(len(rows), groups, LANES).transpose(1, 0, 2)).reshape(groups, -1)
+    spins = np.empty((groups, count, LANES))
+    _compiled(model)(lanes, interval / steps, steps, spins)
+    found = np.empty((len(order), count))
+    found[order] = spins.transpose(0, 2, 1).reshape(-1, count)[: len(order)]
+    return found
+
+
+@cache
+def _compiled(model: Model) -> Cached:
+    """Compiled (lanes, h, steps, spins) -> None: `sampled` for groups of lanes."""
+    from numba import prange
+
+    names = (*model.states, *(f"constant.{name}" for name in model.constants._fields))
+    layout, n = Layout(names), len(model.states)
+    load_states, load_constants = make_load(names[:n], layout), make_load(names[n:], layout, model.constants)
+    store, step, wide, lanes = make_store(names[:n], layout), make_step(DOPRI5, model.rhs, n), full_width(), LANES
+    lost = compile_inline("lost", f"def lost():\n    return {tuple_of(['np.nan'] * n)}", {"np": np})
+
+    @exactly_compiled
+    def follow(group: Any, h: float, steps: int, spins: Any) -> None:
+        wide()
+        for k in range(len(spins)):
+            for i in range(steps):
+                for lane in range(lanes):
+                    y = load_states(group, lane)
+                    new, spin, _, sound, _, _ = step(y, load_constants(group, lane), h)
+                    store(group, lane, sound, new, lost())
+                    spins[k, lane] = spin if i == 0 else spins[k, lane]
+
+    def run(groups: Any, h: Any, steps: Any, spins: Any) -> None:
+        for g in prange(len(groups)):
+            follow(groups[g], h[g], steps[g], spins[g])
+
+    return parallel(run, f"samples-{model.key}", *model.files)

@@ -1,0 +1,114 @@
+"""A film of a body that spins: its spin, or the angle that it has turned, at instants, from a table of numbers."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sweep.config import ConfigError
+from sweep.config.faults import Fault, brief, either
+from sweep.grid import Array
+
+MOST_ROWS = 20_000
+"""Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
+
+_SPINS = {"rad/s": 1.0, "1/s": 1.0, "": 1.0, "deg/s": np.pi / 180, "°/s": np.pi / 180, "rpm": np.pi / 30}
+_ANGLES = {"rad": 1.0, "": 1.0, "deg": np.pi / 180, "°": np.pi / 180}
+_TIMES = {"s": 1.0, "": 1.0, "ms": 1e-3, "min": 60.0}
+
+# What trackers and phones (phyphox) call their columns, without the unit in parentheses.
+_NAMES = {
+    "time": (_TIMES, ("time", "t")),
+    "spin": (_SPINS, ("spin", "n", "gyroscope z", "gyro z", "omega z", "angular velocity", "wz")),
+    "heading": (_ANGLES, ("heading", "angle", "theta")),
+    "error": (_SPINS | _ANGLES, ("error", "sigma", "uncertainty")),
+}
+
+
+@dataclass(frozen=True)
+class Film:
+    """What was seen, from its first instant on; arrays of shape (instants,)."""
+
+    time: Array
+    """Since the first instant, in the unit of time of the configuration: s in SI."""
+    value: Array
+    """Spin, or heading without wraps, in radian."""
+    error: Array | None
+    """Standard error of each value, if the film tells."""
+    heading: bool
+    """Whether the values are headings."""
+    left_out: int
+    """Rows that hold no number, or that are too many."""
+
+
+def read(path: str | Path) -> Film:
+    """Read a film from a table with a header, columns apart by commas, semicolons or tabs.
+
+    Raises
+    ------
+    ConfigError
+        if there is no such file, or it has no time, neither spin nor heading, an unknown unit, a time that goes back,
+        or too few rows.
+    """
+    path = Path(path)
+    header, rows = _rows(path)
+    found = _columns(path, header)
+    if "time" not in found or not {"spin", "heading"} & set(found):
+        names = either(f"'{name}'" for name in ("spin (rad/s)", "heading (deg)"))
+        raise _fault(path, 1, f"needs a column 'time (s)' and one {names}; it has {brief(', '.join(header))}")
+    what = "spin" if "spin" in found else "heading"
+    time, value = (rows[:, place] * factor for place, factor in (found["time"], found[what]))
+    error = rows[:, found["error"][0]] * found[what][1] if "error" in found else None
+    whole = np.isfinite(time) & np.isfinite(value)
+    back = np.flatnonzero(np.diff(time[whole]) < 0)
+    if len(back):
+        raise _fault(path, int(np.flatnonzero(whole)[back[0] + 1]) + 2, "the time goes back; sort the rows by time")
+    if error is not None and not np.all(error[whole] > 0):
+        raise _fault(path, int(np.flatnonzero(whole & ~(error > 0))[0]) + 2, "the error must be a number > 0")
+    kept = np.flatnonzero(whole)
+    kept = kept[:: -(-len(kept) // MOST_ROWS)] if len(kept) else kept
+    if len(kept) < 8 or time[kept[-1]] == time[kept[0]]:
+        raise _fault(path, None, f"has {len(kept)} rows with a time and a {what}; a fit needs at least 8")
+    value = np.unwrap(value[kept]) if what == "heading" else value[kept]
+    error = None if error is None else error[kept]
+    return Film(time[kept] - time[kept[0]], value, error, what == "heading", len(rows) - len(kept))
+
+
+def _rows(path: Path) -> tuple[list[str], Array]:
+    """The header, and the numbers below it; NaN where there is none."""
+    import pandas
+
+    try:
+        with path.open(encoding="utf-8-sig") as stream:
+            first = stream.readline()
+        mark = max(",;\t", key=first.count)
+        header = next(csv.reader([first.strip()], delimiter=mark), [])
+        table = pandas.read_csv(path, sep=mark, encoding="utf-8-sig", dtype=str, keep_default_na=False)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "is no table of numbers"
+        raise _fault(path, None, f"cannot be read: {reason}") from None
+    numbers = [pandas.to_numeric(table.iloc[:, i], errors="coerce") for i in range(table.shape[1])]
+    return [name.strip() for name in header], np.array(numbers, float).reshape(len(numbers), -1).T
+
+
+def _columns(path: Path, header: list[str]) -> dict[str, tuple[int, float]]:
+    """The place of each known column, and what its numbers are multiplied by."""
+    found: dict[str, tuple[int, float]] = {}
+    for place, written in enumerate(header):
+        name, _, unit = (part.strip() for part in re.sub(r"[)\]]\s*$", "", written).replace("[", "(").partition("("))
+        plain = re.sub(r"[_\s]+", " ", name).lower()
+        for what, (units, names) in _NAMES.items():
+            if plain in names and what not in found:
+                if unit not in units:
+                    known = either(sorted(filter(None, units)))
+                    raise _fault(path, 1, f"{what} is in '{brief(unit, 20)}'; its unit must be {known}")
+                found[what] = place, units[unit]
+    return found
+
+
+def _fault(path: Path, line: int | None, message: str) -> ConfigError:
+    return ConfigError([Fault(str(path), line, None, (), message)])

@@ -1,0 +1,249 @@
+"""Finds the body, friction and start that reproduce a film.
+
+The misfit has many minima: a trajectory that reverses once more is another one.  So the search starts from points all
+over the ranges (Sobol), and first asks for the film up to its first reversal, then up to the next, and so on.
+
+An interval holds the values of a parameter at which the other parameters can keep the misfit, in units of the variance,
+within 1 or 3.84 of its least (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from scipy.stats import qmc
+
+from sweep.config import Config, ConfigError, Values
+from sweep.config.faults import brief, fault_of, suggestion
+from sweep.config.user_models import explained
+from sweep.engine.reporter import Reporter
+from sweep.grid import Array
+from sweep.interrupt import deferred
+from sweep.results import dataset
+from sweep.results.provenance import provenance
+from sweep.studies.film import Film, read
+from sweep.studies.misfit import Minimum, Problem
+from sweep.studies.search import require_simulated
+from sweep.variables import Variable
+
+_TIME = Variable("float64", "1", "time since the film began, in sqrt(c/g)")
+
+LEVELS = {68: 1.0, 95: 3.84}
+"""Percent of an interval, and how far its ends raise the misfit: quantiles of chi square for one parameter."""
+
+POPULATION, KEPT = 256, 8
+"""Points all over the ranges, and the best of them from which the search goes on."""
+
+# Minima whose parameters differ by less than this share of their ranges are one.
+_SAME = 0.01
+
+# A film turns where its average over this part passes from one side of a share of its fastest spin to the other.
+_SMOOTH, _TURN = 50, 0.03
+
+# A direction is not determined if its 95 % interval is longer than this share of the ranges.
+_BLIND = 0.5
+
+# Correlation of two parameters beyond which neither is known without the other.
+_TIED = 0.98
+
+
+@deferred()
+def fit(config: Config, film: str | Path | Film, free: Sequence[str], reporter: Reporter | None = None) -> xr.Dataset:
+    """As `sweep.api.fit`; a film may have been read already."""
+    config = _one_body(config, free)
+    film = film if isinstance(film, Film) else read(film)
+    note = (reporter or Reporter()).note
+    if film.left_out:
+        note(f"{film.left_out} rows of the film are left out: they hold no number, or are more than a fit needs")
+    with explained(config.origin):
+        problem = Problem(config, film, {name: _range(config, name) for name in free})
+        minima = _search(problem, note)
+        best, limits = _intervals(problem, minima[0], note)
+    return _labelled(problem, [best, *minima[1:]], limits)
+
+
+def _one_body(config: Config, free: Sequence[str]) -> Config:
+    """`config` if it describes one body, apart from the `free` parameters; `ConfigError` if not."""
+    require_simulated(config)
+    known = config.tier.parameters
+    if not free:
+        raise fault_of(f"name the free parameters, out of {', '.join(known)}")
+    for name in free:
+        if name not in known:
+            message = f"{brief(name)} is no parameter of the {config.tier.name} model{suggestion(name, known)}"
+            raise fault_of(f"{message}; its parameters are {', '.join(known)}")
+    if config.cases is not None:
+        raise ConfigError([config.fault(("cases",), "cannot be fitted; a fit is of one body")])
+    if more := [name for name in config.axes if name not in free]:
+        raise ConfigError([config.fault(config.table[more[0]].place, "has several values; free it, or give one")])
+    return config
+
+
+def _range(config: Config, name: str) -> tuple[float, float]:
+    """The range in which a parameter is sought: its axis, or from a fifth to five times a positive value."""
+    values, parameter = config.parameters[name], config.table[name]
+    if values.is_axis and len(values.numbers) > 1:
+        return min(values.numbers), max(values.numbers)
+    value = values.numbers[0]
+    if value == 0:
+        message = "give the ends of its range as two values, such as [-1, 1]: it is free, and zero tells no size"
+        raise ConfigError([config.fault(parameter.place, message)])
+    if max(parameter.above, parameter.at_least) >= 0:
+        return value / 5, min(value * 5, parameter.below)
+    return value - abs(value) / 2, value + abs(value) / 2
+
+
+def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
+    """The minima over the whole film, the lowest first."""
+    sobol = qmc.Sobol(len(problem.free), rng=0).random(POPULATION)
+    horizons = list(_horizons(problem.film))
+    cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
+    places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:KEPT]]]
+    for number, instants in enumerate(horizons, start=1):
+        minima = _different(sorted((problem.minimise(place, instants) for place in places), key=lambda m: m.misfit))
+        note(f"film to {problem.film.time[instants - 1]:.4g}: {len(minima)} minima ({number} of {len(horizons)})")
+        places = [each.place for each in minima]
+    return minima
+
+
+def _horizons(film: Film) -> Iterator[int]:
+    """Numbers of instants: up to each turn of the spin, once a tenth of the film is over, and the whole film."""
+    rows = len(film.time)
+    spin = np.gradient(film.value) if film.heading else film.value
+    wide = max(rows // _SMOOTH, 1)
+    smooth = np.convolve(spin, np.full(wide, 1 / wide), "valid")
+    clear = np.flatnonzero(np.abs(smooth) > _TURN * np.abs(smooth).max())
+    turns = [int(later) + wide for before, later in pairwise(clear) if smooth[before] * smooth[later] < 0]
+    yield from (at for at in turns if rows / 10 < at < 0.9 * rows)
+    yield rows
+
+
+def _different(minima: list[Minimum]) -> list[Minimum]:
+    found: list[Minimum] = []
+    for each in minima:
+        if all(np.max(np.abs(each.place - other.place)) > _SAME for other in found):
+            found.append(each)
+    return found
+
+
+def _variance(problem: Problem, best: Minimum) -> float:
+    """The variance of the residuals: 1 if the film tells its errors."""
+    if problem.film.error is not None:
+        return 1.0
+    return best.misfit / (len(problem.film.time) - len(problem.free))
+
+
+def _intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> tuple[Minimum, Array]:
+    """The best minimum, and the ends of the intervals of `LEVELS` as places, shape (levels, 2, free).
+
+    An end at 0 or 1 is that of the range.  Where a profile finds a lower minimum, it begins anew from that.
+    """
+    limits = np.empty((len(LEVELS), 2, len(problem.free)))
+    for i, name in enumerate(problem.free):
+        for level, allowed in enumerate(LEVELS.values()):
+            for side, sign in enumerate((-1, 1)):
+                end, lower = _end(problem, best, i, sign, allowed)
+                if lower is not None:
+                    return _intervals(problem, problem.minimise(lower.place, len(problem.film.time)), note)
+                limits[level, side, i] = end
+        note(f"interval of {name}: {problem.trajectories} trajectories so far")
+    return best, limits
+
+
+def _end(problem: Problem, best: Minimum, i: int, sign: int, allowed: float) -> tuple[float, Minimum | None]:
+    """Where one parameter leaves its interval, and a lower minimum if one is met on the way."""
+    variance, covariance = _variance(problem, best), _covariance(problem, best)
+    size = np.sqrt(max(covariance[i, i], 1e-30))
+    along, reach = covariance[:, i] / size**2, float(np.sqrt(allowed) * size)
+    near, far = 0.0, np.inf
+    for _ in range(8):
+        end = float(np.clip(best.place[i] + sign * reach, 0, 1))
+        start = np.clip(best.place + along * (end - best.place[i]), 0, 1)
+        start[i] = end
+        found = problem.minimise(start, len(problem.film.time), i)
+        above = (found.misfit - best.misfit) / variance
+        if above < -0.01 * allowed:
+            return end, found
+        if abs(above / allowed - 1) < 0.05 or (end in (0, 1) and above < allowed):
+            return end, None
+        reach = abs(end - best.place[i])
+        near, far = (reach, far) if above < allowed else (near, reach)
+        # A profile is nearly a parabola; where it is not, halve.
+        guess = reach * float(np.sqrt(allowed / max(above, 0.05 * allowed)))
+        reach = guess if near < guess < far else (near + far) / 2
+    return float(np.clip(best.place[i] + sign * reach, 0, 1)), None
+
+
+def _covariance(problem: Problem, best: Minimum) -> Array:
+    """Of the places, by the Jacobian; a direction that the film does not see is as wide as its range."""
+    sizes, directions = np.linalg.eigh(best.jacobian.T @ best.jacobian / _variance(problem, best))
+    return np.asarray((directions / np.maximum(sizes, 1.0)) @ directions.T)
+
+
+def _blind(problem: Problem, best: Minimum) -> list[str]:
+    """What the film does not determine, in words."""
+    covariance, names = _covariance(problem, best), list(problem.free)
+    sizes, directions = np.linalg.eigh(covariance)
+    words = []
+    for size, direction in zip(sizes[::-1], directions.T[::-1], strict=True):
+        if 4 * np.sqrt(size) > _BLIND:
+            some = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
+            together = " and ".join(some) + (" together" if len(some) > 1 else "")
+            words.append(f"the film hardly determines {together}: the interval of 95 % is half of the range or more")
+    deviation = np.sqrt(np.diag(covariance))
+    tied = covariance / np.outer(deviation, deviation)
+    words += [
+        f"{names[i]} and {names[j]} are known only together: their correlation is {tied[i, j]:.3f}"
+        for i in range(len(names))
+        for j in range(i)
+        if abs(tied[i, j]) > _TIED
+    ]
+    return words
+
+
+def _labelled(problem: Problem, minima: list[Minimum], limits: Array) -> xr.Dataset:
+    """What was found, with the film and the curve that fits it."""
+    best, film, names = minima[0], problem.film, list(problem.free)
+    covariance, variance = _covariance(problem, best), _variance(problem, best)
+    deviation, rows = np.sqrt(np.diag(covariance)), len(film.time)
+    fitted = film.value + problem.residuals(best.place[None], rows)[0] * problem.error
+    what = Variable("float64", "radian", "heading") if film.heading else Variable("float64", "1", "spin, in sqrt(g/c)")
+    told, clock = (dataset.described(each, problem.config.units) for each in (what, _TIME))
+    ends = {
+        f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})
+        for k, level in enumerate(LEVELS)
+        for end, side in enumerate(("lower", "upper"))
+    }
+    found = xr.Dataset(
+        {
+            "value": ("parameter", problem.values(best.place), {"long_name": "value that fits best"}),
+            **ends,
+            "range_from": ("parameter", problem.low, {"long_name": "least value that was tried"}),
+            "range_to": ("parameter", problem.high, {"long_name": "largest value that was tried"}),
+            "correlation": (("parameter", "other"), covariance / np.outer(deviation, deviation)),
+            "minimum": (("rank", "parameter"), problem.values(np.array([each.place for each in minima]))),
+            "misfit": ("rank", [each.misfit / variance for each in minima], {"long_name": "chi square of a minimum"}),
+            "seen": ("time", film.value, told),
+            "fitted": ("time", fitted, told),
+        },
+        {"parameter": names, "other": names, "time": ("time", film.time, clock)},
+    )  # fmt: skip
+    criterion = rows * np.log(best.misfit / rows) if film.error is None else best.misfit
+    values = dict(zip(names, problem.values(best.place).tolist(), strict=True))
+    return found.assign_attrs(
+        title=f"{problem.config.name}: fitted to a film ({problem.config.model} model)",
+        **provenance(_with(problem.config, values), 0.0, 1),
+        root_mean_square=float(np.sqrt(np.mean((fitted - film.value) ** 2))), akaike=float(criterion + 2 * len(names)),
+        undetermined="; ".join(_blind(problem, best)), trajectories=problem.trajectories,
+    )  # fmt: skip
+
+
+def _with(config: Config, values: Mapping[str, float]) -> Config:
+    """`config` with these values of its parameters."""
+    fixed = {name: Values((value,), False, value) for name, value in values.items()}
+    return replace(config, name=f"{config.name}_fit", parameters=config.parameters | fixed)

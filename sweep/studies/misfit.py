@@ -1,0 +1,138 @@
+"""How far trajectories are from a film: the misfit, a sum of squares of (computed - seen) / error, and its minima.
+
+SciPy minimises.  A trajectory and its neighbours on both sides, the columns of the Jacobian, are one batch of lanes and
+take the same steps: the misfit is as smooth as the motion, where steps that adapt would leave minima of their own
+(Creswell et al. 2024, doi 10.1098/rsif.2023.0369).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+
+from sweep.config import Config
+from sweep.grid import Array
+from sweep.interrupt import point
+from sweep.kernels.methods import PLAIN, automatic_step
+from sweep.kernels.samples import sampled
+from sweep.models.theory.linear import fastest_motion
+from sweep.studies.film import Film
+
+# Samples per radian of the fastest motion, so that splines through them are good to 1e-6 of a ripple.
+_SAMPLES = 8.0
+
+# Half the distance of two columns of the Jacobian, as a share of a parameter's range.
+_NEAR = 3e-6
+
+# A body that lifts off, or a run that diverges, misses every value by this many times the largest one.
+_LOST = 10.0
+
+# A minimum is found when a step changes misfit or place by less than a share, or there is no slope; and the most steps.
+_ENOUGH, _FLAT, _MOST_STEPS = 1e-9, 1e-14, 50
+
+# Error of the spins: far below that of any film.
+_TOLERANCE = 1e-8
+
+
+class Minimum(NamedTuple):
+    """A local minimum."""
+
+    place: Array
+    """The free parameters, as shares of their ranges, shape (free,)."""
+    misfit: float
+    jacobian: Array
+    """Of the residuals with respect to the place, shape (instants, free)."""
+
+
+@dataclass
+class Problem:
+    """A film, and the trajectories that are to reproduce it."""
+
+    config: Config
+    film: Film
+    free: Mapping[str, tuple[float, float]]
+    """The free parameters, and the ends of the ranges in which they are sought."""
+    trajectories: int = 0
+    """How many were computed."""
+
+    def __post_init__(self) -> None:
+        """Choose the instants at which trajectories are sampled: those of an even film are among them."""
+        model = self.config.equations
+        self.low, self.high = (np.array(ends) for ends in zip(*self.free.values(), strict=True))
+        self.ratio = self.low > 0
+        """Where a range of positive numbers is divided evenly in its logarithm."""
+        ends = self.columns(np.linspace(0, 1, 3)[:, None] * np.ones(len(self.free)))
+        fastest = float(np.nanmax(fastest_motion(model, ends)))
+        frames = np.diff(self.film.time)
+        frame = float(np.median(frames[frames > 0]))
+        self.interval = frame / np.ceil(frame * _SAMPLES * fastest)
+        self.error = np.ones(len(self.film.time)) if self.film.error is None else self.film.error
+
+    def values(self, places: Array) -> Array:
+        """The free parameters at places, of the same shape (..., free)."""
+        low, high = (np.where(self.ratio, np.log(np.where(self.ratio, end, 1)), end) for end in (self.low, self.high))
+        found = low + (high - low) * places
+        return np.where(self.ratio, np.exp(np.where(self.ratio, found, 0)), found)
+
+    def columns(self, places: Array) -> dict[str, Array]:
+        """All parameters at places of shape (cells, free)."""
+        values = self.values(places)
+        fixed = {name: np.full(len(places), v.numbers[0]) for name, v in self.config.parameters.items()}
+        return fixed | {name: np.ascontiguousarray(values[:, i]) for i, name in enumerate(self.free)}
+
+    def curves(self, places: Array, times: Array) -> Array:
+        """What a film would see of the trajectories at `places`, shape (cells, times); NaN if one is lost before."""
+        model, columns = self.config.equations, self.columns(places)
+        self.trajectories += len(places)
+        count = int(np.ceil(times[-1] / self.interval)) + 4
+        spins, possible = np.full((len(places), count), np.nan), np.flatnonzero(~model.impossible(columns))
+        columns = {name: values[possible] for name, values in columns.items()}
+        step, _ = automatic_step(PLAIN, model, columns, _TOLERANCE)
+        spins[possible] = sampled(model, columns, step, self.interval, count)
+        lost = ~np.isfinite(spins).all(axis=1)
+        point()
+        spline = CubicSpline(np.arange(count) * self.interval, np.where(lost[:, None], 0.0, spins), axis=1)
+        seen = (spline.antiderivative() if self.film.heading else spline)(times)
+        seen[lost] = np.nan
+        return np.asarray(seen)
+
+    def residuals(self, places: Array, instants: int) -> Array:
+        """(computed - seen) / error at the first `instants` of the film, shape (cells, instants)."""
+        seen, error = self.film.value[:instants], self.error[:instants]
+        away = self.curves(places, self.film.time[:instants]) - seen
+        if self.film.heading:  # no film tells where a heading counts from
+            away -= np.average(away, axis=1, weights=error**-2.0)[:, None]
+        return np.where(np.isnan(away), _LOST * np.abs(seen).max(), away) / error
+
+    def minimise(self, place: Array, instants: int, fixed: int | None = None) -> Minimum:
+        """The minimum near a place, over all parameters but the `fixed` one."""
+        moved = np.array([i for i in range(len(place)) if i != fixed], int)
+        known: dict[bytes, tuple[Array, Array]] = {}
+
+        def look(some: Array) -> tuple[Array, Array]:
+            if (key := some.tobytes()) not in known:
+                known.clear()
+                at = place.copy()
+                at[moved] = some
+                steps = _NEAR * np.eye(len(place))
+                found = self.residuals(np.concatenate([at[None], at + steps, at - steps]), instants)
+                ahead, behind = found[1 : len(place) + 1], found[len(place) + 1 :]
+                known[key] = found[0], (ahead - behind).T / (2 * _NEAR)
+            return known[key]
+
+        if not len(moved):
+            away, jacobian = look(place[moved])
+            return Minimum(place, float(np.sum(away**2)), jacobian)
+        inside = np.clip(place[moved], 1e-9, 1 - 1e-9)
+        found = least_squares(
+            lambda some: look(some)[0], inside, lambda some: look(some)[1][:, moved], bounds=(0, 1), x_scale="jac",
+            max_nfev=_MOST_STEPS, ftol=_ENOUGH, xtol=_ENOUGH, gtol=_FLAT,
+        )  # fmt: skip
+        end = place.copy()
+        end[moved] = found.x
+        return Minimum(end, float(2 * found.cost), look(found.x)[1])

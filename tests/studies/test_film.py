@@ -1,0 +1,98 @@
+"""Films as phones and trackers write them, and what is wrong with others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.config import ConfigError
+from sweep.studies import film
+
+Write = Callable[..., Path]
+
+TIMES = np.arange(20) / 10
+SPINS = np.cos(TIMES)
+
+
+def table(header: str, *columns: np.ndarray, mark: str = ",") -> str:
+    rows = [mark.join(f"{value:.17g}" for value in row) for row in zip(*columns, strict=True)]
+    return "\n".join([header, *rows, ""])
+
+
+@pytest.mark.parametrize(
+    ("header", "mark", "unit"),
+    [
+        ("t,spin", ",", 1.0),
+        ('"Time (s)","Gyroscope x (rad/s)","Gyroscope z (rad/s)"', ",", 1.0),
+        ("time (ms);omega_z [deg/s]", ";", np.pi / 180),
+        ("Time (min)\tspin (rpm)", "\t", np.pi / 30),
+    ],
+)
+def test_spins_come_in_their_units(write: Write, header: str, mark: str, unit: float) -> None:
+    clock = 1e3 if "(ms)" in header else 1 / 60 if "(min)" in header else 1.0
+    between = [np.zeros(20)] if "Gyroscope x" in header else []
+    found = film.read(write(table(header, 5 + TIMES * clock, *between, SPINS / unit, mark=mark), "film.csv"))
+    np.testing.assert_allclose(found.time, TIMES, atol=1e-12)
+    np.testing.assert_allclose(found.value, SPINS, rtol=1e-12)
+    assert found.error is None
+    assert not found.heading
+
+
+def test_a_heading_is_unwrapped(write: Write) -> None:
+    turned = 300 * TIMES  # in degrees; a turn and two thirds
+    found = film.read(write(table("time (s),angle (deg),error (deg)", TIMES, turned % 360, 1 + TIMES), "film.csv"))
+    assert found.heading
+    np.testing.assert_allclose(found.value, np.radians(turned), atol=1e-12)
+    np.testing.assert_allclose(found.error, np.radians(1 + TIMES), rtol=1e-12)
+
+
+def test_rows_without_a_number_are_left_out(write: Write) -> None:
+    spins = SPINS.copy()
+    spins[[3, 7]] = np.nan
+    text = table("time,spin", TIMES, spins).replace("1.3,", "1.3,lost")
+    found = film.read(write(text, "film.csv"))
+    assert found.left_out == 3
+    np.testing.assert_allclose(found.value, np.delete(SPINS, [3, 7, 13]), rtol=1e-12)
+
+
+def test_a_film_of_a_million_rows_is_thinned(write: Write) -> None:
+    times = np.arange(1_000_000) * 1e-5
+    found = film.read(write(table("time,spin", times, np.cos(times)), "film.csv"))
+    assert len(found.time) == film.MOST_ROWS
+    np.testing.assert_allclose(found.value, np.cos(found.time), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("time\n1\n2\n", ":1:", "needs a column 'time (s)' and one 'spin (rad/s)' or 'heading (deg)'; it has time"),
+        ("spin (m/s),time\n1,2\n", ":1:", "spin is in 'm/s'; its unit must be 1/s, deg/s, rad/s, rpm or °/s"),
+        (table("t,spin", TIMES[::-1], SPINS), ":3:", "the time goes back; sort the rows by time"),
+        (table("t,spin,error", TIMES, SPINS, TIMES), ":2:", "the error must be a number > 0"),
+        (table("t,spin", TIMES[:5], SPINS[:5]), ":", "has 5 rows with a time and a spin; a fit needs at least 8"),
+        (table("t,spin", 0 * TIMES, SPINS), ":", "rows with a time"),
+        ("", ":", "cannot be read"),
+        ("\0\0\1", ":", "film.csv"),
+    ],
+)  # fmt: skip
+def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, line: str, words: str) -> None:
+    path = write(text, "film.csv")
+    with pytest.raises(ConfigError) as refusal:
+        film.read(path)
+    assert len(refusal.value.faults) == 1
+    assert words in str(refusal.value)
+    assert f"{path}{line}" in str(refusal.value)
+
+
+def test_a_film_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"film\.csv: cannot be read: No such file"):
+        film.read(tmp_path / "film.csv")
+
+
+def test_repeated_instants_and_gaps_are_kept(write: Write) -> None:
+    times = np.array([0, 0, 0.1, 0.2, 0.2, 3, 3.1, 3.2, 9])
+    found = film.read(write(table("t,n", times, np.cos(times)), "film.csv"))
+    np.testing.assert_array_equal(found.time, times)

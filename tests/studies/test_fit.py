@@ -1,0 +1,154 @@
+"""Fits to films that another code has made, and their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import adaptive, columns
+from support.cli import invoke, refused
+
+import sweep
+from sweep.config import ConfigError
+from sweep.kernels.samples import sampled
+from sweep.models import MODELS
+from sweep.models.ladder import slip
+from sweep.models.model import take
+from sweep.studies.film import Film
+from sweep.studies.misfit import Problem
+
+Write = Callable[..., Path]
+
+SCENE = "name: scene\nfriction: {mu: [30, 100]}\nstart: {n0: [0.03, 0.07], x0: 0.01, y0: 0.01}\n"
+TRUTH = {"mu": 55.0, "n0": 0.052}
+NOISE = 0.001
+
+
+def noisy(values: np.ndarray, noise: float = NOISE) -> np.ndarray:
+    return np.asarray(values + np.random.default_rng(1).normal(0, noise, values.shape))
+
+
+@pytest.fixture(scope="module")
+def seen() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, spins and headings by SciPy's DOP853, with noise, of a body that reverses within them."""
+    times = np.arange(0, 150, 0.5)
+    body = columns(**TRUTH)
+    *states, heading = adaptive.motion(body, times, rtol=1e-10, atol=1e-13)
+    spin = slip.rhs(tuple(states), take(slip.Constants.of(body), 0))[1][0]
+    return times, noisy(spin), noisy(heading, 0.02)
+
+
+@pytest.fixture(scope="module")
+def found(seen: tuple[np.ndarray, ...], tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    path = tmp_path_factory.mktemp("film") / "scene.yaml"
+    path.write_text(SCENE, encoding="utf-8")
+    times, spins, _ = seen
+    return sweep.fit(path, Film(times, spins, None, False, 0), ["mu", "n0"])
+
+
+def test_samples_are_those_of_a_trajectory() -> None:
+    cells = {**columns(mu=[60.0, 20.0, 100.0]), "b": np.array([3.0, 2.0, 6.0])}
+    spins = sampled(MODELS["slip"], cells, np.array([0.02, 0.05, 0.01]), 2.0, 51)
+    for i in range(3):
+        body = {name: values[[i % len(values)]] for name, values in cells.items()}
+        assert spins[i, -1] == pytest.approx(adaptive.spin(body, 100.0), abs=1e-9)
+    many = {name: np.resize(values, 40) for name, values in cells.items()}
+    again = sampled(MODELS["slip"], many, np.full(40, 0.01), 2.0, 51)
+    np.testing.assert_array_equal(again[2::3], np.broadcast_to(spins[2], (13, 51)))
+
+
+def test_a_body_that_lifts_off_has_no_spin_from_then_on() -> None:
+    cells = columns(n0=[0.05, 5.0], x0=[0.01, 5.0])
+    spins = sampled(MODELS["slip"], cells, np.full(2, 0.01), 0.5, 100)
+    assert np.isfinite(spins[0]).all()
+    assert np.isnan(spins[1, -1])
+
+
+def test_the_truth_is_found_and_lies_in_the_intervals(found: xr.Dataset, seen: tuple[np.ndarray, ...]) -> None:
+    assert found.parameter.values.tolist() == ["mu", "n0"]
+    true = np.array(list(TRUTH.values()))
+    assert np.all((found.lower_95 < true) & (true < found.upper_95))
+    assert np.all((found.lower_95 < found.lower_68) & (found.upper_68 < found.upper_95))
+    assert np.all((found.upper_95 - found.lower_95) / true < [0.2, 0.01])
+    assert found.attrs["root_mean_square"] == pytest.approx(NOISE, rel=0.1)
+    assert not found.attrs["undetermined"]
+    np.testing.assert_array_equal(found.seen, seen[1])
+
+
+def test_an_interval_ends_where_the_misfit_has_risen_by_a_quantile(write: Write, seen: tuple[np.ndarray, ...]) -> None:
+    """Of one parameter alone the profile is the misfit itself, which a scan of trajectories tells."""
+    times, spins, _ = seen
+    film = Film(times, spins, np.full(len(times), NOISE), False, 0)
+    found = sweep.fit(write(SCENE), film, ["mu"], n0=TRUTH["n0"])
+    problem = Problem(sweep.load_config(write(SCENE), {"n0": TRUTH["n0"]}), film, {"mu": (40.0, 70.0)})
+
+    def misfit(mu: float) -> float:
+        return float(np.sum(problem.residuals(np.log([[mu / 40]]) / np.log(70 / 40), len(times)) ** 2))
+
+    least = misfit(found.value.item())
+    assert found.misfit[0].item() == pytest.approx(least, rel=1e-6)
+    for level, rise in ((68, 1.0), (95, 3.84)):
+        for side in ("lower", "upper"):
+            assert misfit(found[f"{side}_{level}"].item()) - least == pytest.approx(rise, rel=0.06)
+
+
+def test_a_heading_tells_the_same(write: Write, seen: tuple[np.ndarray, ...]) -> None:
+    """Wherever it counts from, and with its wraps."""
+    times, _, heading = seen
+    rows = "".join(f"{time},{value % 360}\n" for time, value in zip(times, np.degrees(heading + 2), strict=True))
+    found = sweep.fit(write(SCENE), write("time,heading (deg)\n" + rows, "film.csv"), ["mu", "n0"])
+    true = np.array(list(TRUTH.values()))
+    assert np.all((found.lower_95 < true) & (true < found.upper_95))
+    assert found.seen.attrs["units"] == "radian"
+
+
+def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
+    """A body that spins upright has no friction, and one that hardly rattles none that could be seen."""
+    times = np.arange(0, 50, 0.5)
+    film = Film(times, noisy(np.full(len(times), 0.05)), None, False, 0)
+    found = sweep.fit(write(SCENE), film, ["mu", "n0"], x0=0.0, y0=0.0)
+    assert found.attrs["undetermined"].startswith("the film hardly determines mu: the interval")
+    assert [found[f"{side}_95"].values[0] for side in ("lower", "upper")] == pytest.approx([30, 100])
+    assert abs(found.value.values[1] - 0.05) < 1e-3
+
+
+def test_the_command_writes_what_runs_the_fitted_body(
+    write: Write, seen: tuple[np.ndarray, ...], found: xr.Dataset, tmp_path: Path
+) -> None:
+    times, spins, _ = seen
+    rows = "".join(f"{time},{spin}\n" for time, spin in zip(times, spins, strict=True))
+    film = write("Time (s),Gyroscope z (rad/s)\n" + rows, "film.csv")
+    said = invoke("fit", write(SCENE), film, "--free", "mu,n0", "--output", tmp_path / "out")
+    assert said.exit_code == 0, said.output
+    assert "95 %" in said.stdout
+    written = sweep.open(tmp_path / "out" / "scene_fit.nc")
+    xr.testing.assert_equal(written.drop_attrs(), found.drop_attrs())
+    body = sweep.load_config(tmp_path / "out" / "scene_fit.yaml")
+    assert body.name == "scene_fit"
+    assert body.parameters["mu"].numbers[0] == written.value.values[0]
+    for verb in ("info", "plot"):
+        assert invoke(verb, tmp_path / "out" / "scene_fit.nc").exit_code == 0
+    refused(invoke("explore", "--no-browser", tmp_path / "out" / "scene_fit.nc"), "has a fit; open a dataset of run")
+
+
+@pytest.mark.parametrize(
+    ("free", "overrides", "words"),
+    [
+        (["muu"], {}, "muu is no parameter of the slip model (did you mean mu?); its parameters are a, b"),
+        ([], {}, "name the free parameters"),
+        (["n0"], {}, "has several values; free it, or give one"),
+        (["mu", "n0", "x0"], {"x0": 0.0}, "give the ends of its range as two values"),
+        (["mu"], {"model": "analytic", "n0": 0.05}, "is a formula and cannot be simulated"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(
+    write: Write, free: list[str], overrides: dict[str, object], words: str
+) -> None:
+    film = Film(np.arange(9.0), np.ones(9), None, False, 0)
+    with pytest.raises(ConfigError) as refusal:
+        sweep.fit(write(SCENE), film, free, **overrides)
+    assert words in str(refusal.value)
+    assert len(refusal.value.faults) == 1
