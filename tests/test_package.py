@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -69,10 +70,11 @@ def sweep(python: Path, folder: Path, *arguments: str) -> str:
     return call(folder, python, "-m", "sweep", *arguments)
 
 
-def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
-    listed = call(ROOT, "git", "ls-files", "--cached", "--others", "--exclude-standard", "sweep").split()
+def test_wheel_holds_every_file_of_the_package_and_the_configurations(wheel: Path) -> None:
+    listed = call(ROOT, "git", "ls-files", "--cached", "--others", "--exclude-standard", "sweep", "configs").split()
+    expected = {re.sub("^configs/", "sweep/examples/", name) for name in listed if name != "sweep/examples"}
     with zipfile.ZipFile(wheel) as archive:
-        assert {name for name in archive.namelist() if name.startswith("sweep/")} == set(listed)
+        assert {name for name in archive.namelist() if name.startswith("sweep/")} == expected
 
 
 VERBS = {
@@ -84,6 +86,8 @@ VERBS = {
     "critical small.yaml --width 0.1": ["runs/small/small_critical.nc", "runs/small/small_critical.png"],
     "plot runs/small/small.nc --var energy_error": ["runs/small/small_energy_error.png"],
     "info runs/small/small.nc": [],
+    "body --mass 30g --length 12cm --width 3cm --height 15mm": [],
+    "examples celtic_stone": ["celtic_stone.yaml", "celtic_stone.py"],
     "reproduce --help": [],
     "bench --help": [],
 }  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import click
 
+from sweep.cli.configurations import body, examples
 from sweep.cli.faults import Commands
 from sweep.cli.reports import bench, reproduce
 from sweep.cli.results import explore, info, plot
@@ -27,5 +28,7 @@ def main() -> None:
     """
 
 
-for _command in (run, trajectory, boundaries, critical, fit, reproduce, bench, plot, info, explore):
+for _command in (
+    examples, body, run, trajectory, boundaries, critical, fit, reproduce, bench, plot, info, explore,
+):  # fmt: skip
     main.add_command(_command)

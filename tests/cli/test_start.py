@@ -15,10 +15,10 @@ from support import ROOT, SMALL
 
 Write = Callable[..., Path]
 
-HEAVY = {"numba", "llvmlite", "xarray", "pandas", "netCDF4", "dask", "distributed", "matplotlib", "scipy"}
+HEAVY = {"numba", "llvmlite", "xarray", "pandas", "netCDF4", "dask", "distributed", "matplotlib", "scipy", "pint"}
 """Each takes from a tenth of a second to a whole one."""
 
-HELP = [["--help"], ["--version"], ["run", "--help"], ["run", "--colour"], ["run"], ["colour"]]
+HELP = [["--help"], ["--version"], ["run", "--help"], ["body", "--help"], ["run", "--colour"], ["run"], ["colour"]]
 
 REFUSED = {
     "not YAML": ("run", "body: {b: 3\n"),

@@ -1,0 +1,97 @@
+"""The commands that write a configuration: `body` and `examples`."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from sweep.cli.faults import refuse, say
+from sweep.cli.options import PATH
+from sweep.parameters import PARAMETERS
+
+MEASURED = {
+    "mass": ("mass", "Mass, such as 30g."),
+    "length": ("a", "Length of the solid, such as 12.0+-0.1cm."),
+    "width": ("b", "Width of the solid."),
+    "height": ("c", "Height of the solid."),
+    "radius_long": ("a", "Radius of curvature along the body at its lowest point."),
+    "radius_short": ("b", "Radius of curvature across the body at its lowest point."),
+    "a": ("a", "Semi-axis of the surface along the body."),
+    "b": ("b", "Semi-axis of the surface across the body."),
+    "c": ("c", "Semi-axis of the surface, upright."),
+    "angle": ("delta", "Angle from the surface's axes to the axes of inertia, such as 2deg [default: 0]."),
+}
+"""What can be measured of a body: the parameter whose unit and bounds it has, and the help of its option."""
+
+_EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def _measured(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of what can be measured."""
+    for name, (_, words) in reversed(MEASURED.items()):
+        command = click.option(f"--{name.replace('_', '-')}", metavar="NUMBER[+-ERROR]UNIT", help=words)(command)
+    return command
+
+
+@click.command()
+@_measured
+@click.option("--whole", is_flag=True, help="A whole ellipsoid, not its lower half, flat on top.")
+def body(whole: bool, **texts: str | None) -> None:
+    """Print a configuration of a rattleback that was measured.
+
+    It is a homogeneous solid, by default the lower half of an ellipsoid.  Lengths may have any unit.
+    Give the mass, and for each direction a size, a radius of curvature or a semi-axis; where there
+    are two, the size is that of the solid, the other that of the surface.
+    """
+    from sweep.config import load_config
+    from sweep.config.document import parse_value
+    from sweep.config.measured import configuration, measured
+
+    given = {
+        name: measured(f"--{name.replace('_', '-')}", text, PARAMETERS[MEASURED[name][0]])
+        for name, text in texts.items()
+        if text is not None
+    }
+    text = configuration(given, whole=whole)
+    load_config(parse_value(text, "body"))
+    click.echo(text, nl=False)
+
+
+@click.command()
+@click.argument("name", required=False)
+@click.option("--output", type=PATH, default=".", help="Folder to copy it to [default: this one].")
+def examples(name: str | None, output: Path) -> None:
+    """List the configurations that come with the package, or copy the one called NAME.
+
+    The model and the table of cases that it names are copied as well.  No file is overwritten.
+    """
+    shipped = {path.stem: path for path in sorted(_EXAMPLES.glob("*.yaml"))}
+    if name is None:
+        width = max(map(len, shipped))
+        for stem, path in shipped.items():
+            first = path.read_text(encoding="utf-8").splitlines()[0]
+            say(f"{stem:{width}}  {first.removeprefix('# ')}")
+        return
+    if name not in shipped:
+        from sweep.config.faults import brief, suggestion
+
+        refuse(f"examples {brief(name)}", f"no such example{suggestion(name, shipped)}; `sweep examples` lists them")
+    for path in (copied := _with_companions(shipped[name])):
+        if (output / path.name).exists():
+            refuse(str(output / path.name), "exists already; choose another folder by --output")
+    output.mkdir(parents=True, exist_ok=True)
+    for path in copied:
+        shutil.copyfile(path, output / path.name)
+        say(f"wrote {output / path.name}")
+
+
+def _with_companions(path: Path) -> list[Path]:
+    """Return a configuration, and the files beside it that it names."""
+    from sweep.config.document import read
+
+    values = read(path).values
+    named = [path.parent / values[key] for key in ("model", "cases") if key in values]
+    return [path, *(each for each in named if each.is_file())]

@@ -1,0 +1,130 @@
+"""The commands `body` and `examples`: what they write runs as it is, and what they refuse is one line."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from support import ROOT
+from support.cli import invoke, refused
+
+import sweep
+
+TOY = ("--mass", "30g", "--length", "12.0±0.1cm", "--width", "3 cm", "--height", "15mm", "--angle", "2.0 +- 0.5 deg")
+
+
+def printed(*arguments: str) -> str:
+    result = invoke("body", *arguments)
+    assert result.exit_code == 0, result.stderr
+    return result.stdout
+
+
+def loaded(text: str, folder: Path) -> dict[str, float]:
+    """The body of a configuration, by name."""
+    (folder / "toy.yaml").write_text(text, encoding="utf-8")
+    config = sweep.load_config(folder / "toy.yaml")
+    assert config.units == "SI"
+    return {name: config.parameters[name].numbers[0] for name in re.findall(r"^  (\w+): ", text, re.MULTILINE)}
+
+
+def test_what_is_printed_loads_with_the_numbers_measured(tmp_path: Path) -> None:
+    found = loaded(printed(*TOY), tmp_path)
+    assert list(found) == ["a", "b", "c", "offset", "mass", "Ixx", "Iyy", "Izz", "Ixy"]
+    expected = {
+        "a": 0.06,
+        "b": 0.015,
+        "c": 0.015,
+        "offset": 0.005625,
+        "mass": 0.03,
+        "Izz": 0.006 * (0.06**2 + 0.015**2),
+    }
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-5)
+    assert found["Ixy"] < 0
+
+
+def test_units_of_one_size_are_one_body() -> None:
+    sizes = {"--mass": ("30g", "0.03 kg"), "--length": ("12cm", "0.12m"), "--width": ("3cm", "30mm"),
+             "--height": ("15e-3 m", "1.5cm"), "--angle": ("1.8deg", "0.0314159265358979rad")}  # fmt: skip
+    one, other = (printed(*(w for name, both in sizes.items() for w in (name, both[i]))) for i in (0, 1))
+    assert one.partition("units:")[2] == other.partition("units:")[2]
+    assert one != other  # what was given is told
+
+
+def test_errors_stand_beside_what_they_make_uncertain() -> None:
+    text = printed(*TOY)
+    lines = dict(re.findall(r"^  (\w+): \S+  # (.*)$", text, re.MULTILINE))
+    assert (lines["a"], lines["b"], lines["mass"]) == ("± 0.0005 m", "m", "kg")
+    assert re.fullmatch(r"± 1.8e-07 kg m2", lines["Ixy"])
+    assert "±" not in printed(*(re.sub(r" ?(±|\+-) ?[\d.]+", "", word) for word in TOY)).partition("body:\n")[2]
+
+
+def test_a_measured_body_runs_and_turns_back_from_one_spin_alone(tmp_path: Path) -> None:
+    (tmp_path / "toy.yaml").write_text(printed(*TOY), encoding="utf-8")
+    found = sweep.run(tmp_path / "toy.yaml", t_end=10.0)
+    assert (found["reversals"] > 0).values.tolist() == [False, True]
+
+
+REFUSED = {
+    "": "body: not all is known; give --mass as well",
+    "--mass 30g --width 3cm --height 1cm": "give --length, --radius-long or --a as well",
+    "--mass 30g --length 12cm --width 3cm": "give --height or --c as well",
+    "--mass 30": "--mass: must be a number with its unit, such as 30.0+-0.1g, not '30'",
+    "--mass 30cm": "--mass: must be a number with its unit",
+    "--mass 30colours": "--mass: must be a number with its unit",
+    "--length 12c": "--length: must be a number with its unit, such as 12.0+-0.1cm, not '12c'",
+    "--length 12and": "--length: must be a number with its unit",
+    "--length -12cm": "--length: must be a finite number > 0 and < 1e+06, in m, with an error >= 0, not '-12cm'",
+    "--length 12±-1cm": "--length: must be a finite number",
+    "--length 12±1e999cm": "--length: must be a finite number",
+    "--angle 100deg": "--angle: must be a finite number > -1.5708",
+    "--mass 30g --radius-long 1m --a 6cm --width 3cm --height 1cm": "--a: cannot be combined with --radius-long",
+    "--mass 30g --length 12cm --width 2cm --height 15mm": "--radius-short: the body falls over, since this is 0.00667 m",
+    "--mass 30g --length 12cm --width 3cm --height 15mm --c 1mm": "body: centre of mass outside the ellipsoid",
+}
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_what_cannot_be_a_body_is_one_line(words: str) -> None:
+    result = invoke("body", *words.split())
+    refused(result, REFUSED[words])
+    assert result.stdout == ""
+
+
+CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+
+
+def test_every_configuration_is_listed_with_its_first_line() -> None:
+    lines = invoke("examples").stdout.splitlines()
+    assert [line.split(maxsplit=1)[0] for line in lines] == [path.stem for path in CONFIGS]
+    for line, path in zip(lines, CONFIGS, strict=True):
+        words = line.split(maxsplit=1)[1]
+        assert path.read_text(encoding="utf-8").startswith(f"# {words}\n")
+        assert words[-1] in ".?", "a line of its own"
+
+
+@pytest.mark.parametrize("name", [path.stem for path in CONFIGS])
+def test_a_copied_example_loads_and_is_not_overwritten(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "new"
+    assert invoke("examples", name, "--output", folder).exit_code == 0
+    for copy in folder.iterdir():
+        assert copy.read_bytes() == (ROOT / "configs" / copy.name).read_bytes()
+    assert sweep.load_config(folder / f"{name}.yaml").name == name
+    (folder / f"{name}.yaml").write_text("mine", encoding="utf-8")
+    refused(invoke("examples", name, "--output", folder), f"{name}.yaml: exists already; choose another folder")
+    assert (folder / f"{name}.yaml").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_table_of_cases_is_copied_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shipped = tmp_path / "shipped"
+    shipped.mkdir()
+    (shipped / "tabled.yaml").write_text("# A table.\ncases: table.csv\n", encoding="utf-8")
+    (shipped / "table.csv").write_text("mu\n60\n", encoding="utf-8")
+    monkeypatch.setattr("sweep.cli.configurations._EXAMPLES", shipped)
+    monkeypatch.chdir(tmp_path)
+    assert invoke("examples", "tabled").stdout == "wrote tabled.yaml\nwrote table.csv\n"
+    assert (tmp_path / "table.csv").read_text(encoding="utf-8") == "mu\n60\n"
+
+
+def test_an_unknown_example_is_one_line() -> None:
+    refused(invoke("examples", "woden"), "examples woden: no such example (did you mean wooden?)")
