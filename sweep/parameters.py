@@ -124,6 +124,9 @@ PARAMETERS: dict[str, Parameter] = {
     for name, meaning, default, bounds in rows
 }
 
+DENSITY = Parameter("density", "", "kg/m^3", "density of a body of one material", None, **_MASS)
+"""No key of a configuration: it is measured instead of the mass."""
+
 PAPER_PARAMETERS: dict[str, Parameter] = {
     name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")
 }

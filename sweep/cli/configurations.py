@@ -10,21 +10,22 @@ import click
 
 from sweep.cli.faults import refuse, say
 from sweep.cli.options import PATH
-from sweep.parameters import PARAMETERS
+from sweep.parameters import DENSITY, PARAMETERS, Parameter
 
-MEASURED = {
-    "mass": ("mass", "Mass, such as 30g."),
-    "length": ("a", "Length of the solid, such as 12.0+-0.1cm."),
-    "width": ("b", "Width of the solid."),
-    "height": ("c", "Height of the solid."),
-    "radius_long": ("a", "Radius of curvature along the body at its lowest point."),
-    "radius_short": ("b", "Radius of curvature across the body at its lowest point."),
-    "a": ("a", "Semi-axis of the surface along the body."),
-    "b": ("b", "Semi-axis of the surface across the body."),
-    "c": ("c", "Semi-axis of the surface, upright."),
-    "angle": ("delta", "Angle from the surface's axes to the axes of inertia, such as 2deg [default: 0]."),
+MEASURED: dict[str, tuple[Parameter, str]] = {
+    "mass": (PARAMETERS["mass"], "Mass, such as 30g."),
+    "density": (DENSITY, "Density, such as 1.24g/cm3, instead of the mass."),
+    "length": (PARAMETERS["a"], "Length of the solid, such as 12.0+-0.1cm."),
+    "width": (PARAMETERS["b"], "Width of the solid."),
+    "height": (PARAMETERS["c"], "Height of the solid."),
+    "radius_long": (PARAMETERS["a"], "Radius of curvature along the body at its lowest point."),
+    "radius_short": (PARAMETERS["b"], "Radius of curvature across the body at its lowest point."),
+    "a": (PARAMETERS["a"], "Semi-axis of the surface along the body."),
+    "b": (PARAMETERS["b"], "Semi-axis of the surface across the body."),
+    "c": (PARAMETERS["c"], "Semi-axis of the surface, upright."),
+    "angle": (PARAMETERS["delta"], "Angle from the surface's axes to the axes of inertia, such as 2deg [default: 0]."),
 }
-"""What can be measured of a body: the parameter whose unit and bounds it has, and the help of its option."""
+"""What can be measured: the parameter whose unit and bounds it has, and the help of its option."""
 
 _EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -39,23 +40,27 @@ def _measured(command: Callable[..., None]) -> Callable[..., None]:
 @click.command()
 @_measured
 @click.option("--whole", is_flag=True, help="A whole ellipsoid, not its lower half, flat on top.")
-def body(whole: bool, **texts: str | None) -> None:
+@click.option("--stl", type=PATH, help="STL file of the shape, in millimetres, z up as it stands on a table.")
+def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
     """Print a configuration of a rattleback that was measured.
 
     It is a homogeneous solid, by default the lower half of an ellipsoid.  Lengths may have any unit.
     Give the mass, and for each direction a size, a radius of curvature or a semi-axis; where there
-    are two, the size is that of the solid, the other that of the surface.
+    are two, the size is that of the solid, the other that of the surface.  With --stl, give only the
+    mass or the density.
     """
+    if stl and whole:
+        refuse("--whole", "cannot be combined with --stl; leave out one of the two")
     from sweep.config import load_config
     from sweep.config.document import parse_value
-    from sweep.config.measured import configuration, measured
+    from sweep.config.measured import measured, of_shape, of_solid
 
     given = {
-        name: measured(f"--{name.replace('_', '-')}", text, PARAMETERS[MEASURED[name][0]])
+        name: measured(f"--{name.replace('_', '-')}", text, MEASURED[name][0])
         for name, text in texts.items()
         if text is not None
     }
-    text = configuration(given, whole=whole)
+    text = of_shape(given, stl) if stl else of_solid(given, whole=whole)
     load_config(parse_value(text, "body"))
     click.echo(text, nl=False)
 

@@ -3,30 +3,42 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import pint
 
-from sweep.config.faults import either, fault_of, refusal
-from sweep.models.general import solids
-from sweep.parameters import PARAMETERS, SI, Parameter
+from sweep.config.faults import either, fault_of, printable, refusal
+from sweep.models.general import meshes, solids
+from sweep.parameters import DENSITY, PARAMETERS, SI, Parameter
 from sweep.variables import in_si
 
 _NUMBER = r"[-+]?(?:\.\d+|\d+(?:\.\d*)?)(?:[eE][-+]?\d+)?"
-_QUANTITY = re.compile(rf"(?P<value>{_NUMBER}) *(?:(?:±|\+/?-) *(?P<error>{_NUMBER}))? *(?P<unit>°|[^\W\d_]+)")
-_EXAMPLES = {"m": "12.0+-0.1cm", "kg": "30.0+-0.1g", "radian": "2.0+-0.5deg"}
+_UNIT = r"°|[^\W\d_]+(?:/[^\W\d_]+\^?3?)?"
+_QUANTITY = re.compile(rf"(?P<value>{_NUMBER}) *(?:(?:±|\+/?-) *(?P<error>{_NUMBER}))? *(?P<unit>{_UNIT})")
+_EXAMPLES = {"m": "12.0+-0.1cm", "kg": "30.0+-0.1g", "radian": "2.0+-0.5deg", DENSITY.units: "1.24+-0.02g/cm3"}
 _UNITS: pint.UnitRegistry[float] = pint.UnitRegistry()
 
-_NEEDED = [["mass"], *([size, *filter(None, [solids.RADII.get(axis)]), axis] for axis, size in solids.SIZES.items())]
-"""What has to be known: for each, the names of the measurements that tell it."""
+_MILLIMETRE = 1e-3
+_MASS = ("mass", "density")
+_AXES = [[size, *filter(None, [solids.RADII.get(axis)]), axis] for axis, size in solids.SIZES.items()]
+"""For each semi-axis, the names of the measurements that tell it."""
 
-_WRITTEN = """\
+_SOLID = """\
 # A homogeneous solid {solid}, by `python -m sweep body` from
 #   {said}.
 # The solid has the semi-axes A, B, C: its inertia about the ellipsoid's centre is m diag(B² + C², A² + C², A² + B²)/5,
 # and its centre of mass lies {below} (E. W. Weisstein, mathworld.wolfram.com, "Ellipsoid" and "Hemisphere").
 # The axes of inertia are then turned by the angle; without one, nothing tells one sense of spin from the other.
+"""
+_SHAPE = """\
+# A homogeneous solid of the shape {file}, in millimetres and z up, by `python -m sweep body` from
+#   {said}.
+# Its inertia is an integral over the tetrahedra of its triangles and a point, by the divergence theorem.  The ellipsoid
+# of a, b and c is fitted to the lowest tenth of its height, within {misfit:.2g} m.
+"""
+_BODY = """\
 # Behind ± are errors, to first order, if those of the measurements are independent.
 units: {units}
 body:
@@ -46,6 +58,10 @@ class Measured:
     said: str
 
 
+Given = Mapping[str, Measured]
+"""What was measured, by the names of the parameters of `sweep.models.general.solids.body`."""
+
+
 def measured(option: str, text: str, parameter: Parameter) -> Measured:
     """Read a number with its unit and perhaps its error, such as "12.0+-0.1 cm".
 
@@ -61,10 +77,11 @@ def measured(option: str, text: str, parameter: Parameter) -> Measured:
     """
     unit, found = _unit(parameter), _QUANTITY.fullmatch(text.strip())
     try:
-        factor = float(_UNITS.Quantity(1.0, found["unit"]).to(unit).magnitude) if found else 0.0
-    except (pint.PintError, AttributeError):
-        factor = 0.0
-    if not found or not factor:
+        spelled = re.sub(r"\^?3$", "**3", found["unit"]) if found else ""  # as Pint wants cm3
+        factor = float(_UNITS.Quantity(1.0, spelled).to(unit).magnitude)
+    except pint.PintError:
+        found = None
+    if not found:
         raise fault_of(refusal(text, f"a number with its unit, such as {_EXAMPLES[unit]}"), file=option)
     value, error = (float(found[name] or 0) * factor for name in ("value", "error"))
     if not (parameter.allows(value) and 0 <= error < float("inf")):
@@ -72,7 +89,7 @@ def measured(option: str, text: str, parameter: Parameter) -> Measured:
     return Measured(value, error, f"{option} {text.strip()}")
 
 
-def configuration(given: Mapping[str, Measured], *, whole: bool) -> str:
+def of_solid(given: Given, *, whole: bool) -> str:
     """Return the text of a configuration, in SI units, of the body that `sweep.models.general.solids.body` makes.
 
     Raises
@@ -80,41 +97,69 @@ def configuration(given: Mapping[str, Measured], *, whole: bool) -> str:
     ConfigError
         if something is missing or given twice, or if the body does not stand.
     """
-    _check_names(given)
-    values = {"angle": 0.0} | {name: each.value for name, each in given.items()}
-    errors = {name: each.error for name, each in given.items() if each.error}
-    found = solids.body(values, whole=whole)
-    spread = solids.propagated(lambda numbers: solids.body(numbers, whole=whole), values, errors)
+    _check_names(given, [_MASS, *_AXES])
+    head = _SOLID.format(
+        solid="ellipsoid" if whole else "half-ellipsoid, flat on top",
+        below="there" if whole else "3C/8 below that",
+        said=_said(given),
+    )
+    return head + _body(lambda numbers: solids.body({"angle": 0.0, **numbers}, whole=whole), given)
+
+
+def of_shape(given: Given, file: Path) -> str:
+    """Return the text of a configuration, in SI units, of the body whose shape is in an STL file, in millimetres.
+
+    Raises
+    ------
+    OSError
+        if the file cannot be read.
+    ConfigError
+        if more is given than a mass or a density, or if the shape is none or does not stand.
+    """
+    _check_names(given, [_MASS])
+    for option in _options([name for name in given if name not in _MASS]):
+        raise fault_of("cannot be combined with --stl; leave out one of the two", file=option)
+    try:
+        solid = meshes.mesh(meshes.triangles(file.read_bytes()) * _MILLIMETRE)
+    except ValueError as error:
+        raise fault_of(str(error), file=f"--stl {file}") from None
+    head = _SHAPE.format(file=printable(file.name), said=_said(given), misfit=solid.misfit)
+    return head + _body(lambda numbers: meshes.body(solid, numbers), given)
+
+
+def _body(formula: Callable[[solids.Numbers], solids.Numbers], given: Given) -> str:
+    """Return the lines of a configuration whose body `formula` makes of what was measured."""
+    values, errors = ({name: getattr(each, part) for name, each in given.items()} for part in ("value", "error"))
+    found, spread = formula(values), solids.propagated(formula, values, errors)
     _check_stands(found)
     entries = (
         f"  {name}: {value + 0.0:.6g}  #{f' ± {spread[name]:.2g}' if spread[name] else ''} {_unit(PARAMETERS[name])}"
         for name, value in found.items()
     )
-    return _WRITTEN.format(
-        solid="ellipsoid" if whole else "half-ellipsoid, flat on top",
-        below="there" if whole else "3C/8 below that",
-        said=", ".join(each.said for each in given.values()),
-        units=SI, entries="\n".join(entries), x0=found["a"] / 50, y0=found["b"] / 50,
-    )  # fmt: skip
+    return _BODY.format(units=SI, entries="\n".join(entries), x0=found["a"] / 50, y0=found["b"] / 50)
+
+
+def _said(given: Given) -> str:
+    return ", ".join(each.said for each in given.values())
 
 
 def _unit(parameter: Parameter) -> str:
     return in_si(parameter.units, parameter.long_name)[0]
 
 
-def _options(names: list[str]) -> list[str]:
+def _options(names: Sequence[str]) -> list[str]:
     return [f"--{name.replace('_', '-')}" for name in names]
 
 
-def _check_names(given: Mapping[str, Measured]) -> None:
-    """Refuse what is missing, and a semi-axis beside the radius that tells it as well."""
-    for names in _NEEDED:
+def _check_names(given: Given, needed: Sequence[Sequence[str]]) -> None:
+    """Refuse that all names of a group are missing, and two that tell the same."""
+    for names in needed:
         if not given.keys() & {*names}:
             raise fault_of(f"not all is known; give {either(_options(names))} as well", file="body")
-    for twice in solids.RADII.items():
+    for twice in (_MASS, *solids.RADII.items()):
         if {*twice} <= given.keys():
-            axis, radius = _options([*twice])
-            raise fault_of(f"cannot be combined with {radius}; leave out one of the two", file=axis)
+            one, other = _options(twice)
+            raise fault_of(f"cannot be combined with {other}; leave out one of the two", file=one)
 
 
 def _check_stands(body: Mapping[str, float]) -> None:
@@ -124,7 +169,7 @@ def _check_stands(body: Mapping[str, float]) -> None:
         if (found := body[axis] ** 2 / body["c"]) <= height:
             (option,) = _options([radius])
             raise fault_of(
-                f"the body falls over, since this is {found:.3g} m and the centre of mass is {height:.3g} m high; "
-                f"give a measured radius, or check {either(_options([*solids.SIZES.values()]))}",
-                file=option,
+                f"it falls over, since {option} is {found:.3g} m and its centre of mass {height:.3g} m high; "
+                "measure this radius, or check the sizes",
+                file="body",
             )

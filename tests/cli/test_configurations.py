@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support import ROOT
 from support.cli import invoke, refused
@@ -57,8 +58,40 @@ def test_a_measured_body_runs_and_turns_back_from_one_spin_alone(tmp_path: Path)
     assert (found["reversals"] > 0).values.tolist() == [False, True]
 
 
+def half_ellipsoid(directions: int = 80, rings: int = 40) -> str:
+    """The triangles of the lower half of an ellipsoid of 60, 15 and 15 mm as ASCII STL, z up."""
+    phi, theta = np.arange(directions + 1) * 2 * np.pi / directions, np.linspace(0, np.pi / 2, rings + 1)[:, None]
+    unit = np.broadcast_arrays(np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), -np.cos(theta))
+    sheet = np.concatenate([np.stack(unit, -1) * [60, 15, 15], np.zeros((1, directions + 1, 3))])
+    one, across = sheet[:-1, :-1], sheet[1:, 1:]
+    halves = ((one, sheet[1:, :-1], across), (one, across, sheet[:-1, 1:]))
+    corners = np.concatenate([np.stack(half, 2).reshape(-1, 3) for half in halves])
+    return "".join("vertex {:.9g} {:.9g} {:.9g}\n".format(*corner) for corner in corners)
+
+
+def test_a_shape_of_an_ellipsoid_is_the_body_of_its_sizes(tmp_path: Path) -> None:
+    (tmp_path / "toy.stl").write_text(half_ellipsoid(), encoding="utf-8")
+    text = printed("--stl", str(tmp_path / "toy.stl"), "--density", "1.24±0.1 g/cm3")
+    found = loaded(text, tmp_path)
+    sizes = printed("--density", "1240 kg/m^3", "--length", "12cm", "--width", "3cm", "--height", "15mm")
+    for name, value in loaded(sizes, tmp_path).items():
+        assert found.get(name, 0.0) == pytest.approx(value, rel=3e-3), name
+    assert "toy.stl, in millimetres" in text
+    assert re.search(r"mass: 0.0350?\d+  # ± 0.0028 kg", text)
+
+
+def test_a_shape_takes_a_mass_or_a_density_alone(tmp_path: Path) -> None:
+    file = tmp_path / "toy.stl"
+    refused(invoke("body", "--stl", file, "--mass", "30g"), f"{file}: No such file")
+    file.write_text("solid", encoding="utf-8")
+    refused(invoke("body", "--stl", file, "--mass", "30g"), f"--stl {file}: not an STL file")
+    refused(invoke("body", "--stl", file), "body: not all is known; give --mass or --density as well")
+    refused(invoke("body", "--stl", file, "--mass", "30g", "--angle", "2deg"), "--angle: cannot be combined with --stl")
+    refused(invoke("body", "--stl", file, "--mass", "30g", "--whole"), "--whole: cannot be combined with --stl")
+
+
 REFUSED = {
-    "": "body: not all is known; give --mass as well",
+    "": "body: not all is known; give --mass or --density as well",
     "--mass 30g --width 3cm --height 1cm": "give --length, --radius-long or --a as well",
     "--mass 30g --length 12cm --width 3cm": "give --height or --c as well",
     "--mass 30": "--mass: must be a number with its unit, such as 30.0+-0.1g, not '30'",
@@ -69,9 +102,12 @@ REFUSED = {
     "--length -12cm": "--length: must be a finite number > 0 and < 1e+06, in m, with an error >= 0, not '-12cm'",
     "--length 12±-1cm": "--length: must be a finite number",
     "--length 12±1e999cm": "--length: must be a finite number",
+    "--mass 30g --density 1g/cm^3": "body: not all is known; give --length, --radius-long or --a as well",
+    "--mass 30g --density 1g/cm³ --length 12cm --width 3cm --height 15mm": "--mass: cannot be combined with --density",
+    "--density 1g/cm2": "--density: must be a number with its unit, such as 1.24+-0.02g/cm3",
     "--angle 100deg": "--angle: must be a finite number > -1.5708",
     "--mass 30g --radius-long 1m --a 6cm --width 3cm --height 1cm": "--a: cannot be combined with --radius-long",
-    "--mass 30g --length 12cm --width 2cm --height 15mm": "--radius-short: the body falls over, since this is 0.00667",
+    "--mass 30g --length 12cm --width 2cm --height 15mm": "body: it falls over, since --radius-short is 0.00667",
     "--mass 30g --length 12cm --width 3cm --height 15mm --c 1mm": "body: centre of mass outside the ellipsoid",
 }
 

@@ -31,7 +31,7 @@ def body(measured: Numbers, *, whole: bool) -> dict[str, Any]:
 
     Parameters
     ----------
-    measured : `mass`, `angle`, and one number or more for each semi-axis
+    measured : `mass` or `density`, `angle`, and one number or more for each semi-axis
     whole : whether the solid is the whole ellipsoid, not its lower half
     """
     parts = {"length": 2, "width": 2, "height": 2 if whole else 1}
@@ -40,13 +40,19 @@ def body(measured: Numbers, *, whole: bool) -> dict[str, Any]:
     surface |= {axis: np.sqrt(measured[name] * surface["c"]) for axis, name in RADII.items() if name in measured}
     a, b, c = ((surface | solid)[axis] for axis in SIZES)
     below = 0 if whole else 3 * c / 8
-    mass, cos, sin = measured["mass"], np.cos(measured["angle"]), np.sin(measured["angle"])
+    mass = mass_of(measured, (4 if whole else 2) / 3 * np.pi * a * b * c)
+    cos, sin = np.cos(measured["angle"]), np.sin(measured["angle"])
     along, across = mass * ((b**2 + c**2) / 5 - below**2), mass * ((a**2 + c**2) / 5 - below**2)
     return {
         "a": surface["a"], "b": surface["b"], "c": surface["c"], "offset": surface["c"] - (c - below), "mass": mass,
         "Ixx": along * cos**2 + across * sin**2, "Iyy": along * sin**2 + across * cos**2,
         "Izz": mass * (a**2 + b**2) / 5, "Ixy": (along - across) * sin * cos,
     }  # fmt: skip
+
+
+def mass_of(measured: Numbers, volume: Any) -> Any:
+    """Return the mass that was measured, or that of the density."""
+    return measured["mass"] if "mass" in measured else measured["density"] * volume
 
 
 def propagated(formula: Callable[[Numbers], Numbers], values: Numbers, errors: Numbers) -> dict[str, float]:

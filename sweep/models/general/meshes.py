@@ -1,0 +1,96 @@
+"""A homogeneous solid inside triangles, as an STL file has them, and the ellipsoid that fits its lowest part."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.models.general.solids import Numbers, mass_of
+
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_HEADER = 84
+_LOWEST = 0.1
+"""The share of the height in which the surface is fitted."""
+
+
+def triangles(stl: bytes) -> NDArray[np.float64]:
+    """Return the corners in a binary or ASCII STL file, shape (triangles, 3, 3); a ValueError says what it is not."""
+    if len(stl) >= _HEADER and len(stl) == _HEADER + _RECORD.itemsize * int.from_bytes(stl[80:_HEADER], "little"):
+        found = np.frombuffer(stl, _RECORD, offset=_HEADER)["corners"].astype(float)
+    else:
+        words = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", stl)
+        found = np.array(words[: len(words) // 3 * 3]).astype(float).reshape(-1, 3, 3)
+    if not len(found) or not np.isfinite(found).all():
+        raise ValueError("not an STL file")
+    return found
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A solid that stands on the plane, in the axes of `a` and `b` and downwards."""
+
+    volume: float
+    second: NDArray[np.float64]
+    """Central second moments per mass, shape (3, 3)."""
+    surface: dict[str, float]
+    """`a`, `b`, `c` and `offset`."""
+    misfit: float
+    """How far the surface is from that ellipsoid at most, where it was fitted."""
+
+
+def mesh(corners: NDArray[np.float64]) -> Mesh:
+    """Return the solid inside triangles with these corners, shape (triangles, 3, 3), z up; lengths in any unit.
+
+    Its integrals are sums over the tetrahedra of the triangles and one point, by the divergence theorem.  An ellipsoid
+    that touches the plane below the centre of mass has 2 h = k1 x² + 2 k12 x y + k2 y² + h²/c at the height h, with the
+    curvatures k there: its coefficients come from linear least squares.
+
+    Raises
+    ------
+    ValueError
+        in words if the triangles leave holes, or if the solid does not stand on a rounded lowest point.
+    """
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    if np.abs(areas.sum(0)).max() > 1e-4 * np.abs(areas).sum():
+        raise ValueError("the triangles leave holes; repair the shape")
+    corners = corners - corners.mean((0, 1))
+    volumes, sums = np.linalg.det(corners) / 6, corners.sum(1)
+    volume = volumes.sum()
+    if not abs(volume) > 1e-9 * np.ptp(corners, axis=(0, 1)).prod():
+        raise ValueError("the triangles hold no volume")
+    centre = volumes @ sums / 4 / volume
+    second = np.einsum("t,tki,tkj->ij", volumes, corners, corners) + (volumes * sums.T) @ sums
+    return _standing(abs(volume), second / 20 / volume - np.outer(centre, centre), corners.reshape(-1, 3) - centre)
+
+
+def _standing(volume: float, second: NDArray[np.float64], points: NDArray[np.float64]) -> Mesh:
+    """Fit the surface to points around the centre of mass, and turn the axes."""
+    bottom, height = points[:, 2].min(), np.ptp(points[:, 2])
+    x, y, h = np.unique(points[points[:, 2] < bottom + _LOWEST * height], axis=0).T - [[0], [0], [bottom]]
+    terms = np.array([x * x, 2 * x * y, y * y, h * h, x, y, np.ones_like(x)]).T
+    (k1, k12, k2, flat, *slope, shift), _, rank, _ = np.linalg.lstsq(terms, 2 * h, rcond=None)
+    curvatures, axes = np.linalg.eigh([[k1, k12], [k12, k2]])
+    if rank < terms.shape[1] or curvatures[0] <= 0:
+        raise ValueError("no rounded lowest point; turn the shape as it stands on a table, z up, or make it finer")
+    if np.hypot(*np.linalg.solve([[k1, k12], [k12, k2]], slope)) > 0.02 * np.ptp(points[:, :2], axis=0).max():
+        raise ValueError("centre of mass not above the lowest point; turn the shape as it stands on a table, z up")
+    depth = -bottom - shift / 2
+    c = 1 / np.clip(flat, _LOWEST / height, 1 / depth)
+    along, _ = axes.T
+    turn = np.array([[*along, 0], [along[1], -along[0], 0], [0, 0, -1]])
+    surface = {"a": np.sqrt(c / curvatures[0]), "b": np.sqrt(c / curvatures[1]), "c": c, "offset": c - depth}
+    misfit = np.abs(terms @ [k1, k12, k2, flat, *slope, shift] - 2 * h).max() / 2
+    return Mesh(volume, turn @ second @ turn.T, {name: float(each) for name, each in surface.items()}, float(misfit))
+
+
+def body(solid: Mesh, measured: Numbers) -> dict[str, Any]:
+    """Return the parameters of the section `body` of a solid whose `mass` or `density` is measured, all in SI units."""
+    mass = mass_of(measured, solid.volume)
+    matrix = np.trace(solid.second) * np.eye(3) - solid.second
+    places = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
+    kept = {name: at for name, at in places.items() if abs(matrix[at]) > 1e-6 * matrix[2, 2]}
+    return solid.surface | {"mass": mass} | {name: mass * matrix[at] for name, at in kept.items()}

@@ -1,0 +1,87 @@
+"""Solids inside triangles: against the same shapes integrated in another way, in both kinds of STL files."""
+
+from __future__ import annotations
+
+import runpy
+from collections.abc import Callable
+from math import pi
+
+import numpy as np
+import pytest
+from support import ROOT
+
+from sweep.models.general import meshes
+
+PEBBLE = {"hull": (0.08, 0.04, 0.035), "thickness": 0.022, "outline": (0.12, 0.052), "turn": 0.09, "density": 2650.0}
+
+
+def pebble(turned: float = 0.0, directions: int = 160, rings: int = 60) -> np.ndarray:
+    """The triangles of what a flat top and an oval outline leave of an ellipsoid, z up, turned from x towards y."""
+    (a, b, c), low = PEBBLE["hull"], PEBBLE["thickness"]
+    length, width = PEBBLE["outline"]
+    phi = np.arange(directions) * 2 * pi / directions
+    # y points the other way than with z down.
+    edge = 1 / np.hypot(np.cos(phi + PEBBLE["turn"]) / (length / 2), np.sin(phi + PEBBLE["turn"]) / (width / 2))
+    rim = np.sqrt(1 - (1 - low / c) ** 2) / np.hypot(np.cos(phi) / a, np.sin(phi) / b)
+    r = np.linspace(0, 1, rings + 1)[:, None] * np.minimum(edge, rim)
+    x, y = r * np.cos(phi + turned), r * np.sin(phi + turned)
+    bottom = -c * np.sqrt(1 - (r * np.cos(phi) / a) ** 2 - (r * np.sin(phi) / b) ** 2)
+    sheets = np.array([[x, y, bottom], [x, y, np.full_like(x, low - c)]]).transpose(0, 2, 3, 1)
+    grid = np.concatenate([sheets[0], sheets[1][::-1]])
+    one, other = grid[:-1], grid[1:]
+    beside, across = np.roll(one, -1, 1), np.roll(other, -1, 1)
+    halves = ((one, other, across), (one, across, beside))
+    return np.concatenate([np.stack(half, 2).reshape(-1, 3, 3) for half in halves]) + np.array([0.3, -0.2, 1.0])
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.4])
+def test_a_shape_has_the_numbers_of_its_integrals_however_it_lies(turned: float) -> None:
+    expected = runpy.run_path(str(ROOT / "scripts" / "body_inertia.py"))["properties"](**PEBBLE)
+    found = meshes.body(meshes.mesh(pebble(turned)), {"density": PEBBLE["density"]})
+    assert set(found) == set(expected)
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=3e-3), name
+
+
+def test_a_measured_mass_is_that_of_the_shape() -> None:
+    heavy, light = (meshes.body(meshes.mesh(pebble()), {"mass": mass}) for mass in (0.4, 0.1))
+    assert heavy["mass"] == 0.4
+    assert heavy["Izz"] == pytest.approx(4 * light["Izz"])
+
+
+def ascii_file(corners: np.ndarray) -> bytes:
+    """Text, as most programs write it."""
+    facets = ("".join("vertex {:.9e} {:.9e} {:.9e}\n".format(*corner) for corner in three) for three in corners)
+    return "".join(f"facet normal 0 0 0\nouter loop\n{facet}endloop\nendfacet\n" for facet in facets).encode()
+
+
+def binary_file(corners: np.ndarray) -> bytes:
+    """Little-endian records of 50 bytes behind a header of 80 and their number."""
+    facets = b"".join(bytes(12) + three.astype("<f4").tobytes() + bytes(2) for three in corners)
+    return b"solid but binary".ljust(80) + len(corners).to_bytes(4, "little") + facets
+
+
+@pytest.mark.parametrize("written", [ascii_file, binary_file])
+def test_both_kinds_of_files_are_read(written: Callable[[np.ndarray], bytes]) -> None:
+    corners = pebble(directions=8, rings=3)
+    np.testing.assert_allclose(meshes.triangles(written(corners)), corners, rtol=1e-6)
+
+
+WRONG = {
+    "leave holes": pebble()[:-200],
+    "hold no volume": pebble() * [1, 1, 0],
+    "no rounded lowest point": np.maximum(pebble(), [-1, -1, 0.975]),
+    "centre of mass not above": pebble() @ np.array([[0.995, 0, 0.0998], [0, 1, 0], [-0.0998, 0, 0.995]]),
+}
+
+
+@pytest.mark.parametrize("words", WRONG)
+def test_what_is_no_standing_solid_is_refused(words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        meshes.mesh(WRONG[words])
+
+
+@pytest.mark.parametrize("data", [b"", b"hello", b"vertex 1 2 3", b"vertex 1 2 nan\n" * 3])
+def test_other_files_are_no_stl(data: bytes) -> None:
+    with pytest.raises(ValueError, match="not an STL file"):
+        meshes.triangles(data)
