@@ -55,11 +55,7 @@ def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
     from sweep.config.document import parse_value
     from sweep.config.measured import measured, of_shape, of_solid
 
-    given = {
-        name: measured(f"--{name.replace('_', '-')}", text, MEASURED[name][0])
-        for name, text in texts.items()
-        if text is not None
-    }
+    given = {name: measured(name, text, MEASURED[name][0]) for name, text in texts.items() if text is not None}
     text = of_shape(given, stl) if stl else of_solid(given, whole=whole)
     load_config(parse_value(text, "body"))
     click.echo(text, nl=False)

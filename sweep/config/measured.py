@@ -62,12 +62,12 @@ Given = Mapping[str, Measured]
 """What was measured, by the names of the parameters of `sweep.models.general.solids.body`."""
 
 
-def measured(option: str, text: str, parameter: Parameter) -> Measured:
+def measured(name: str, text: str, parameter: Parameter) -> Measured:
     """Read a number with its unit and perhaps its error, such as "12.0+-0.1 cm".
 
     Parameters
     ----------
-    option : named in faults
+    name : of the measurement, whose option is named in faults
     parameter : whose unit and bounds it has
 
     Raises
@@ -75,6 +75,7 @@ def measured(option: str, text: str, parameter: Parameter) -> Measured:
     ConfigError
         if `text` is something else.
     """
+    (option,) = _options([name])
     unit, found = _unit(parameter), _QUANTITY.fullmatch(text.strip())
     try:
         spelled = re.sub(r"\^?3$", "**3", found["unit"]) if found else ""  # as Pint wants cm3
@@ -83,7 +84,7 @@ def measured(option: str, text: str, parameter: Parameter) -> Measured:
         found = None
     if not found:
         raise fault_of(refusal(text, f"a number with its unit, such as {_EXAMPLES[unit]}"), file=option)
-    value, error = (float(found[name] or 0) * factor for name in ("value", "error"))
+    value, error = (float(found[part] or 0) * factor for part in ("value", "error"))
     if not (parameter.allows(value) and 0 <= error < float("inf")):
         raise fault_of(refusal(text, f"{parameter.allowed}, in {unit}, with an error >= 0"), file=option)
     return Measured(value, error, f"{option} {text.strip()}")

@@ -81,7 +81,7 @@ def test_what_is_no_standing_solid_is_refused(words: str) -> None:
         meshes.mesh(WRONG[words])
 
 
-@pytest.mark.parametrize("data", [b"", b"hello", b"vertex 1 2 3", b"vertex 1 2 nan\n" * 3])
+@pytest.mark.parametrize("data", [b"", b"hello", b"vertex 1 2 3", b"vertex 1 2 nan\n" * 3, b"vertex 1 2 1e200\n" * 3])
 def test_other_files_are_no_stl(data: bytes) -> None:
     with pytest.raises(ValueError, match="not an STL file"):
         meshes.triangles(data)

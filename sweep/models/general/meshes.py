@@ -13,6 +13,7 @@ from sweep.models.general.solids import Numbers, mass_of
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER = 84
+_LARGEST = 1e9
 _LOWEST = 0.1
 """The share of the height in which the surface is fitted."""
 
@@ -24,7 +25,7 @@ def triangles(stl: bytes) -> NDArray[np.float64]:
     else:
         words = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", stl)
         found = np.array(words[: len(words) // 3 * 3]).astype(float).reshape(-1, 3, 3)
-    if not len(found) or not np.isfinite(found).all():
+    if not len(found) or not (np.abs(found) < _LARGEST).all():
         raise ValueError("not an STL file")
     return found
 
