@@ -28,8 +28,8 @@ _AXES = [[size, *filter(None, [solids.RADII.get(axis)]), axis] for axis, size in
 _SOLID = """\
 # A homogeneous solid {solid}, by `python -m sweep body` from
 #   {said}.
-# The solid has the semi-axes A, B, C: its inertia about the ellipsoid's centre is m diag(B² + C², A² + C², A² + B²)/5,
-# and its centre of mass lies {below} (E. W. Weisstein, mathworld.wolfram.com, "Ellipsoid" and "Hemisphere").
+# With semi-axes A, B, C of the solid, inertia about the centre of the ellipsoid is m diag(B² + C², A² + C², A² + B²)/5,
+# and the centre of mass lies {below} (E. W. Weisstein, mathworld.wolfram.com, "Ellipsoid" and "Hemisphere").
 # The axes of inertia are then turned by the angle; without one, nothing tells one sense of spin from the other.
 """
 _SHAPE = """\
