@@ -100,8 +100,9 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         if path.stem != "celtic_stone":  # whose exponents a page draws
             small.pop("measure", None)
         yaml.dump(small, tmp_path / "configs" / path.name)
-    for path in (ROOT / "configs").glob("*.py"):
-        shutil.copy(path, tmp_path / "configs")
+    for path in (ROOT / "configs").iterdir():
+        if path.suffix in (".py", ".csv"):
+            shutil.copy(path, tmp_path / "configs")
     (tmp_path / "docs" / "tutorial").mkdir(parents=True)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(mpl, "rcParams", mpl.RcParams(mpl.rcParams | {"figure.max_open_warning": 0}))

@@ -67,7 +67,7 @@ def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
 def examples(name: str | None, output: Path) -> None:
     """List the configurations that come with the package, or copy the one called NAME.
 
-    The model and the table of cases that it names are copied as well.  No file is overwritten.
+    The model and the table of cases that it names, and a film of its body, are copied as well.  No file is overwritten.
     """
     shipped = {path.stem: path for path in sorted(_EXAMPLES.glob("*.yaml"))}
     if name is None:
@@ -90,9 +90,10 @@ def examples(name: str | None, output: Path) -> None:
 
 
 def _with_companions(path: Path) -> list[Path]:
-    """Return a configuration, and the files beside it that it names."""
+    """Return a configuration, the files beside it that it names, and the film of its body."""
     from sweep.config.document import read
 
     values = read(path).values
     named = [path.parent / values[key] for key in ("model", "cases") if key in values]
+    named.append(path.with_name(f"{path.stem}_film.csv"))
     return [path, *(each for each in named if each.is_file())]

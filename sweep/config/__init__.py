@@ -53,7 +53,7 @@ def load_config(
     Parameters
     ----------
     config : path of a YAML file, what such a file says as a mapping, or a configuration.  An axis of a mapping may be
-        a list, tuple, range, NumPy array or `xarray.DataArray`
+        a list, tuple, range, NumPy array or `xarray.DataArray`, and `cases` a `pandas.DataFrame`
     overrides : values that replace those of `config`, by path ("friction.mu") or, for a parameter or a setting of the
         integrator, by bare name ("mu")
     argument : what faults call the override of this key
@@ -70,6 +70,8 @@ def load_config(
     known = loading.table(origin)
     for key, value in (overrides or {}).items():
         source.set(_full_path(key, known), plain_data(value), argument(key))
+    if isinstance(table := source.values.get("cases"), dict):
+        source.table, source.values["cases"] = ("cases", cases.of_columns(source, table, known)), "cases"
     # A name made from the file's must not be refused, since the user did not choose it.
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")

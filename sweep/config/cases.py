@@ -1,18 +1,22 @@
-"""Tables of cases: CSV files with a column per parameter and a row per trajectory."""
+"""Tables of cases, with a column per parameter and a row per trajectory: CSV files, or columns in the configuration."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from sweep.config.document import Document, number
 from sweep.config.faults import ConfigError, Fault, brief, refusal, suggestion
 from sweep.config.values import MAX_AXIS
 from sweep.parameters import Parameter
 
+Columns = dict[str, tuple[float, ...]]
+"""The numbers of each parameter, by name."""
 
-def read(source: Document, name: str, known: Mapping[str, Parameter]) -> dict[str, tuple[float, ...]]:
+
+def read(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns:
     """Read the table `name`, a path relative to the configuration's folder, and check it cell by cell.
 
     Parameters
@@ -41,6 +45,31 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> dict[st
         if found := list(faults):
             raise ConfigError(found)
     return {name: tuple(float(row[i]) for _, row in rows) for i, name in enumerate(header)}
+
+
+def of_columns(source: Document, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> Columns:
+    """Check a table that the configuration itself gives, by column; result and errors are as of `read`."""
+    if faults := list(_faults_of_columns(table, known)):
+        raise ConfigError(source.fault(("cases", *path), words) for path, words in faults)
+    return {name: tuple(map(float, column)) for name, column in table.items()}
+
+
+def _faults_of_columns(
+    table: Mapping[str, Any], known: Mapping[str, Parameter]
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    lengths = {len(column) for column in table.values() if isinstance(column, list)}
+    if len(lengths) != 1 or not 0 < max(lengths) <= MAX_AXIS:
+        yield (), f"its columns must be lists of the same length, 1 to {MAX_AXIS} numbers"
+        return
+    for name, column in table.items():
+        if name not in known:
+            yield (name,), f"unknown parameter{suggestion(name, known)}; the parameters are {', '.join(known)}"
+        elif not isinstance(column, list):
+            yield (name,), refusal(column, "a list of numbers")
+        else:
+            for i, each in enumerate(column):
+                if isinstance(each, bool) or not isinstance(each, int | float) or not known[name].allows(each):
+                    yield (name, i), refusal(each, known[name].allowed)
 
 
 def _faults_of_header(file: str, header: list[str], known: Mapping[str, Parameter]) -> Iterator[Fault]:

@@ -95,12 +95,15 @@ def plain_data(value: Any) -> Any:
     """Python's `value` as a YAML file could hold it: mappings, lists, words and numbers.
 
     Tuples, ranges and arrays become lists; an array is whatever NumPy can read as one, such as an `xarray.DataArray` or
-    a `pandas.Series`.  Values of any other type are returned as they are, and refused by the schema.
+    a `pandas.Series`.  A `pandas.DataFrame` becomes a mapping of its columns.  Values of any other type are returned as
+    they are, and refused by the schema.
     """
     if isinstance(value, Mapping):
         return {str(key): plain_data(item) for key, item in value.items()}
     if isinstance(value, list | tuple | range):
         return [plain_data(item) for item in value]
+    if hasattr(value, "columns") and hasattr(value, "to_dict"):  # a table of pandas
+        return plain_data(value.to_dict("list"))
     if hasattr(value, "__array__"):
         return np.asarray(value).tolist()
     return os.fspath(value) if isinstance(value, os.PathLike) else value

@@ -181,9 +181,10 @@ class _Top(Strict):
     units: Literal[PAPER_UNITS, SI] = Field(  # type: ignore[valid-type]
         default=PAPER_UNITS, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
     )
-    cases: Annotated[str | None, Allowed("the name of a CSV file")] = Field(
+    cases: Annotated[str | None, Allowed("the name of a CSV file, or lists of numbers by parameter")] = Field(
         default=None,
-        description="CSV table with a column for each parameter and a row for each trajectory, instead of axes",
+        description="table with a column for each parameter and a row for each trajectory, instead of axes: the name "
+        "of a CSV file, or lists of numbers",
     )
     integrator: Integrator = Integrator()
     measure: Annotated[list[str] | None, BeforeValidator(_measures), Allowed(f"a list of {', '.join(MEASURES)}")] = (

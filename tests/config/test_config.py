@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from support import ROOT, SMALL
 
-from sweep import load_config
+from sweep import ConfigError, load_config
 from sweep.config.values import Range
 from sweep.grid import Grid
 
@@ -71,6 +73,38 @@ def test_the_configurations_we_ship_load(path: Path) -> None:
 
 
 CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
+
+
+@pytest.mark.parametrize("table", [dict, pandas.DataFrame])
+def test_cases_given_by_columns(table: Callable[..., Any]) -> None:
+    columns = {"mu": np.array([60.0, 130.0]), "n0": [0.05, -0.02]}
+    config = load_config({"start": {"x0": 0.01}}, {"cases": table(columns)})
+    assert config.cases == {"mu": (60.0, 130.0), "n0": (0.05, -0.02)}
+    assert load_config(config, {"t_end": 50.0}).cases == config.cases
+    other = load_config({"start": {"x0": 0.01}}, {"cases": {"mu": [60.0, 131.0], "n0": [0.05, -0.02]}})
+    assert other.fingerprint() != config.fingerprint()
+    assert load_config({"start": {"x0": 0.01}, "cases": columns}).fingerprint() == config.fingerprint()
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"muu": [1.0]}, "cases.muu: unknown parameter (did you mean mu?)"),
+        ({"mu": [1.0], "n0": [1.0, 2.0]}, "cases: its columns must be lists of the same length"),
+        ({"mu": []}, "cases: its columns must be lists of the same length"),
+        ({}, "cases: its columns must be lists of the same length"),
+        ({"mu": [1.0], "n0": 0.05}, "cases.n0: must be a list of numbers, not 0.05"),
+        ({"mu": [1.0, -1.0]}, "cases.mu[1]: must be a finite number >= 0"),
+        ({"mu": [1.0, "two"]}, "cases.mu[1]: must be a finite number >= 0"),
+        ({"mu": [1.0, True]}, "cases.mu[1]: must be a finite number >= 0"),
+        ({"mu": [1.0, float("nan")]}, "cases.mu[1]: must be a finite number >= 0"),
+    ],
+)
+def test_wrong_columns_of_cases_are_refused(columns: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigError) as refusal:
+        load_config({"cases": columns})
+    assert said in str(refusal.value)
+    assert len(refusal.value.faults) == 1
 
 
 def test_cases(write: Write, tmp_path: Path) -> None:
