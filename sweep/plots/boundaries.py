@@ -13,7 +13,7 @@ from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, lines, scales
 from sweep.plots.figure import RATIO, Picture, arrangement, set_scale
-from sweep.plots.panels import MAX_PANELS, heading
+from sweep.plots.panels import MAX_PANELS
 from sweep.plots.theory import Line
 from sweep.results.margins import OPEN, smoothed
 
@@ -24,7 +24,7 @@ def draw(dataset: xr.Dataset) -> Figure:
     panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [("no count changes between the cells", dataset)]
     rows, columns = arrangement(len(panels), 1)
     figure = Picture(5.2 * columns + 0.6, 1.2 + 5.2 * RATIO * rows)
-    figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
+    figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     scale = scales.counts(dataset["level"].values if dataset.sizes["point"] else np.zeros(1, int), None, None)
     for k, (words, part) in enumerate(panels):
         axes = figure.add_subplot(rows, columns, k + 1)

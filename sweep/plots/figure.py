@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels
-from sweep.plots.panels import Panel, heading, title
+from sweep.plots.panels import Panel, in_lines, title
 
 PAGE = 14.0
 """Inches of a page across."""
@@ -36,21 +36,28 @@ class Picture(Figure):
 
     def __init__(self, width: float, height: float) -> None:
         super().__init__((width, height), dpi=110, layout="constrained")
+        self._constants = ""
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()
         self.savefig(stream, format="png")
         return stream.getvalue()
 
+    def head(self, title: str, constants: str) -> None:
+        """A title, and the constant parameters, which stand over the legend."""
+        self._constants = in_lines(constants, self.get_figwidth())
+        if title:
+            self.suptitle(title, fontsize=10)
+
     def explain(self, handles: Sequence[Artist]) -> None:
-        """A legend below the figure, never over its data, in as many columns as fit."""
-        if not handles:
+        """A legend below the figure, never over its data, in as many columns as fit; over it the constants."""
+        if not handles and not self._constants:
             return
-        longest = max(len(str(handle.get_label())) for handle in handles)
+        longest = max((len(str(handle.get_label())) for handle in handles), default=0)
         columns = max(1, int(self.get_figwidth() / (longest * _LETTER + _HANDLE)))
         self.legend(
             handles=list(handles), loc="outside lower center", fontsize=8, frameon=False, handlelength=3,
-            ncols=min(columns, len(handles)),
+            ncols=min(columns, max(len(handles), 1)), title=self._constants or None, title_fontsize=8,
         )  # fmt: skip
 
 
@@ -66,7 +73,7 @@ def framed(
     """
     rows, columns = arrangement(len(panels), 2)
     figure = Picture(min(width * columns, PAGE), above + height * rows)
-    figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
+    figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
         lowest = k + columns >= len(panels)

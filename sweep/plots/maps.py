@@ -19,7 +19,7 @@ from sweep.plots import hatches, labels, lines
 from sweep.plots.description import Map, common_scale, describe
 from sweep.plots.figure import PAGE, RATIO, Picture, arrangement, set_scale
 from sweep.plots.marks import legend, of_all
-from sweep.plots.panels import MAX_PANELS, Panel, Panels, heading, in_lines, title
+from sweep.plots.panels import MAX_PANELS, Panel, Panels, title
 from sweep.plots.quantities import COMPARISONS
 from sweep.plots.scales import Limits, Scale
 
@@ -56,7 +56,7 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) 
     columns = groups * len(names)
     width, small = min(PAGE / columns, _WIDEST), columns > _SMALL
     figure = Picture(width * columns + 1.2, 1.6 + width * RATIO * rows)
-    figure.suptitle(heading(dataset, figure.get_figwidth()), fontsize=10)
+    figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     maps = _maps(panels, names)
     kinds = _columns(maps[0])
     grid = figure.add_gridspec(rows, groups * len(kinds), width_ratios=groups * [1 if name else _BAR for name in kinds])
@@ -95,8 +95,7 @@ def draw_beside(each: list[Panels], limits: Limits | None = None, cmap: str | No
         raise ValueError(f"{', '.join(short)} has no two axes; only maps are drawn side by side")
     rows, columns = arrangement(count, 1)
     figure = Picture(_WIDEST * columns + 1.2, 1.8 + _WIDEST * RATIO * rows)
-    common = in_lines(_constants([panels.dataset for panels in each]), figure.get_figwidth())
-    figure.suptitle(f"{labels.words(each[0].dataset, name)}\n{common}".strip(), fontsize=10)
+    figure.head(labels.words(each[0].dataset, name), _constants([panels.dataset for panels in each]))
     maps = [_maps(panels, [name]) for panels in each]
     scale = common_scale([shown[name] for of_one in maps for shown in of_one], limits, cmap)
     bar = [] if maps[0][0][name].flags else [_BAR]

@@ -105,11 +105,6 @@ def title(dataset: xr.Dataset, panel: Panel) -> str:
     return ", ".join(labels.measured(dataset, d, float(dataset[d][i])) for d, i in panel.items())
 
 
-def heading(dataset: xr.Dataset, width: float) -> str:
-    """The dataset's title and its constant parameters, in lines for a figure of so many inches."""
-    return f"{dataset.attrs.get('title', '')}\n{in_lines(labels.constants(dataset), width)}".strip()
-
-
 def in_lines(constants: str, width: float) -> str:
     """Constants in lines that break between them, for a figure of so many inches."""
     space = "\N{NO-BREAK SPACE}"

@@ -14,7 +14,6 @@ from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, lines, theory
 from sweep.plots.figure import Picture
-from sweep.plots.panels import heading
 from sweep.results.kind import is_of_own_body, parameters
 
 # Title and the series drawn together; two panels stand beside each other.
@@ -68,7 +67,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
     figure = Picture(11, 4.2 + 1.9 * rows)
-    figure.suptitle(heading(_constants_apart(dataset), figure.get_figwidth()), fontsize=10)
+    figure.head(dataset.attrs.get("title", ""), labels.constants(_constants_apart(dataset)))
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}

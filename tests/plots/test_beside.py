@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support.cli import invoke, refused
-from support.figures import entries
+from support.figures import constants, entries
 
 import sweep
 from sweep.plots import picture
@@ -34,9 +34,9 @@ def test_one_scale_and_axes_of_their_own(two: list[xr.Dataset]) -> None:
     assert norms[0](counts.min()) < norms[0](counts.max())
     assert bar.get_ylim() == (counts.min() - 0.5, counts.max() + 0.5)
     assert one.get_ylim()[1] > 10 * other.get_ylim()[1]
-    assert "a = 10" in figure.get_suptitle()
-    assert "delta" not in figure.get_suptitle()
-    assert "δ" not in figure.get_suptitle()
+    assert "a = 10" in constants(figure)
+    assert "delta" not in constants(figure)
+    assert "δ" not in constants(figure)
 
 
 def test_the_legend_counts_the_cells_of_each(two: list[xr.Dataset]) -> None:

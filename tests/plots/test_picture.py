@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, to_rgb
 from matplotlib.figure import Figure
 from support.cli import invoke, refused
-from support.figures import entries
+from support.figures import constants, entries
 
 import sweep
 from sweep.kernels.status import DIVERGED, SETTLED, TIME_LIMIT
@@ -253,7 +253,7 @@ def test_a_page_fits_a_screen(starts: int) -> None:
 def test_the_nearest_value_is_drawn() -> None:
     dataset = made(n0=[0.02, 0.05])
     figure = picture.plot(dataset, sel={"n0": 0.04})
-    assert "n₀ = 0.05" in figure.get_suptitle()
+    assert "n₀ = 0.05" in constants(figure)
     with pytest.raises(ValueError, match="no axis q; the axes are mu, b, n0"):
         picture.plot(dataset, sel={"q": 1})
 

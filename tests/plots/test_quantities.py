@@ -98,7 +98,7 @@ def test_without_the_cycles_an_exponent_is_shown_itself(whole: xr.Dataset) -> No
         ("regimes", "regime"),
         ("reversal_time", "t_first_reversal"),
         ("mu_b", "reversals"),
-        ("kane_levinson", "reversals"),
+        ("kane_levinson", "t_first_reversal"),
     ],
 )
 def test_the_picture_of_a_configuration_shows_what_it_is_about(name: str, variable: str, whole: xr.Dataset) -> None:

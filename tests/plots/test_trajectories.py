@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support.cli import invoke, refused
-from support.figures import entries
+from support.figures import constants, entries
 
 from sweep.plots import picture, trajectories
 from sweep.plots.panels import in_lines
@@ -67,7 +67,7 @@ def test_axes_have_plain_names() -> None:
     figure = trajectories.draw(made([60]))
     assert figure.axes[0].get_ylabel() == "spin n (√(g/c))"
     assert figure.axes[-1].get_xlabel() == "time t (√(c/g))"
-    assert "b = 3" in figure.get_suptitle()
+    assert "b = 3" in constants(figure)
 
 
 def test_a_body_in_si_has_its_units_everywhere() -> None:
@@ -76,7 +76,7 @@ def test_a_body_in_si_has_its_units_everywhere() -> None:
         dataset[name].attrs = {"units": units, "long_name": f"{name} per unit mass" if name == "energy" else name}
     dataset["reversals"][:] = [1, 2]
     figure = trajectories.draw(dataset)
-    assert figure.get_suptitle().startswith("a = 0.2 m,")
+    assert constants(figure).startswith("a = 0.2 m,")
     assert entries(figure)[:2] == ["n₀ = −1 rad/s: 1 reversal", "n₀ = 2 rad/s: 2 reversals"]
     assert figure.axes[0].get_ylabel() == "spin n (rad/s)"
     assert (figure.axes[-1].get_title("left"), figure.axes[-1].get_ylabel()) == ("energy per unit mass", "m²/s²")
