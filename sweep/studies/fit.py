@@ -9,6 +9,7 @@ within 1 or 3.84 of its least (profile likelihood: Raue et al. 2009, doi 10.1093
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -57,14 +58,14 @@ def fit(config: Config, film: str | Path | Film, free: Sequence[str], reporter: 
     """As `sweep.api.fit`; a film may have been read already."""
     config = _one_body(config, free)
     film = film if isinstance(film, Film) else read(film)
-    note = (reporter or Reporter()).note
+    note, began = (reporter or Reporter()).note, time.perf_counter()
     if film.left_out:
         note(f"{film.left_out} rows of the film are left out: they hold no number, or are more than a fit needs")
     with explained(config.origin):
         problem = Problem(config, film, {name: _range(config, name) for name in free})
         minima = _search(problem, note)
         best, limits = _intervals(problem, minima[0], note)
-    return _labelled(problem, [best, *minima[1:]], limits)
+    return _labelled(problem, [best, *minima[1:]], limits, time.perf_counter() - began)
 
 
 def _one_body(config: Config, free: Sequence[str]) -> Config:
@@ -106,7 +107,7 @@ def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
     places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:KEPT]]]
     for number, instants in enumerate(horizons, start=1):
         minima = _different(sorted((problem.minimise(place, instants) for place in places), key=lambda m: m.misfit))
-        note(f"film to {problem.film.time[instants - 1]:.4g}: {len(minima)} minima ({number} of {len(horizons)})")
+        note(f"film up to {problem.film.time[instants - 1]:.4g}, {number} of {len(horizons)}: minima: {len(minima)}")
         places = [each.place for each in minima]
     return minima
 
@@ -206,7 +207,7 @@ def _blind(problem: Problem, best: Minimum) -> list[str]:
     return words
 
 
-def _labelled(problem: Problem, minima: list[Minimum], limits: Array) -> xr.Dataset:
+def _labelled(problem: Problem, minima: list[Minimum], limits: Array, seconds: float) -> xr.Dataset:
     """What was found, with the film and the curve that fits it."""
     best, film, names = minima[0], problem.film, list(problem.free)
     covariance, variance = _covariance(problem, best), _variance(problem, best)
@@ -237,7 +238,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array) -> xr.Data
     values = dict(zip(names, problem.values(best.place).tolist(), strict=True))
     return found.assign_attrs(
         title=f"{problem.config.name}: fitted to a film ({problem.config.model} model)",
-        **provenance(_with(problem.config, values), 0.0, 1),
+        **provenance(_with(problem.config, values), seconds, problem.trajectories),
         root_mean_square=float(np.sqrt(np.mean((fitted - film.value) ** 2))), akaike=float(criterion + 2 * len(names)),
         undetermined="; ".join(_blind(problem, best)), trajectories=problem.trajectories,
     )  # fmt: skip

@@ -23,6 +23,13 @@ from sweep.studies.misfit import Problem
 Write = Callable[..., Path]
 
 SCENE = "name: scene\nfriction: {mu: [30, 100]}\nstart: {n0: [0.03, 0.07], x0: 0.01, y0: 0.01}\n"
+STONE = """\
+units: SI
+body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
+friction: {law: coulomb, regularisation: sqrt, mu: [0.1, 0.9], speed: [0.2, 1.5]}
+start: {n0: 5, x0: 2.0e-3, y0: 2.0e-4}
+integrator: {t_end: 2}
+"""
 TRUTH = {"mu": 55.0, "n0": 0.052}
 NOISE = 0.001
 
@@ -113,6 +120,17 @@ def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
     assert found.attrs["undetermined"].startswith("the film hardly determines mu: the interval")
     assert [found[f"{side}_95"].values[0] for side in ("lower", "upper")] == pytest.approx([30, 100])
     assert abs(found.value.values[1] - 0.05) < 1e-3
+
+
+def test_friction_that_hardly_slips_is_known_by_its_slope_alone(write: Write) -> None:
+    """With a speed far above that of the slip only the ratio of the two counts."""
+    scene = write(STONE)
+    one = sweep.trajectory(scene, mu=0.3, speed=0.5, every=1 / 60).isel(trajectory=0)
+    film = Film(one.time.values, noisy(one.spin.values, 0.02), None, False, 0)
+    found = sweep.fit(scene, film, ["mu", "speed"])
+    assert "speed and mu are known only together" in found.attrs["undetermined"]
+    ratio = (found.value[0] / found.value[1]).item()
+    assert ratio == pytest.approx(0.6, rel=0.1)
 
 
 def test_the_command_writes_what_runs_the_fitted_body(
