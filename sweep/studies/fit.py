@@ -49,6 +49,11 @@ _SMOOTH, _TURN = 50, 0.03
 # A direction is not determined if its 95 % interval is longer than this share of the ranges.
 _BLIND = 0.5
 
+# How often intervals are sought anew because a lower minimum has turned up.
+_RESTARTS = 3
+
+_RUGGED = "the misfit is rugged: minima lie close together, and the intervals are of one of them alone"
+
 # Correlation of two parameters beyond which neither is known without the other.
 _TIED = 0.98
 
@@ -64,8 +69,9 @@ def fit(config: Config, film: str | Path | Film, free: Sequence[str], reporter: 
     with explained(config.origin):
         problem = Problem(config, film, {name: _range(config, name) for name in free})
         minima = _search(problem, note)
-        best, limits = _intervals(problem, minima[0], note)
-    return _labelled(problem, [best, *minima[1:]], limits, time.perf_counter() - began)
+        best, limits, rugged = _intervals(problem, minima[0], note)
+    words = _blind(problem, best) + ([_RUGGED] if rugged else [])
+    return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began)
 
 
 def _one_body(config: Config, free: Sequence[str]) -> Config:
@@ -139,21 +145,34 @@ def _variance(problem: Problem, best: Minimum) -> float:
     return best.misfit / (len(problem.film.time) - len(problem.free))
 
 
-def _intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> tuple[Minimum, Array]:
+def _intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> tuple[Minimum, Array, bool]:
     """The best minimum, and the ends of the intervals of `LEVELS` as places, shape (levels, 2, free).
 
-    An end at 0 or 1 is that of the range.  Where a profile finds a lower minimum, it begins anew from that.
+    An end at 0 or 1 is that of the range.  Where a profile meets a lower minimum, all begins anew from that.  If
+    that happens more than once, the misfit is rugged, which is told as well.
     """
-    limits = np.empty((len(LEVELS), 2, len(problem.free)))
+    for restart in range(_RESTARTS + 1):
+        limits, lower = _profiles(problem, best, note, stops=restart < _RESTARTS)
+        if lower is None:
+            break
+        best = problem.minimise(lower.place, len(problem.film.time))
+        note(f"a lower minimum: {best.misfit:.6g}")
+    return best, limits, restart > 1
+
+
+def _profiles(
+    problem: Problem, best: Minimum, note: Callable[[str], None], *, stops: bool
+) -> tuple[Array, Minimum | None]:
+    """The ends of all intervals, shape (levels, 2, free), or, if it `stops` there, a minimum that is lower."""
+    limits = np.full((len(LEVELS), 2, len(problem.free)), np.nan)
     for i, name in enumerate(problem.free):
         for level, allowed in enumerate(LEVELS.values()):
             for side, sign in enumerate((-1, 1)):
-                end, lower = _end(problem, best, i, sign, allowed)
-                if lower is not None:
-                    return _intervals(problem, problem.minimise(lower.place, len(problem.film.time)), note)
-                limits[level, side, i] = end
+                limits[level, side, i], lower = _end(problem, best, i, sign, allowed)
+                if lower and stops:
+                    return limits, lower
         note(f"interval of {name}: {problem.trajectories} trajectories so far")
-    return best, limits
+    return limits, None
 
 
 def _end(problem: Problem, best: Minimum, i: int, sign: int, allowed: float) -> tuple[float, Minimum | None]:
@@ -207,7 +226,7 @@ def _blind(problem: Problem, best: Minimum) -> list[str]:
     return words
 
 
-def _labelled(problem: Problem, minima: list[Minimum], limits: Array, seconds: float) -> xr.Dataset:
+def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: list[str], seconds: float) -> xr.Dataset:
     """What was found, with the film and the curve that fits it."""
     best, film, names = minima[0], problem.film, list(problem.free)
     covariance, variance = _covariance(problem, best), _variance(problem, best)
@@ -240,7 +259,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, seconds: f
         title=f"{problem.config.name}: fitted to a film ({problem.config.model} model)",
         **provenance(_with(problem.config, values), seconds, problem.trajectories),
         root_mean_square=float(np.sqrt(np.mean((fitted - film.value) ** 2))), akaike=float(criterion + 2 * len(names)),
-        undetermined="; ".join(_blind(problem, best)), trajectories=problem.trajectories,
+        undetermined="; ".join(words), trajectories=problem.trajectories,
     )  # fmt: skip
 
 
