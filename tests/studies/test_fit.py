@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import adaptive, columns
-from support.cli import invoke, refused
+from support.cli import invoke
 
 import sweep
 from sweep.config import ConfigError
+from sweep.explore.slices import Source
 from sweep.kernels.samples import sampled
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import take
+from sweep.results.store import StoreError
 from sweep.studies.film import Film
 from sweep.studies.misfit import Problem
 
@@ -149,7 +151,8 @@ def test_the_command_writes_what_runs_the_fitted_body(
     assert body.parameters["mu"].numbers[0] == written.value.values[0]
     for verb in ("info", "plot"):
         assert invoke(verb, tmp_path / "out" / "scene_fit.nc").exit_code == 0
-    refused(invoke("explore", "--no-browser", tmp_path / "out" / "scene_fit.nc"), "has a fit; open a dataset of run")
+    with pytest.raises(StoreError, match="has a fit; open a dataset of run"):
+        Source(written)
 
 
 @pytest.mark.parametrize(
