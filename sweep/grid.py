@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from math import prod
 from typing import Any, Protocol
@@ -26,16 +26,25 @@ class Sweepable(Protocol):
     def parameters(self) -> Mapping[str, Any]: ...
     @property
     def cases(self) -> Mapping[str, tuple[float, ...]] | None: ...
+    @property
+    def row(self) -> str: ...
+
+
+CASE, SAMPLE = "case", "sample"
+"""Names of the dimension along the rows of a table: cases that are listed, or samples that are drawn."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Cells over axes, or a list of cases along the one dimension `case`."""
+    """Cells over axes and, as the last dimension, over the rows of a table of parameters if there is one."""
 
     axes: dict[str, Array]
-    """Values by axis; empty for cases."""
+    """Values by axis."""
     constants: dict[str, float]
-    cases: dict[str, Array] | None = None
+    table: dict[str, Array] | None = None
+    """Columns of the table by parameter, each of shape (rows,)."""
+    row: str = CASE
+    """Name of the dimension along the rows of the table."""
 
     @classmethod
     def of(cls, config: Sweepable) -> Grid:
@@ -43,19 +52,23 @@ class Grid:
         values = config.parameters
         return cls(
             axes={name: np.array(v.numbers) for name, v in values.items() if v.is_axis},
-            constants={name: v.numbers[0] for name, v in values.items() if not v.is_axis},
-            cases=None if config.cases is None else {k: np.array(v) for k, v in config.cases.items()},
+            constants={n: v.numbers[0] for n, v in values.items() if not v.is_axis and n not in (config.cases or ())},
+            table=None if config.cases is None else {k: np.array(v) for k, v in config.cases.items()},
+            row=config.row,
         )
 
     @property
+    def rows(self) -> int | None:
+        """The length of the table, if there is one."""
+        return None if self.table is None else len(next(iter(self.table.values())))
+
+    @property
     def dims(self) -> tuple[str, ...]:
-        return ("case",) if self.cases is not None else tuple(self.axes)
+        return (*self.axes, *([] if self.table is None else [self.row]))
 
     @property
     def shape(self) -> tuple[int, ...]:
-        if self.cases is not None:
-            return (len(next(iter(self.cases.values()))),)
-        return tuple(map(len, self.axes.values()))
+        return (*map(len, self.axes.values()), *([] if self.rows is None else [self.rows]))
 
     @property
     def size(self) -> int:
@@ -63,12 +76,15 @@ class Grid:
 
     def columns(self) -> dict[str, Array]:
         """Values of all parameters, axes and constants, each of shape (size,)."""
-        if self.cases is not None:
-            varying = self.cases
-        else:
-            mesh = np.meshgrid(*self.axes.values(), indexing="ij")
-            varying = {name: values.ravel() for name, values in zip(self.axes, mesh, strict=True)}
-        return varying | {name: np.full(self.size, value) for name, value in self.constants.items()}
+        mesh = np.meshgrid(*map(np.arange, self.shape), indexing="ij")
+        return self._at([place.ravel() for place in mesh]) | {
+            name: np.full(self.size, value) for name, value in self.constants.items()
+        }
+
+    def _at(self, places: Sequence[Any]) -> dict[str, Array]:
+        """Values of what varies, at these indices along each dimension."""
+        found = {name: values[at] for (name, values), at in zip(self.axes.items(), places, strict=False)}
+        return found | {name: values[places[-1]] for name, values in (self.table or {}).items()}
 
     def tiles(self, cells: int) -> list[Tile]:
         """Tiles of about `cells` cells that cover the grid; each is contiguous in C order."""
@@ -87,48 +103,42 @@ class Grid:
 
     def part(self, tile: Tile) -> Grid:
         """The grid of the cells of a tile."""
-        if self.cases is not None:
-            return Grid({}, self.constants, {name: values[tile[0]] for name, values in self.cases.items()})
-        return Grid({n: v[at] for (n, v), at in zip(self.axes.items(), tile, strict=True)}, self.constants)
+        found = self._at(tile)
+        table = None if self.table is None else {name: found[name] for name in self.table}
+        return replace(self, axes={name: found[name] for name in self.axes}, table=table)
 
     def take(self, cells: Array) -> Grid:
         """The cells with these indices, as a list of cases."""
-        if self.cases is not None:
-            return Grid({}, self.constants, {name: values[cells] for name, values in self.cases.items()})
-        if not self.axes:
+        if not self.shape:
             return Grid({}, {}, {name: np.full(len(cells), value) for name, value in self.constants.items()})
-        places = np.unravel_index(cells, self.shape)
-        return Grid({}, self.constants, {n: v[at] for (n, v), at in zip(self.axes.items(), places, strict=True)})
+        return Grid({}, self.constants, self._at(np.unravel_index(cells, self.shape)))
 
     def sample(self, cells: int) -> Grid:
-        """About `cells` of the cells, spread evenly over each axis with both its ends; all if there are no more."""
+        """About `cells` of the cells, evenly along each dimension with both its ends; all if there are no more."""
         if self.size <= cells:
             return self
         each = max(2, int(cells ** (1 / sum(n > 1 for n in self.shape))))
-
-        def thin(values: Array) -> Array:
-            kept = np.linspace(0, len(values) - 1, min(each, len(values))).round().astype(int)
-            return np.asarray(values[np.unique(kept)])
-
-        if self.cases is not None:
-            return Grid({}, self.constants, {name: thin(values) for name, values in self.cases.items()})
-        return Grid({name: thin(values) for name, values in self.axes.items()}, self.constants)
+        places = [np.unique(np.linspace(0, n - 1, min(each, n)).round().astype(int)) for n in self.shape]
+        found = self._at(places)
+        table = None if self.table is None else {name: found[name] for name in self.table}
+        return replace(self, axes={name: found[name] for name in self.axes}, table=table)
 
     def first_cell(self, tile: Tile) -> int:
         """Index of the first cell of a tile, in the C order of the grid."""
         return int(np.ravel_multi_index([at.start for at in tile], self.shape)) if tile else 0
 
     def bodies(self) -> tuple[Grid, Array]:
-        """The grid of the bodies, without the start parameters, and for each cell the index of its body in it."""
-        if self.cases is not None:
-            return self, np.arange(self.size)
+        """The grid of the bodies, without the start parameters, and for each cell the index of its body in it.
+
+        Every case is a body of its own.
+        """
+        fixed = {name: float(values[0]) for name, values in self._at([slice(1)] * len(self.shape)).items()}
         kept = {name: values for name, values in self.axes.items() if name not in START}
-        place = np.arange(prod(map(len, kept.values()))).reshape([len(v) for v in kept.values()])
-        for position, name in enumerate(self.axes):
-            if name in START:
-                place = np.repeat(np.expand_dims(place, position), len(self.axes[name]), position)
-        constants = self.constants | {name: float(v[0]) for name, v in self.axes.items() if name in START}
-        return Grid(kept, constants), place.ravel()
+        table = self.table if self.table and (self.row == CASE or set(self.table) - START) else None
+        constants = self.constants | {name: fixed[name] for name in fixed if name not in {**kept, **(table or {})}}
+        bodies = replace(self, axes=kept, constants=constants, table=table)
+        own = [n if dim in bodies.dims else 1 for dim, n in zip(self.dims, self.shape, strict=True)]
+        return bodies, np.broadcast_to(np.arange(bodies.size).reshape(own), self.shape).ravel()
 
 
 _TILE = 1 << 18
@@ -140,5 +150,5 @@ BODY = tuple(p.name for p in PARAMETERS.values() if p.section in ("body", ""))
 
 def distinct(grid: Grid, names: tuple[str, ...]) -> Iterator[dict[str, Array]]:
     """Columns of cells that have every combination of the parameters `names`, a bounded number of cells at a time."""
-    grid = Grid({n: v if n in names else v[:1] for n, v in grid.axes.items()}, grid.constants, grid.cases)
+    grid = replace(grid, axes={n: v if n in names else v[:1] for n, v in grid.axes.items()})
     return (grid.part(tile).columns() for tile in grid.tiles(_TILE))

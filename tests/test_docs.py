@@ -85,7 +85,7 @@ def _coarsen(value: Any) -> Any:
     """The same configuration with axes of three values, without late times, and with one set of measurements, which
     spares a compilation."""
     if isinstance(value, dict):
-        return {key: min(3, v) if key == "num" else _coarsen(v) for key, v in value.items()}
+        return {key: min(3, v) if key in ("num", "samples") else _coarsen(v) for key, v in value.items()}
     return value
 
 

@@ -19,6 +19,7 @@ from sweep.models import MODELS, TIERS
 from sweep.models.model import Model
 from sweep.parameters import PARAMETERS
 from sweep.results import dataset
+from sweep.results.probabilities import PROBABILITIES
 
 Row = tuple[str, ...]
 
@@ -62,6 +63,8 @@ def _variables() -> tuple[Row, list[Row]]:
             words += ": " + ", ".join(f"{code} {flag}" for code, flag in spec.flags.items())
         over = "all but the start's" if spec.per_body else "all"
         rows.append((f"`{name}`", spec.dtype, over, words))
+    for name, spec in PROBABILITIES.items():
+        rows.append((f"`{name}`", spec.dtype, "all but `sample`, and `count`", spec.long_name))
     for name, spec in dataset.VERIFIED.items():
         rows.append((f"`verified_{name}`", spec.dtype, "`verified`", spec.long_name))
     return ("variable", "type", "axes", "meaning"), rows

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from sweep.config import cases, cross_checks, document, schema, user_models
 from sweep.config.configuration import FIRST_AXES, Config, model_of
+from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.messages import describe
@@ -113,7 +114,7 @@ def _source(config: ConfigLike) -> document.Document:
     if config.source:
         return deepcopy(config.source)
     values, table = config.document(), None
-    if config.cases is not None:
+    if config.cases is not None and not config.samples:
         values["cases"] = config.cases_file or "cases"
         table = values["cases"], config.cases
     return document.Document("", values, table=table, model=config.origin)
@@ -130,7 +131,12 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     """Fill in defaults, order the axes, and check that everything fits together."""
     known = loading.table(origin)
     given = _given(values, source, known)
-    columns = _table(values.cases, source, known) if values.cases is not None else None
+    uncertain = {name: value.distribution for name, value in given.items() if value.distribution}
+    samples = values.samples or (schema.SAMPLES if uncertain else None)
+    if values.cases is not None:
+        columns: dict[str, tuple[float, ...]] | None = _table(values.cases, source, known)
+    else:
+        columns = drawn(uncertain, samples, values.seed) if samples and uncertain else None
     physics = _physics(values, origin, frozenset((*given, *(columns or ()))))
     _refuse(source, cross_checks.of_physics(values, physics, origin))
     model = model_of(values.model, origin, physics)
@@ -148,6 +154,8 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         refine=values.refine,
         cases=columns,
         cases_file=values.cases,
+        samples=samples,
+        seed=values.seed,
         units=physics.units,
         law=physics.law.name,
         surface=physics.surface.name,
@@ -206,7 +214,7 @@ def _parameters(
         if name in given:
             found[name] = given[name]
         elif name not in columns and default is not None:
-            found[name] = Values((default,), False, default)
+            found[name] = Values.one(default)
     return found
 
 

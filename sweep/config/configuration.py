@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -15,6 +15,7 @@ from sweep.config.document import Document
 from sweep.config.faults import Fault, Path
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
+from sweep.grid import CASE, SAMPLE
 from sweep.models import TIERS
 from sweep.models.general import laws
 from sweep.models.general.selection import PAPER_LAW, Physics
@@ -52,8 +53,11 @@ class Config:
     verify: float = 0.0
     refine: int = 0
     cases: dict[str, tuple[float, ...]] | None = None
-    """Columns of the table of cases, if there is one."""
+    """Columns of the table of cases, if there is one, or of the samples."""
     cases_file: str | None = None
+    samples: int | None = None
+    """How many samples are drawn of the parameters that are distributions, if there are such."""
+    seed: int = 0
     units: str = PAPER_UNITS
     law: str = PAPER_LAW
     """Name of the law of friction, as in `sweep.models.general.laws.LAWS`."""
@@ -67,6 +71,19 @@ class Config:
     def fault(self, path: Path, message: str) -> Fault:
         """A fault at the key `path`, with the place where the user can correct it if that is known."""
         return (self.source or Document("")).fault(path, message, at_key=True)
+
+    @property
+    def row(self) -> str:
+        """What a row of `cases` is."""
+        return SAMPLE if self.samples else CASE
+
+    @property
+    def at_medians(self) -> Config:
+        """The same with the median in place of each distribution."""
+        if not self.samples:
+            return self
+        medians = {name: Values.one(self.parameters[name].numbers[0]) for name in self.cases or ()}
+        return replace(self, parameters=self.parameters | medians, cases=None, samples=None)
 
     @property
     def axes(self) -> dict[str, tuple[float, ...]]:
@@ -106,14 +123,15 @@ class Config:
         return self.tier
 
     def described(self, name: str) -> dict[str, str]:
-        """The CF attributes of a physical parameter."""
-        parameter = self.table[name]
+        """The CF attributes of a physical parameter, and its distribution if it has one."""
+        parameter, value = self.table[name], self.parameters.get(name)
+        known = {"distribution": value.distribution.words} if value and value.distribution else {}
         if name in (self.own_law or laws.LAWS[self.law]).pure:
-            return {"long_name": "coefficient of friction", "units": "1"}
+            return {"long_name": "coefficient of friction", "units": "1", **known}
         units, long_name = parameter.units, SURFACES[self.surface].meanings.get(name, parameter.long_name)
         if self.units == SI:
             units, long_name = in_si(units, long_name)
-        return {"long_name": long_name, "units": units}
+        return {"long_name": long_name, "units": units, **known}
 
     def document(self) -> dict[str, Any]:
         """The whole configuration, defaults included, as plain data."""
@@ -136,6 +154,7 @@ class Config:
             "model": self.model,
             **top,
             **({"cases": self.cases_file} if self.cases_file else {}),
+            **({"samples": self.samples, "seed": self.seed} if self.samples else {}),
             **{section: values for section, values in found.items() if values},
             "integrator": self.integrator.model_dump(),
             "measure": [{name: int(n)} if n else name for name, _, n in (m.partition("=") for m in self.measure)],

@@ -5,7 +5,6 @@ Each check yields the path of the key to be changed, and what is wrong with it a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from sweep.config import bodies
 from sweep.config.configuration import Config
 from sweep.config.faults import Path, either
-from sweep.config.schema import MAX_REFINED_CELLS
+from sweep.config.schema import MAX_CELLS_IN_MEMORY
 from sweep.config.values import Values
 from sweep.grid import BODY, Grid, distinct
 from sweep.kernels import measures, methods
@@ -59,11 +58,13 @@ def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
 
 def of_all_cells(config: Config) -> Iterator[Misfit]:
     """Check all cells together; each check relies on those before it."""
-    cells = math.prod(map(len, config.axes.values()))
+    cells = Grid.of(config).size
     if cells > MAX_CELLS:
         yield (), f"{cells} cells are too many; keep to {MAX_CELLS}"
-    if config.refine and cells > MAX_REFINED_CELLS:
-        yield ("refine",), f"cannot hold {cells} cells in memory; keep to {MAX_REFINED_CELLS}, or set it to 0"
+    if config.refine and cells > MAX_CELLS_IN_MEMORY:
+        yield ("refine",), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY}, or set it to 0"
+    if config.samples and cells > MAX_CELLS_IN_MEMORY:
+        yield ("samples",), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY} in all"
     for path, check in (
         (("body",), bodies.impossible),
         (("start", "x0"), bodies.misplaced),
@@ -80,13 +81,19 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
         # A number that the model does not use may stay, so that one file serves every model.
         if name not in model.parameters and value.is_axis:
             yield path, f"the {model.name} model has no {name}; its parameters are {', '.join(model.parameters)}"
-        elif name in columns:
+        elif name in columns and not config.samples:
             yield path, f"is also a column of {config.cases_file}; remove one of the two"
-        elif config.cases is not None and value.is_axis:
-            yield path, "cannot be an axis beside cases; give a number, or a column of the table"
+        elif config.cases_file and (value.is_axis or value.distribution):
+            kind = "a distribution" if value.distribution else "an axis"
+            yield path, f"cannot be {kind} beside cases; give a number, or a column of the table"
+        elif value.distribution and (beyond := [n for n in columns[name] if not config.table[name].allows(n)]):
+            words = f"{len(beyond)} of {len(columns[name])} samples are like {beyond[0]:.4g}"
+            yield path, f"must be {config.table[name].allowed}, but {words}; choose another distribution"
         if name in model.positive and 0.0 in value.numbers:
             yield path, f"must be > 0 for the {model.name} model, not 0"
-    for name, column in columns.items():
+    if config.samples and not columns:
+        yield ("samples",), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
+    for name, column in () if config.samples else columns.items():
         if name not in model.parameters:
             yield ("cases",), f"column {name}: the {model.name} model has no {name}; remove it"
         elif name in model.positive and 0.0 in column:
@@ -113,7 +120,7 @@ def _of_refinement(config: Config) -> Iterator[Misfit]:
     if not config.simulated:
         yield ("refine",), f"needs a simulation, but the {config.model} model is a formula; set it to 0"
     if config.cases is not None:
-        yield ("refine",), "cannot be combined with cases, which have no neighbours; set it to 0"
+        yield ("refine",), f"cannot be combined with {config.row}s, which have no neighbours; set it to 0"
     if config.verify:
         yield ("verify",), "cannot be combined with refine; set it to 0"
     if "reversals" not in config.measure:

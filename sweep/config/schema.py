@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from sweep.config.faults import either, refusal
 from sweep.config.messages import Allowed, wrong
-from sweep.config.values import Strict, Whole, parse_values, whole
+from sweep.config.values import MAX_AXIS, Strict, Whole, parse_values, whole
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
@@ -54,6 +54,9 @@ def _measure(raw: Any, i: int) -> str:
 VERIFIED = 0.002
 """Share of the cells that are run again unasked, in runs of so many cells that it amounts to one."""
 
+SAMPLES = 1024
+"""Default of `samples`."""
+
 FOREVER = 1e7
 """What `t_end: .inf` stands for, in sqrt(c/g): longer than any rattleback spins.  A trajectory that has not settled by
 then has the status `time_limit` all the same."""
@@ -67,8 +70,8 @@ LATER = 1e6
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
 
-MAX_REFINED_CELLS = 2**24
-"""Most cells of a refined run, which holds all its arrays in memory."""
+MAX_CELLS_IN_MEMORY = 2**24
+"""Most cells of a run of samples or of a refined one, which hold all their arrays in memory."""
 
 
 class Integrator(Strict):
@@ -195,8 +198,14 @@ class _Top(Strict):
         description=f"share of the cells, drawn at random, to run again with the plain method at half its step; by "
         f"default {VERIFIED:g} with `method: auto` where that is a cell or more and nothing is inferred, else 0",
     )  # fmt: skip
+    samples: Annotated[Whole | None, Allowed(f"a whole number >= 1 and <= {MAX_AXIS}")] = Field(
+        default=None, ge=1, le=MAX_AXIS,
+        description="how many samples to draw of the parameters that are given as distributions; by default "
+        f"{SAMPLES} if there is one",
+    )  # fmt: skip
+    seed: Whole = Field(default=0, ge=0, lt=2**32, description="seed of the samples; the same gives the same")
     refine: Whole = Field(
-        default=0, ge=0, le=MAX_REFINED_CELLS.bit_length() - 1,
+        default=0, ge=0, le=MAX_CELLS_IN_MEMORY.bit_length() - 1,
         description="the largest patches, whose inside is inferred from their sides, have 2^refine cells a side; 0 "
         "simulates every cell",
     )  # fmt: skip

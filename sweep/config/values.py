@@ -1,4 +1,4 @@
-"""The value of a physical parameter: a number, or an axis given as a list or a range."""
+"""The value of a physical parameter: a number, an axis given as a list or a range, or a distribution."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
+from sweep.config.distributions import FAMILIES, Distribution
 from sweep.config.document import number, plain_data
 from sweep.config.faults import fault_of, refusal
 from sweep.config.messages import describe, wrong
 from sweep.parameters import Parameter
+
+_MORE = ", a list of such, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}"
 
 MAX_AXIS = 1_000_000
 """Most values of one axis and most rows of a table of cases: they are held in memory as Python numbers."""
@@ -63,12 +66,19 @@ def _divided(start: float, stop: float, num: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Values:
-    """A parameter's checked value: one number, or an axis of distinct numbers."""
+    """A parameter's checked value: one number, an axis of distinct numbers, or a distribution."""
 
     numbers: tuple[float, ...]
+    """Of a distribution its median."""
     is_axis: bool
     spec: float | list[float] | dict[str, Any]
     """The value as it stands in the configuration."""
+    distribution: Distribution | None = None
+
+    @classmethod
+    def one(cls, number: float) -> Values:
+        """A single number."""
+        return cls((number,), False, number)
 
 
 def parse_values(parameter: Parameter, raw: Any) -> Values:
@@ -76,10 +86,10 @@ def parse_values(parameter: Parameter, raw: Any) -> Values:
     if parameter.units == "radian":
         raw = _in_radians(raw)
     if isinstance(raw, dict):
-        return _parse_range(parameter, raw)
+        return _parse_distribution(parameter, raw) if raw.keys() & FAMILIES.keys() else _parse_range(parameter, raw)
     if not isinstance(raw, list):
         _check_number(raw, parameter)
-        return Values((float(raw),), False, float(raw))
+        return Values.one(float(raw))
     if not raw:
         raise wrong("an empty axis; give it one number or more")
     for i, item in enumerate(raw):
@@ -120,6 +130,13 @@ def _parse_range(parameter: Parameter, raw: dict[str, Any]) -> Values:
     return _axis(numbers, span.model_dump())
 
 
+def _parse_distribution(parameter: Parameter, raw: dict[str, Any]) -> Values:
+    known = Distribution.parse(raw)
+    if not parameter.allows(known.median):
+        raise wrong(f"its median is {known.median:g}, but must be {parameter.allowed}")
+    return Values((known.median,), False, known.spec, known)
+
+
 def _axis(numbers: list[float], spec: Any = None) -> Values:
     if len(set(numbers)) < len(numbers):
         raise wrong("equal values on one axis; keep each once")
@@ -129,5 +146,5 @@ def _axis(numbers: list[float], spec: Any = None) -> Values:
 def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
     is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
     if not is_number or not parameter.allows(raw):
-        axis = "" if is_number or at else ", a list of such, or {start, stop, num, spacing: linear|log}"
+        axis = "" if is_number or at else _MORE
         raise wrong(refusal(raw, parameter.allowed + axis), *at)

@@ -23,6 +23,7 @@ from sweep.kernels.status import FAILURES, TIME_LIMIT
 from sweep.models.model import Model
 from sweep.parameters import Parameter, sections
 from sweep.results import dataset
+from sweep.results.dataset import ROWS
 from sweep.results.identity import Identity
 from sweep.results.provenance import identify
 from sweep.results.store import Store
@@ -31,7 +32,7 @@ RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
 """Names of the cells that a run can be asked to compute again, with their statuses."""
 
 # What may differ between a run and the one that it enlarges; one that computes cells again may change the integrator.
-_FREE = {"name", "max_failed_fraction", "verify", "measure", "integrator.t_end"}
+_FREE = {"name", "max_failed_fraction", "verify", "measure", "samples", "seed", "integrator.t_end"}
 
 
 @dataclass(frozen=True)
@@ -140,11 +141,11 @@ def _grid(there: xr.Dataset) -> Grid:
     """The grid of a dataset."""
     values = {str(name): coordinate.values for name, coordinate in there.coords.items()}
     constants = {name: float(value) for name, value in values.items() if value.ndim == 0}
-    dims = [str(d) for d in there["status"].dims]
-    if dims == ["case"]:
-        cases = {n: v for n, v in values.items() if there[n].dims == ("case",) and n != "case"}
-        return Grid({}, constants, cases)
-    return Grid({name: values[name] for name in dims}, constants)
+    *names, last = map(str, there["status"].dims or [""])
+    if last not in ROWS:
+        return Grid({name: values[name] for name in map(str, there["status"].dims)}, constants)
+    table = {n: v for n, v in values.items() if there[n].dims == (last,) and n != last}
+    return Grid({name: values[name] for name in names}, constants, table, last)
 
 
 def _match(grid: Grid, there: Grid) -> Array:

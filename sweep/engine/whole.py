@@ -54,6 +54,9 @@ class Whole:
 
         Every tile is read twice: the file begins with what the tiles hold apart from their cells.
         """
+        if self.config.samples:  # a probability is of all samples together
+            netcdf.write(path, self.dataset())
+            return
         tails, apart = dict[str, tuple[int, ...]](), list[Apart]()
         for i in range(len(self.tiles)):
             arrays = self.store.load(i)
@@ -117,8 +120,8 @@ class Some(Whole):
         """The configuration whose cases are the simulated cells, which `tiles` cover."""
         table = self.grid.take(self.cells)
         constants = {name: self.config.parameters[name] for name in table.constants}
-        cases = {name: tuple(values.tolist()) for name, values in (table.cases or {}).items()}
-        return replace(self.config, refine=0, verify=0.0, parameters=constants, cases=cases)
+        cases = {name: tuple(values.tolist()) for name, values in (table.table or {}).items()}
+        return replace(self.config, refine=0, verify=0.0, parameters=constants, cases=cases, samples=None)
 
     def save(self, path: Path) -> None:
         """Write the labelled dataset, which has to fit into memory."""

@@ -41,6 +41,8 @@ def yaml(source: Source, setup: Setup, state: State) -> str:
     lines += [f"# python -m sweep trajectory {name} {_options(config, cell)}" for cell in state.cells]
     if "case" in source.dims:
         lines.append("# The cases of the table are left out; this is the first of them.")
+    if "sample" in source.dims:
+        lines.append("# The samples are left out; the medians of their distributions stand for them.")
     return "\n".join([*lines, config.to_yaml()])
 
 
@@ -50,7 +52,7 @@ def _sliced(source: Source, config: Config, state: State) -> Config:
     for name, at in state.at.items():
         if name in parameters and name not in (state.x, state.y):
             value = float(source.axes[name].values[at])
-            parameters[name] = Values((value,), False, value)
+            parameters[name] = Values.one(value)
     return replace(config, parameters=parameters)
 
 

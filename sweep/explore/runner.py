@@ -87,7 +87,7 @@ class Job(Reporter):
 def run(setup: Setup, cell: Cell, reporter: Reporter | None = None) -> Curve:
     """Run the trajectory of a cell, with the usual measurements, and keep what is worth a look (`lively_until`)."""
     began = time.perf_counter()
-    parameters = {name: Values((value,), False, value) for name, value in cell.items()}
+    parameters = {name: Values.one(value) for name, value in cell.items()}
     t_end = setup.config.integrator.patient.t_end
     t_end = LONG if t_end >= FOREVER else t_end
     integrator = setup.config.integrator.model_copy(update={"t_end": t_end})

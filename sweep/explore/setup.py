@@ -89,4 +89,5 @@ def _configuration(source: Source, named: dict[str, str], announce: Announce | N
     if not config.simulated:
         raise ConfigError([])
     names = config.tier.parameters
+    config = config.at_medians
     return replace(config, parameters={name: config.parameters[name] for name in names if name in config.parameters})

@@ -69,7 +69,7 @@ class Source:
         more = [
             str(d)
             for variable in self.dataset.data_vars.values()
-            if set(self.dims) <= set(variable.dims)
+            if set(self.dims) & set(variable.dims)
             for d in variable.dims
         ]
         return list(dict.fromkeys([*self.dims, *more]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import xarray as xr
 
@@ -43,11 +44,16 @@ _PARAMETER_WORDS = {
     "omega2": "start angular velocity ω₂ about the axis of b",
     "omega3": "start angular velocity ω₃ about z",
     "case": "case",
+    "sample": "sample",
+    "count": "spin reversals, at least",
     "trajectory": "trajectory",
 }
 
 _VARIABLE_WORDS = {
     "reversals": "spin reversals, simulated",
+    "probability": "probability of so many spin reversals or more",
+    "probability_low": "probability, lower end of its 95 % interval",
+    "probability_high": "probability, upper end of its 95 % interval",
     "reversals_predicted": "spin reversals, predicted (Takano 2011)",
     "difference": "simulated − predicted",
     "ratio": "first reversal, simulated / predicted",
@@ -143,6 +149,8 @@ def number(at: float) -> str:
 
 def value(name: str, at: float) -> str:
     """A parameter with its value, such as "μ = 60"."""
+    if name == "count":
+        return f"{reversals(int(at))} or more"
     return f"{symbol(name)} = {number(at)}"
 
 
@@ -166,7 +174,16 @@ def constants(dataset: xr.Dataset) -> str:
     if not is_of_own_body(dataset):
         found = {name: at for name, at in found.items() if at or name not in PARAMETERS or PARAMETERS[name].default}
     ordered = [name for name in parameters(dataset) if name in found]
-    return ", ".join(measured(dataset, name, found[name]) for name in dict.fromkeys([*ordered, *found]))
+    fixed = [measured(dataset, name, found[name]) for name in dict.fromkeys([*ordered, *found])]
+    return ", ".join([*fixed, *_distributions(dataset)])
+
+
+def _distributions(dataset: xr.Dataset) -> Iterator[str]:
+    """What is known of each parameter that was sampled."""
+    for name, coordinate in dataset.coords.items():
+        if known := coordinate.attrs.get("distribution"):
+            units = "" if coordinate.attrs["units"] == "1" else f" {unit(dataset, str(name))}"
+            yield f"{symbol(str(name))}: {known}{units}"
 
 
 def _fraction(units: str) -> str:

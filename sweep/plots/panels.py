@@ -23,6 +23,9 @@ MAX_PANELS = 8
 _HEADING, _LETTERS = 90, 13.0
 """Most letters in a line of the constant parameters above a figure, and letters that an inch of the figure holds."""
 
+_TELLING = 3
+"""Maps of probabilities, each of another count, that one figure shows unasked."""
+
 _PANEL_VALUES = 4
 """An axis of more values is drawn as an axis; one of fewer gets a panel for each value."""
 
@@ -68,6 +71,10 @@ def choose(
         raise ValueError(f"x and y are both {x}; choose two axes")
     across = _across(dataset, dims, x, y)
     rest = [d for d in dims if d not in across]
+    if names == ["probability"] and len(across) < 2:
+        rest.remove("count")  # all counts are drawn together
+    elif names == ["probability"] and "count" in rest:
+        dataset = dataset.isel(count=_telling(dataset))
     if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
         shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
         raise ValueError(f"{count} panels ({shown}) are more than {MAX_PANELS}; select one value of an axis")
@@ -124,10 +131,16 @@ def _variables(dataset: xr.Dataset, variable: str | None) -> list[str]:
 def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:
     """The dimensions to draw as axes, the vertical one first: those asked for, then the first long ones."""
     free = [d for d in dims if d not in (x, y)]
-    long = [d for d in free if dataset.sizes[d] > _PANEL_VALUES]
-    longest = sorted(free, key=lambda d: -dataset.sizes[d])[:1]
+    long = [d for d in free if dataset.sizes[d] > _PANEL_VALUES and d != "count"]
+    longest = sorted((d for d in free if d != "count"), key=lambda d: -dataset.sizes[d])[:1]
     if x is None and y is None:
         return (long or longest)[:2]
     if x is None:
         return [d for d in (y, *(long or longest)[:1]) if d]
     return [d for d in (y or next(iter(long), None), x) if d]
+
+
+def _telling(dataset: xr.Dataset) -> list[int]:
+    """The indices of up to three counts whose probability differs most from cell to cell, in their order."""
+    over = [d for d in dataset["probability"].dims if d != "count"]
+    return sorted(np.argsort(-dataset["probability"].std(over).values)[:_TELLING].tolist())

@@ -10,7 +10,7 @@ import matplotlib as mpl
 import xarray as xr
 from matplotlib.figure import Figure
 
-from sweep.plots import boundaries, critical, curves, fit, maps, panels, scales, trajectories
+from sweep.plots import boundaries, critical, curves, fit, maps, panels, probabilities, scales, trajectories
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import subject
 from sweep.plots.scales import Limits
@@ -99,6 +99,8 @@ def _drawn(datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any
             return fit.draw(dataset)
         return boundaries.draw(dataset) if found == BOUNDARIES else critical.draw(dataset)
     chosen = panels.choose(dataset, variable, **axes)
+    if chosen.names == ["probability"] and len(chosen.across) < 2:
+        return probabilities.draw(chosen)
     return maps.draw(chosen, **colours) if len(chosen.across) == 2 else curves.draw(chosen, colours["limits"])
 
 

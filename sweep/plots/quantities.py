@@ -89,6 +89,8 @@ def subject(dataset: xr.Dataset) -> str:
     It is the first variable of the measurement that the configuration names first, or the quantity that this serves.
     Where it is lacking, it is the reversals.
     """
+    if "probability" in dataset:
+        return "probability"
     measurement = str(dataset.attrs.get("measured", "")).partition(" ")[0].partition("=")[0]
     served = [_SERVE[measurement]] if measurement in _SERVE else []
     variables = MEASURES[measurement].variables if measurement in MEASURES else {}

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError
-from sweep.grid import Array, Grid
+from sweep.grid import CASE, SAMPLE, Array, Grid
 from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
@@ -19,6 +19,7 @@ from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.parameters import PAPER_UNITS, SI
 from sweep.prediction import Prediction
+from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.variables import Variable, in_si, without_unit
 
 STATUSES = {
@@ -45,6 +46,10 @@ REASONS = {
     NO_BODY: "impossible",
 }
 """Whether there is a critical spin, n_c1 by the eigenvalues and n_c2 by simulation, and why not."""
+
+
+ROWS = {CASE: "row of the table of cases", SAMPLE: "number of the sample"}
+"""What the index along the rows of a table says."""
 
 
 def _critical(sign: str, event: str, source: str) -> Variable:
@@ -165,22 +170,38 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
         if along := VARIABLES[name].along:
             words = {"long_name": f"number of the {along}", "units": "1"}
             coordinates[along] = xr.Variable((along,), np.arange(1, variable.shape[-1] + 1), words)
-    for name, column in (grid.cases or {}).items():
-        coordinates[name] = xr.Variable(("case",), column, config.described(name))
-    if grid.cases is not None:
-        index = np.arange(grid.size, dtype="int64")
-        coordinates["case"] = xr.Variable(("case",), index, {"long_name": "row of the table of cases", "units": "1"})
+    for name, column in (grid.table or {}).items():
+        coordinates[name] = xr.Variable((grid.row,), column, config.described(name))
+    if grid.rows is not None:
+        index = np.arange(grid.rows, dtype="int64")
+        coordinates[grid.row] = xr.Variable((grid.row,), index, {"long_name": ROWS[grid.row], "units": "1"})
     for name, value in grid.constants.items():
         coordinates[name] = xr.Variable((), value, config.described(name))
     of = " of a rattleback" if config.of_rattlebacks else ""
     head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals{of} ({config.model} model)"}
     head |= {"surface": config.surface} if config.surface != ELLIPSOID.name else {}
-    return xr.Dataset(variables, coordinates, {**head, **attributes})
+    found = xr.Dataset(variables, coordinates, {**head, **attributes})
+    return with_probabilities(config, found) if grid.row == SAMPLE and "reversals" in found else found
+
+
+def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
+    """`dataset`, of samples, with the probability of each number of reversals."""
+    axes = [dim for dim in dataset["status"].dims if dim != SAMPLE]
+    found = probabilities(dataset)
+    counts = np.arange(1, found["probability"].shape[-1] + 1)
+    coordinate = xr.Variable(("count",), counts, {"long_name": "number of reversals or more", "units": "1"})
+    return dataset.assign_coords(count=coordinate).assign(
+        {
+            name: xr.Variable((*axes, "count"), found[name], described(spec, config.units))
+            for name, spec in PROBABILITIES.items()
+        }
+    )
 
 
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
     """Raise a `ConfigError` if a parameter has the name of a variable, or of one of these `series`."""
-    names = {*VARIABLES, *(f"verified_{name}" for name in ("cell", *VERIFIED)), *series} & set(config.tier.parameters)
+    own = {*VARIABLES, *PROBABILITIES, *ROWS, *(f"verified_{name}" for name in ("cell", *VERIFIED)), *series}
+    names = own & set(config.tier.parameters)
     if names:
         words = f"parameter {min(names)}: is reserved for a variable of the dataset; rename it"
         raise ConfigError([config.fault(("model",), words)])

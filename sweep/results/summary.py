@@ -12,6 +12,7 @@ from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import EXISTS, REASONS, STATUSES
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, TRAJECTORY, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
+from sweep.results.probabilities import PROBABILITIES
 
 
 def failed_fraction(dataset: xr.Dataset) -> float:
@@ -129,6 +130,8 @@ def _summary(dataset: xr.Dataset) -> Iterator[str]:
         valid = np.isin(status, (SETTLED, TIME_LIMIT))
         if valid.any():
             yield _reversals(dataset, valid)
+    if "probability" in dataset and dataset["probability"].dims == ("count",):
+        yield f"probability: {', '.join(_probabilities(dataset))}"
     if "spin_error" in dataset:
         error = np.ravel(dataset["spin_error"].values)
         if np.isfinite(error).any():
@@ -149,6 +152,14 @@ def _summary(dataset: xr.Dataset) -> Iterator[str]:
     if "wall_time" in dataset.attrs:
         seconds, rate = dataset.attrs["wall_time"], dataset.attrs["trajectories_per_second"]
         yield f"cost: {seconds:.3g} s, {rate:.3g} trajectories/s"
+
+
+def _probabilities(dataset: xr.Dataset) -> Iterator[str]:
+    """How probable each number of reversals or more is."""
+    for count in dataset["count"].values:
+        one = dataset.sel(count=count)
+        share, low, high = (one[name].item() for name in PROBABILITIES)
+        yield f"{count} or more {share:.3f} ({low:.3f} to {high:.3f})"
 
 
 def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:

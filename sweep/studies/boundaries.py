@@ -28,7 +28,7 @@ from sweep.results.margins import FOUND, OPEN, POINTS, UNCERTAIN, Counts
 from sweep.results.store import Store
 from sweep.studies.kept import kept
 from sweep.studies.roots import Root
-from sweep.studies.search import Search, measuring, require_simulated
+from sweep.studies.search import Search, measuring, require_certain, require_simulated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,6 +64,7 @@ def boundaries(
 def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
     """The axes over which boundaries are curves: those named, or else the first two."""
     require_simulated(config)
+    require_certain(config)
     if COUNT not in config.equations.offers:
         raise ConfigError([config.fault(("model",), "counts no reversals, so that there are no boundaries")])
     long = [name for name, values in config.axes.items() if len(values) > 1]

@@ -34,7 +34,7 @@ from sweep.results.margins import Counts
 from sweep.results.store import Store
 from sweep.studies.kept import kept
 from sweep.studies.roots import Root
-from sweep.studies.search import Search, measuring, require_simulated
+from sweep.studies.search import Search, measuring, require_certain, require_simulated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,6 +75,7 @@ def critical(
 def searchable(config: Config) -> Config:
     """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
     require_simulated(config)
+    require_certain(config)
     if not config.of_rattlebacks:
         raise ConfigError([config.fault(("model",), "no rattleback; critical spins are asked of: slip, noslip")])
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
@@ -83,7 +84,7 @@ def searchable(config: Config) -> Config:
         raise ConfigError(
             [config.fault(("start",), "cannot be given by angles and angular velocities here; give x0 and y0")]
         )
-    parameters = config.parameters | {"n0": Values((0.0,), False, 0.0)}
+    parameters = config.parameters | {"n0": Values.one(0.0)}
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
     found = replace(measuring(config), parameters=parameters, cases=cases or None)
     return replace(found, integrator=found.integrator.patient)

@@ -40,7 +40,7 @@ def of_critical(config: Config) -> str:
     config = critical.searchable(config)
     grid = Grid.of(config)
     axes = " × ".join(f"{name} {len(values)}" for name, values in grid.axes.items())
-    if grid.cases is not None:
+    if grid.table is not None:
         axes = f"case {grid.size}"
     bodies = f"bodies: {grid.size} ({axes or 'one body'}), each with spins of both signs"
     search = critical.CriticalSpins(config, Memory(), critical.WIDTH)

@@ -29,7 +29,7 @@ from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.film import Film, read
 from sweep.studies.misfit import Minimum, Problem
-from sweep.studies.search import require_simulated
+from sweep.studies.search import require_certain, require_simulated
 from sweep.variables import Variable
 
 _TIME = Variable("float64", "1", "time since the film began, in sqrt(c/g)")
@@ -77,6 +77,7 @@ def fit(config: Config, film: str | Path | Film, free: Sequence[str], reporter: 
 def _one_body(config: Config, free: Sequence[str]) -> Config:
     """`config` if it describes one body, apart from the `free` parameters; `ConfigError` if not."""
     require_simulated(config)
+    require_certain(config)
     known = config.tier.parameters
     if not free:
         raise fault_of(f"name the free parameters, out of {', '.join(known)}")
@@ -265,5 +266,5 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
 
 def _with(config: Config, values: Mapping[str, float]) -> Config:
     """`config` with these values of its parameters."""
-    fixed = {name: Values((value,), False, value) for name, value in values.items()}
+    fixed = {name: Values.one(value) for name, value in values.items()}
     return replace(config, name=f"{config.name}_fit", parameters=config.parameters | fixed)

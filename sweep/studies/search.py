@@ -37,6 +37,14 @@ def measuring(config: Config) -> Config:
     return replace(config, measure=measure, verify=0.0, refine=0, integrator=integrator)
 
 
+def require_certain(config: Config) -> None:
+    """Raise a `ConfigError` if a parameter is a distribution."""
+    for name, value in config.parameters.items():
+        if value.distribution:
+            words = "is a distribution, of which run draws samples; here give a number or an axis"
+            raise ConfigError([config.fault(config.table[name].place, words)])
+
+
 def require_simulated(config: Config) -> None:
     """Raise a `ConfigError` if the model is a formula, which takes no steps."""
     if not config.simulated:

@@ -204,6 +204,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
         raise ConfigError(
             [Fault("", None, None, (), f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")]
         )
+    config = config.at_medians
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
         constants |= {name: column[0] for name, column in config.cases.items()}

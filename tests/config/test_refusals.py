@@ -45,7 +45,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (mu(".nan"), 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, not nan"),
     (mu("[40, .inf]"), 3, "friction.mu[1]", "must be a finite number >= 0"),
     (mu("[-40, 60]"), 3, "friction.mu[0]", "must be a finite number >= 0 and < 1e+12, not -40"),
-    (small("10.0", "ten"), 2, "body.a", "a list of such, or {start, stop, num, spacing: linear|log}, not 'ten'"),
+    (small("10.0", "ten"), 2, "body.a", "a list of such, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}, not 'ten'"),
     (small("10.0", "true"), 2, "body.a", "not true"),
     (small("a: 10.0", "a: "), 2, "body.a", "not nothing"),
     (small("a: 10.0", "a: 0"), 2, "body.a", "must be a finite number > 0 and < 1e+06, not 0"),

@@ -1,0 +1,118 @@
+"""Parameters that are known as a distribution, and the samples that are drawn of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import inf, isfinite, log
+from typing import Any, Literal
+
+import numpy as np
+
+from sweep.config.faults import refusal
+from sweep.config.messages import wrong
+from sweep.grid import Array
+
+
+def _normal(chance: Array, mean: float, deviation: float) -> Array:
+    from scipy.special import ndtri  # here, since few configurations need it
+
+    return np.asarray(mean + deviation * ndtri(chance))
+
+
+def _lognormal(chance: Array, median: float, deviation: float) -> Array:
+    return np.exp(_normal(chance, log(median), deviation))
+
+
+def _uniform(chance: Array, low: float, high: float) -> Array:
+    return low + (high - low) * chance
+
+
+@dataclass(frozen=True)
+class Family:
+    """Distributions of one kind, which two numbers tell apart."""
+
+    quantile: Callable[[Array, float, float], Array]
+    """The value that a sample falls short of with a chance above 0 and below 1, from the chance and the two numbers."""
+    words: tuple[str, str]
+    """What the two numbers are."""
+    above: tuple[float, float | Literal["first"]]
+    """What each of the two has to exceed; the second perhaps the first."""
+
+
+FAMILIES = {
+    "normal": Family(_normal, ("mean", "standard deviation"), (-inf, 0.0)),
+    "lognormal": Family(_lognormal, ("median", "standard deviation of the logarithm"), (0.0, 0.0)),
+    "uniform": Family(_uniform, ("lowest value", "highest value"), (-inf, "first")),
+}
+"""The distributions that a configuration may give to a parameter, as in `{normal: [-6.3, 0.3]}`."""
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """What is known of a parameter."""
+
+    family: str
+    first: float
+    second: float
+
+    @classmethod
+    def parse(cls, raw: Mapping[str, Any]) -> Distribution:
+        """The distribution that a configuration names; `wrong` tells what is wrong with it."""
+        if len(raw) > 1:
+            raise wrong(f"a distribution beside other keys; keep one of {', '.join(raw)}")
+        ((name, numbers),) = raw.items()
+        family = FAMILIES[name]
+        if not isinstance(numbers, list) or len(numbers) != 2:
+            raise wrong(refusal(numbers, "[{}, {}]".format(*family.words)), name)
+        for i, (number, word, above) in enumerate(zip(numbers, family.words, family.above, strict=True)):
+            least = numbers[0] if above == "first" else above
+            if not _is_number(number) or not number > least:
+                bound = "" if least == -inf else f" > {least:g}"
+                raise wrong(refusal(number, f"the {word}, a finite number{bound}"), name, i)
+        return cls(name, *map(float, numbers))
+
+    @property
+    def spec(self) -> dict[str, list[float]]:
+        """As it stands in a configuration."""
+        return {self.family: [self.first, self.second]}
+
+    @property
+    def words(self) -> str:
+        """Such as "normal, mean 0.05, standard deviation 0.002"."""
+        first, second = FAMILIES[self.family].words
+        return f"{self.family}, {first} {self.first:g}, {second} {self.second:g}"
+
+    def at(self, chance: Array) -> Array:
+        """The values that samples fall short of with these chances, each above 0 and below 1, of the same shape."""
+        return FAMILIES[self.family].quantile(chance, self.first, self.second)
+
+    @property
+    def median(self) -> float:
+        return float(self.at(np.array(0.5)))
+
+
+def drawn(known: Mapping[str, Distribution], number: int, seed: int) -> dict[str, tuple[float, ...]]:
+    """Draw so many samples of all parameters, each of its distribution and independent of the others.
+
+    They lie at scrambled Sobol points, which fill the ranges more evenly than chance does; more samples of one seed
+    begin with the fewer (Owen 1998, doi 10.1006/jcom.1998.0487).
+
+    Returns
+    -------
+    The numbers of each parameter, shape (number,).
+    """
+    from scipy.stats import qmc  # takes half a second
+
+    power = max(number - 1, 0).bit_length()
+    points = qmc.Sobol(len(known), rng=seed, bits=_BITS).random_base2(power)[:number]
+    chance = points + 2.0 ** -(_BITS + 1)  # in the middle of its cell: never 0
+    return {name: tuple(each.at(chance[:, i]).tolist()) for i, (name, each) in enumerate(known.items())}
+
+
+_BITS = 52
+"""Binary digits of a Sobol point."""
+
+
+def _is_number(raw: Any) -> bool:
+    return isinstance(raw, int | float) and not isinstance(raw, bool) and isfinite(raw)
