@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from sweep.studies.predictions import predict
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "boundaries", "critical", "fit", "load_config", "open", "plot", "predict",
-    "run", "trajectory",
+    "Config", "ConfigError", "StoreError", "boundaries", "critical", "fit", "indices", "load_config", "open", "plot",
+    "predict", "run", "trajectory",
 ]  # fmt: skip
 
 _HOMES = {
@@ -260,6 +260,44 @@ def fit(
 
     with shown(progress, reporter) as told:
         return fit(load_config(config, overrides, announce=told.note), film, free, told)
+
+
+def indices(
+    config: ConfigLike,
+    output: str | Path | None = None,
+    *,
+    fresh: bool = False,
+    progress: bool | None = None,
+    reporter: Reporter | None = None,
+    cluster: Cluster | None = None,
+    **overrides: Any,
+) -> xr.Dataset:
+    """Tell on which of the uncertain parameters the results of a scene depend, by Sobol indices.
+
+    Parameters
+    ----------
+    config, output, fresh, progress, reporter, cluster, overrides : as for `run`.  Some parameters are distributions,
+        and none is an axis.  n (uncertain parameters + 2) trajectories are run, n being the samples rounded up to a
+        power of two
+
+    Returns
+    -------
+    Dataset over (quantity, parameter): the index of `first_order`, which a parameter has alone, and of `total_order`,
+    with all that it shares with others, both with the ends of their intervals of 95 %.  NaN where a sample failed,
+    where not all samples have the quantity, or where all have the same.
+
+    Raises
+    ------
+    ConfigError, StoreError
+        as `run`; also if the model is a formula, no parameter is a distribution, or one is an axis.
+    """
+    from sweep.config import load_config
+    from sweep.progress import shown
+    from sweep.studies.indices import indices
+
+    with shown(progress, reporter) as told:
+        checked = load_config(config, overrides, announce=told.note)
+        return indices(checked, output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:

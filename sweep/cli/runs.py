@@ -1,4 +1,4 @@
-"""The commands that simulate: `run`, `trajectory`, `boundaries`, `critical` and `fit`."""
+"""The commands that simulate: `run`, `trajectory`, `boundaries`, `critical`, `indices` and `fit`."""
 
 from __future__ import annotations
 
@@ -187,6 +187,27 @@ def critical(
         click.echo(estimates.of_critical(checked))
     else:
         _written(checked, "critical", partial(search, checked, width, fresh=fresh), **how)
+
+
+@click.command()
+@CONFIG
+@_resumed
+def indices(config: Path, settings: tuple[str, ...], dry_run: bool, fresh: bool, **how: Any) -> None:
+    """Tell on which of the uncertain parameters of CONFIG its results depend.
+
+    CONFIG is of one scene, with a distribution for each parameter that is uncertain.  Sobol indices say how much of the
+    variance of counts and times comes from each.  Writes NAME_indices.nc and .png.  If it is interrupted, finished
+    simulations are kept, and the same command resumes.
+    """
+    checked = loaded(config, settings)
+    from sweep.engine.estimate import estimate
+    from sweep.studies.indices import designed
+    from sweep.studies.indices import indices as find
+
+    if dry_run:
+        click.echo(estimate(designed(checked)))
+    else:
+        _written(checked, "indices", partial(find, checked, fresh=fresh), **how)
 
 
 @click.command()

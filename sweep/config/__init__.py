@@ -131,15 +131,14 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     """Fill in defaults, order the axes, and check that everything fits together."""
     known = loading.table(origin)
     given = _given(values, source, known)
-    uncertain = {name: value.distribution for name, value in given.items() if value.distribution}
-    samples = values.samples or (schema.SAMPLES if uncertain else None)
-    if values.cases is not None:
-        columns: dict[str, tuple[float, ...]] | None = _table(values.cases, source, known)
-    else:
-        columns = drawn(uncertain, samples, values.seed) if samples and uncertain else None
+    columns = _table(values.cases, source, known) if values.cases is not None else None
     physics = _physics(values, origin, frozenset((*given, *(columns or ()))))
     _refuse(source, cross_checks.of_physics(values, physics, origin))
     model = model_of(values.model, origin, physics)
+    uncertain = {n: v.distribution for n, v in given.items() if v.distribution and n in model.parameters}
+    samples = values.samples or (schema.SAMPLES if uncertain else None)
+    if samples and uncertain and values.cases is None:
+        columns = drawn(uncertain, samples, values.seed)
     parameters = _parameters(model, given, columns or {}, known, physics)
     rattleback = not origin or loading.law(origin) is not None
     numbers = {name: value.numbers for name, value in parameters.items()} | (columns or {})

@@ -86,7 +86,7 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
         elif config.cases_file and (value.is_axis or value.distribution):
             kind = "a distribution" if value.distribution else "an axis"
             yield path, f"cannot be {kind} beside cases; give a number, or a column of the table"
-        elif value.distribution and (beyond := [n for n in columns[name] if not config.table[name].allows(n)]):
+        elif config.samples and (beyond := [n for n in columns.get(name, ()) if not config.table[name].allows(n)]):
             words = f"{len(beyond)} of {len(columns[name])} samples are like {beyond[0]:.4g}"
             yield path, f"must be {config.table[name].allowed}, but {words}; choose another distribution"
         if name in model.positive and 0.0 in value.numbers:

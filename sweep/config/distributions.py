@@ -95,19 +95,23 @@ class Distribution:
 def drawn(known: Mapping[str, Distribution], number: int, seed: int) -> dict[str, tuple[float, ...]]:
     """Draw so many samples of all parameters, each of its distribution and independent of the others.
 
-    They lie at scrambled Sobol points, which fill the ranges more evenly than chance does; more samples of one seed
-    begin with the fewer (Owen 1998, doi 10.1006/jcom.1998.0487).
-
     Returns
     -------
     The numbers of each parameter, shape (number,).
     """
+    chance = chances(len(known), number, seed)
+    return {name: tuple(each.at(chance[:, i]).tolist()) for i, (name, each) in enumerate(known.items())}
+
+
+def chances(parameters: int, number: int, seed: int) -> Array:
+    """Scrambled Sobol points, which fill the unit cube more evenly than chance does; shape (number, parameters).
+
+    None is on its sides.  More points of one seed begin with the fewer (Owen 1998, doi 10.1006/jcom.1998.0487).
+    """
     from scipy.stats import qmc  # takes half a second
 
-    power = max(number - 1, 0).bit_length()
-    points = qmc.Sobol(len(known), rng=seed, bits=_BITS).random_base2(power)[:number]
-    chance = points + 2.0 ** -(_BITS + 1)  # in the middle of its cell: never 0
-    return {name: tuple(each.at(chance[:, i]).tolist()) for i, (name, each) in enumerate(known.items())}
+    points = qmc.Sobol(parameters, rng=seed, bits=_BITS).random_base2((number - 1).bit_length())[:number]
+    return np.asarray(points + 2.0 ** -(_BITS + 1))  # the middles of their cells: none is 0
 
 
 _BITS = 52

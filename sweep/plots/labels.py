@@ -116,6 +116,11 @@ def words(dataset: xr.Dataset, name: str) -> str:
     return short or _SCALE.sub("", _long_name(dataset, name)) or name.replace("_", " ")
 
 
+def short(name: str) -> str:
+    """A variable of a run in a few words."""
+    return _VARIABLE_WORDS.get(name, name.replace("_", " "))
+
+
 def label(dataset: xr.Dataset, name: str) -> str:
     """The label of an axis: what it shows, and the unit."""
     return f"{words(dataset, name)} ({found})" if (found := unit(dataset, name)) else words(dataset, name)

@@ -10,17 +10,20 @@ import matplotlib as mpl
 import xarray as xr
 from matplotlib.figure import Figure
 
-from sweep.plots import boundaries, critical, curves, fit, maps, panels, probabilities, scales, trajectories
+from sweep.plots import boundaries, critical, curves, fit, indices, maps, panels, probabilities, scales, trajectories
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import subject
 from sweep.plots.scales import Limits
-from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, TRAJECTORY, kind
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
 _NO_DATE: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _DPI = 110
 
+
+_OWN = {BOUNDARIES: boundaries.draw, FIT: fit.draw, INDICES: indices.draw}
+"""Kinds of dataset that have one picture each."""
 
 Source = xr.Dataset | str | Path
 """A dataset, or the path of its file."""
@@ -83,21 +86,19 @@ def _drawn(datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any
     """The figure of datasets, of whatever kind they are."""
     kinds = {kind(each) for each in datasets}
     if len(datasets) != 1:
-        if not datasets or kinds & {BOUNDARIES, CRITICAL, FIT, TRAJECTORY}:
+        if kinds != {RUN}:
             raise ValueError("several datasets can be drawn side by side only if each is of a run")
         common = variable or subject(datasets[0])
         return maps.draw_beside([panels.choose(each, common, **axes) for each in datasets], **colours)
     (dataset,), (found,) = datasets, kinds
-    if found in (BOUNDARIES, FIT) and variable is not None:
+    if found in _OWN and variable is not None:
         raise ValueError(f"variable: not for a figure of {found}, which draws what it is; leave it out")
-    if found in (TRAJECTORY, BOUNDARIES, FIT) or (found == CRITICAL and variable is None):
+    if found in (TRAJECTORY, *_OWN) or (found == CRITICAL and variable is None):
         if given := [name for name, value in {**axes, **colours}.items() if value]:
             raise ValueError(f"{given[0]}: not for a figure of {found}; name it for the maps of a run alone")
         if found == TRAJECTORY:
             return trajectories.draw(dataset, variable)
-        if found == FIT:
-            return fit.draw(dataset)
-        return boundaries.draw(dataset) if found == BOUNDARIES else critical.draw(dataset)
+        return {**_OWN, CRITICAL: critical.draw}[found](dataset)
     chosen = panels.choose(dataset, variable, **axes)
     if chosen.names == ["probability"] and len(chosen.across) < 2:
         return probabilities.draw(chosen)

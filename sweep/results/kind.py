@@ -1,4 +1,4 @@
-"""Says what a dataset is of: a run, single trajectories, critical spins, boundaries, or a fit."""
+"""Says what a dataset is of: a run, single trajectories, critical spins, boundaries, a fit, or Sobol indices."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 
 RUN, TRAJECTORY, CRITICAL, BOUNDARIES = "a run", "single trajectories", "critical spins", "boundaries"
-FIT = "a fit"
+FIT, INDICES = "a fit", "Sobol indices"
 
 
 OWN_BODY = "a model"
@@ -26,7 +26,7 @@ def parameters(dataset: xr.Dataset) -> list[str]:
 
 
 def kind(dataset: xr.Dataset) -> str | None:
-    """Which of the five, told by the variables alone; None if it is of another program.
+    """Which of the six, told by the variables alone; None if it is of another program.
 
     Predictions count as a run, and so does a part of one.
     """
@@ -38,4 +38,6 @@ def kind(dataset: xr.Dataset) -> str | None:
         return BOUNDARIES
     if {"seen", "fitted", "correlation"} <= set(dataset.variables):
         return FIT
+    if {"first_order", "total_order"} <= set(dataset.variables):
+        return INDICES
     return RUN if set(VARIABLES) & set(dataset.data_vars) else None

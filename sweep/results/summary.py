@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import xarray as xr
@@ -10,7 +10,7 @@ import xarray as xr
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import EXISTS, REASONS, STATUSES
-from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, TRAJECTORY, kind, parameters
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, TRAJECTORY, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
 
@@ -27,15 +27,8 @@ def summarize(dataset: xr.Dataset) -> str:
 
 def describe(dataset: xr.Dataset) -> str:
     """A few lines on the results of a dataset of any kind."""
-    found = kind(dataset)
-    if found == TRAJECTORY:
-        return "\n".join(_trajectories(dataset))
-    if found == CRITICAL:
-        return "\n".join(_critical(dataset))
-    if found == BOUNDARIES:
-        return "\n".join(_boundaries(dataset))
-    if found == FIT:
-        return "\n".join(_fit(dataset))
+    if lines := _LINES.get(kind(dataset) or ""):
+        return "\n".join(lines(dataset))
     if "status" in dataset:
         return summarize(dataset)
     return "no status: predictions, or a part of a run"
@@ -80,6 +73,19 @@ def _fit(dataset: xr.Dataset) -> Iterator[str]:
         f"residuals {dataset.attrs['root_mean_square']:.4g}, root mean square; Akaike's criterion "
         f"{dataset.attrs['akaike']:.6g}; {dataset.attrs['trajectories']} trajectories"
     )
+
+
+def _indices(dataset: xr.Dataset) -> Iterator[str]:
+    """How much of the variance of each quantity comes from each parameter."""
+    yield f"shares of the variance, by {dataset.attrs['trajectories']} trajectories: alone, and with all that it shares"
+    for quantity in dataset["quantity"].values:
+        for name in dataset["parameter"].values:
+            one = dataset.sel(quantity=quantity, parameter=name)
+            alone, total = (
+                "{:6.3f} ({:.3f} to {:.3f})".format(*(one[f"{order}{end}"].item() for end in ("", "_low", "_high")))
+                for order in ("first_order", "total_order")
+            )
+            yield f"  {quantity:18} {name:8} {alone}   {total}"
 
 
 def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
@@ -169,3 +175,12 @@ def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:
         return line
     off = abs(counted - np.ravel(dataset["reversals_predicted"].values)[valid])
     return f"{line}; as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
+
+
+_LINES: dict[str, Callable[[xr.Dataset], Iterator[str]]] = {
+    TRAJECTORY: _trajectories,
+    CRITICAL: _critical,
+    BOUNDARIES: _boundaries,
+    FIT: _fit,
+    INDICES: _indices,
+}

@@ -1,4 +1,4 @@
-"""Keeps what a search finds in a folder, as a run keeps its results: with a checkpoint, a dataset and a picture."""
+"""Keeps what a study finds in a folder, as a run keeps its results: with a checkpoint, a dataset and a picture."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sweep.results.folder import RunFiles
 from sweep.results.memory import Memory
 from sweep.results.provenance import identify
 from sweep.results.store import Store
-from sweep.studies.search import Search
+from sweep.studies.search import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +30,7 @@ def kept(
     config: Config,
     maker: str,
     settings: str,
-    make: Callable[[Store], Search],
+    make: Callable[[Store], Study],
     draw: Callable[[xr.Dataset], Figure],
     output: str | Path | None,
     *,

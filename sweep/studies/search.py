@@ -52,7 +52,15 @@ def require_simulated(config: Config) -> None:
         raise ConfigError([config.fault(("model",), message)])
 
 
-class Search(Whole):
+class Study(Whole):
+    """Simulations that are kept as those of a run are, but whose dataset says what was found with them."""
+
+    @abstractmethod
+    def labelled(self) -> xr.Dataset:
+        """What has been found."""
+
+
+class Search(Study):
     """A search, and the table of the cells that it has asked for."""
 
     def __init__(self, config: Config, store: Store, width: float) -> None:
@@ -73,10 +81,6 @@ class Search(Whole):
     @abstractmethod
     def learn(self, found: Mapping[str, Array]) -> None:
         """Take in what the tiles say of the cells that were asked for last: `status`, `reversals`, margins ..."""
-
-    @abstractmethod
-    def labelled(self) -> xr.Dataset:
-        """What the search has found."""
 
     def simulated(self) -> Config:
         """The configuration whose cases are all cells so far."""

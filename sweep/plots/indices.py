@@ -1,0 +1,36 @@
+"""Sobol indices as bars, with their intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from sweep.plots import labels
+from sweep.plots.figure import Picture
+
+_ORDERS = {"first_order": "the parameter alone", "total_order": "with all that it shares with others"}
+
+
+def draw(dataset: xr.Dataset) -> Figure:
+    """A panel for each quantity: how much of its variance comes from each parameter."""
+    quantities = dataset["quantity"].values
+    figure = Picture(3.2 * len(quantities) + 1, 3.6)
+    figure.head(dataset.attrs["title"], "")
+    grid = figure.subplots(1, len(quantities), squeeze=False, sharey=True).ravel()
+    places = np.arange(dataset.sizes["parameter"])
+    for axes, quantity in zip(grid, quantities, strict=True):
+        one = dataset.sel(quantity=quantity)
+        for k, (order, words) in enumerate(_ORDERS.items()):
+            index, low, high = (one[f"{order}{end}"].values for end in ("", "_low", "_high"))
+            axes.bar(
+                places + 0.36 * (k - 0.5), index, 0.34, color=f"C{k}", label=words, zorder=2,
+                yerr=np.maximum([index - low, high - index], 0), error_kw={"elinewidth": 1, "capsize": 3},
+            )  # fmt: skip
+        axes.set_xticks(places, [labels.symbol(name) for name in one["parameter"].values])
+        axes.set_title(labels.short(quantity), fontsize=9)
+        axes.tick_params(labelsize=8)
+        axes.grid(axis="y", alpha=0.3)
+    grid[0].set_ylabel("share of the variance", fontsize=9)
+    figure.explain(grid[0].get_legend_handles_labels()[0])
+    return figure
