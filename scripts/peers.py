@@ -1,4 +1,4 @@
-"""Whole runs beside other tools: from parameters in Python to spins, and to counts where a tool can count.
+"""Speed against error of whole runs, beside other tools: from parameters in Python to spins, and counts if a tool can.
 
 The task is a small sweep, as a user of each tool would write it: distinct bodies of the slip model (b = 2 … 8) with
 one friction and one start, from t = 0 to T.  Compared are
@@ -6,8 +6,11 @@ one friction and one start, from t = 0 to T.  Compared are
 * `sweep.run` with dopri5 and with the method chosen for each cell, with all default measurements and with counts alone,
 * heyoka.py: Taylor series in batches of the machine's SIMD width, in its ensemble mode and shared out to two threads,
   with the equations as a user would write them; with events that count crossings of zero; and with our algebra,
+* numbalsoda: LSODA and DOP853 on the compiled right-hand side, called from a compiled loop in two threads,
 * diffrax: jitted and vmapped, adaptive, on XLA's own threads,
 * SciPy: DOP853 and LSODA on the compiled right-hand side, in one process.
+
+Each at several tolerances, whose errors and times make a curve.  The errors are measured, whatever was asked for.
 
 The time of a run begins with arrays of parameters and ends with the spins at T; constants, starts and steps are part
 of it.  Compilation is not.  All tools run in double precision on two processors and take turns, so that other work on
@@ -19,14 +22,17 @@ its tightest tolerance.
 A reversal in `sweep` is a change of sign of the ripple-free spin averaged over a period of the rattle.  heyoka's events
 see the spin itself, which may cross zero several times in one reversal: the table tells how many counts agree.
 
-    pip install -e .[peers]
-    python scripts/peers.py [--mu 60 200 1000] [--bodies 1024] [--repeats 5]
+    apt-get install gfortran && pip install -e .[peers]
+    python scripts/peers.py [--mu 60 200 1000] [--bodies 1024] [--repeats 5] [--output FOLDER]
+
+writes peers.csv and peers.png.
 """
 
 from __future__ import annotations
 
 import argparse
 import copy
+import csv
 import math
 import os
 import statistics
@@ -58,13 +64,20 @@ T_END = 400.0
 SLOW_SECONDS, SLOW_REPEATS = 2.0, 3
 """Runs that take longer than `SLOW_SECONDS` are repeated no more than `SLOW_REPEATS` times."""
 
+MOST_STEPS = 100_000_000
+"""Of a solver that has to be told."""
+
 COMPARED = 8
 """Bodies whose errors are computed."""
 
-TOLERANCE = 1e-6
-"""Of sweep's runs."""
 DOPRI5, AUTO, BATCH = "sweep, dopri5", "sweep, auto", "heyoka batch"
-HEYOKA_TOLERANCE, DOP853_TOLERANCE, LSODA_TOLERANCE, TSIT5_TOLERANCE = 1e-5, 1e-5, 1e-9, 1e-6
+
+ALONE = ", counts alone"
+"""Runs of ours that tell no more than the others do: without margins, and without an estimate of each cell's error."""
+
+OURS = (1e-4, 1e-6, 1e-8, 1e-10)
+"""Tolerances of sweep's runs; the others' are such that the errors cover the same range."""
+HEYOKA, DOP853, LSODA, TSIT5 = (1e-3, 1e-6, 1e-9), (1e-4, 1e-7, 1e-10), (1e-6, 1e-8, 1e-10), (1e-4, 1e-6, 1e-8)
 RTOL_TO_ATOL = 1e-3
 """Absolute over relative tolerance: the rattle's states are of order 1e-3."""
 
@@ -146,15 +159,16 @@ def thread_pool() -> ThreadPoolExecutor:
 
 
 def our_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
-    for tool, method in ((DOPRI5, "dopri5"), (AUTO, "auto")):
-        yield tool, f"tol={TOLERANCE:g}", partial(our_run, method, {})
-        yield f"{tool}, counts alone", f"tol={TOLERANCE:g}", partial(our_run, method, {"measure": ["reversals"]})
+    alone = {"measure": ["reversals"], "estimate_errors": False}
+    for tolerance in OURS:
+        for tool, method in ((DOPRI5, "dopri5"), (AUTO, "auto")):
+            more = {"method": method, "tolerance": tolerance, "t_end": T_END}
+            yield tool, f"tol={tolerance:g}", partial(our_run, more)
+            yield f"{tool}{ALONE}", f"tol={tolerance:g}", partial(our_run, more | alone)
 
 
-def our_run(method: str, more: dict[str, Any], problem: Problem) -> Answer:
-    found = sweep.run(
-        configuration(), b=problem.b, mu=problem.mu, method=method, tolerance=TOLERANCE, t_end=T_END, **more
-    )
+def our_run(more: dict[str, Any], problem: Problem) -> Answer:
+    found = sweep.run(configuration(), b=problem.b, mu=problem.mu, **more)
     return found["spin_final"].values, found["reversals"].values
 
 
@@ -171,13 +185,14 @@ def configuration() -> Path:
 def heyoka_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
     import heyoka
 
-    size = heyoka.recommended_simd_size()
-    setting = f"tol={HEYOKA_TOLERANCE:g} batch={size}"
-    written = Batches(textbook_system(), size)
-    yield BATCH, setting, written.in_shares
-    yield "heyoka ensemble of batches", setting, written.in_ensemble
-    yield "heyoka batch, counting", setting, Batches(textbook_system(), size, counting=True).in_shares
-    yield "heyoka batch, our algebra", setting, Batches(heyoka_system(), size).in_shares
+    size, written = heyoka.recommended_simd_size(), textbook_system()
+    for tolerance in HEYOKA:
+        setting = f"tol={tolerance:g} batch={size}"
+        yield BATCH, setting, Batches(written, size, tolerance).in_shares
+        yield "heyoka batch, our algebra", setting, Batches(heyoka_system(), size, tolerance).in_shares
+    setting = f"tol={HEYOKA[1]:g} batch={size}"
+    yield "heyoka ensemble of batches", setting, Batches(written, size, HEYOKA[1]).in_ensemble
+    yield "heyoka batch, counting", setting, Batches(written, size, HEYOKA[1], counting=True).in_shares
 
 
 def heyoka_system() -> list[tuple[Any, Any]]:
@@ -235,7 +250,7 @@ def textbook_system() -> list[tuple[Any, Any]]:
 class Batches:
     """Integrators of `size` bodies at a time; the last batch is filled up with copies of the last body."""
 
-    def __init__(self, system: list[tuple[Any, Any]], size: int, counting: bool = False) -> None:
+    def __init__(self, system: list[tuple[Any, Any]], size: int, tolerance: float, counting: bool = False) -> None:
         import heyoka
 
         self.size, self.counting = size, counting
@@ -244,7 +259,7 @@ class Batches:
             system,
             state=np.zeros((len(MODEL.states), size)),
             pars=np.ones((count_constants(), size)),
-            tol=HEYOKA_TOLERANCE,
+            tol=tolerance,
             fast_math=True,
             nt_events=[heyoka.nt_event_batch(spin_expression(), count_crossing)] if counting else [],
         )
@@ -368,8 +383,57 @@ def scipy_run(method: str, rtol: float, atol: float, problem: Problem) -> Answer
 
 
 def scipy_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
-    for method, rtol in (("DOP853", DOP853_TOLERANCE), ("LSODA", LSODA_TOLERANCE)):
-        yield "SciPy, 1 process", f"{method} rtol={rtol:g}", partial(scipy_run, method, rtol, rtol * RTOL_TO_ATOL)
+    for method, tolerances in (("DOP853", DOP853), ("LSODA", LSODA)):
+        for rtol in tolerances:
+            yield f"SciPy {method}, 1 process", f"rtol={rtol:g}", partial(scipy_run, method, rtol, rtol * RTOL_TO_ATOL)
+
+
+# --- numbalsoda -------------------------------------------------------------------------------
+
+
+def numbalsoda_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
+    import numbalsoda
+
+    for method, solver, tolerances in (
+        ("DOP853", numbalsoda.dop853, DOP853), ("LSODA", numbalsoda.lsoda, LSODA),
+    ):  # fmt: skip
+        solve_all = numbalsoda_loop(solver)
+        for rtol in tolerances:
+            yield f"numbalsoda {method}", f"rtol={rtol:g}", partial(numbalsoda_run, solve_all, rtol)
+
+
+def numbalsoda_loop(solver: Any) -> Any:
+    """The solver on every body, in a compiled loop that shares them out to the threads."""
+    import numbalsoda
+
+    rhs, constants_of, n_states, n_constants = MODEL.rhs, MODEL.constants, len(MODEL.states), count_constants()
+
+    @numba.cfunc(numbalsoda.lsoda_sig, error_model="numpy")
+    def slopes(_t: float, y: Any, dy: Any, p: Any) -> None:
+        states = to_fixed_tuple(numba.carray(y, (n_states,)), n_states)
+        found = rhs(states, constants_of(*to_fixed_tuple(numba.carray(p, (n_constants,)), n_constants)))[0]
+        for i in range(n_states):
+            dy[i] = found[i]
+
+    address = slopes.address
+
+    @numba.njit(parallel=True)
+    def solve_all(starts: Array, constants: Array, rtol: float) -> Array:
+        ends = np.empty_like(starts)
+        for i in numba.prange(len(starts)):
+            found, arrived = solver(
+                address, starts[i], np.array([0.0, T_END]), constants[i], rtol, rtol * RTOL_TO_ATOL, MOST_STEPS
+            )
+            ends[i] = found[-1] if arrived else np.nan
+        return ends
+
+    solve_all.keep = slopes  # or its code would be freed
+    return solve_all
+
+
+def numbalsoda_run(solve_all: Any, rtol: float, problem: Problem) -> Answer:
+    states, constants = problem.start()
+    return spin(solve_all(states.T.copy(), constants.T.copy(), rtol).T, constants), None
 
 
 # --- diffrax ----------------------------------------------------------------------------------
@@ -378,7 +442,8 @@ def scipy_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
 def diffrax_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
     import diffrax
 
-    yield "diffrax Tsit5", f"rtol={TSIT5_TOLERANCE:g}", diffrax_run(diffrax.Tsit5(), TSIT5_TOLERANCE)
+    for rtol in TSIT5:
+        yield "diffrax Tsit5", f"rtol={rtol:g}", diffrax_run(diffrax.Tsit5(), rtol)
 
 
 def diffrax_run(solver: Any, rtol: float) -> Callable[[Problem], Answer]:
@@ -415,6 +480,7 @@ Tool = Callable[[], Iterator[tuple[str, str, Callable[[Problem], Answer]]]]
 TOOLS: dict[str, tuple[Tool, float]] = {
     "sweep": (our_entries, math.inf),
     "heyoka": (heyoka_entries, 1024),
+    "numbalsoda": (numbalsoda_entries, 128),
     "diffrax": (diffrax_entries, 128),
     "scipy": (scipy_entries, 2),
 }
@@ -454,7 +520,7 @@ def prepare(problem: Problem) -> list[Entry]:
             if math.isfinite(entry.error):
                 sound.append(entry)
             else:
-                print(f"{entry.tool} {entry.setting}: diverged, left out")
+                print(f"{entry.tool} {entry.setting}: a body did not arrive, left out")
     return sound
 
 
@@ -467,26 +533,68 @@ def measure(entries: list[Entry], repeats: int) -> None:
 
 
 def print_table(entries: list[Entry]) -> None:
-    cost = {entry.tool: entry.milliseconds for entry in entries}
     counted = next(entry for entry in entries if entry.tool == DOPRI5)
     print(
-        f"{'':53s}{'seconds per run':>26s}{'ms per':>11s}{'largest':>9s}{'counts':>11s}{'times':>8s}\n"
+        f"{'':53s}{'seconds per run':>26s}{'ms per':>11s}{'largest':>9s}{'counts':>11s}\n"
         f"{'tool':29s}{'setting':18s}{'runs':>6s}{'median (min..max)':>26s}{'trajectory':>11s}"
-        f"{'|error|':>9s}{'as dopri5':>11s}{'heyoka':>8s}"
+        f"{'|error|':>9s}{'as dopri5':>11s}"
     )
     for entry in entries:
         spread = f"{statistics.median(entry.seconds):.4f} ({min(entry.seconds):.4f}..{max(entry.seconds):.4f})"
         print(
             f"{entry.tool:29s}{entry.setting:18s}{entry.problem.size:6d}{spread:>26s}{entry.milliseconds:11.4g}"
-            f"{entry.error:9.1e}{agreement(entry, counted):>11s}{cost.get(BATCH, math.nan) / entry.milliseconds:8.3g}"
+            f"{entry.error:9.1e}{agreement(entry, counted):>11s}"
         )
-    for ours in ("", ", counts alone"):
-        ratios = {
-            "auto over dopri5": cost[DOPRI5 + ours] / cost[AUTO + ours],
-            "dopri5 over heyoka batch": cost.get(BATCH, math.nan) / cost[DOPRI5 + ours],
-            "auto over heyoka batch": cost.get(BATCH, math.nan) / cost[AUTO + ours],
-        }
-        print(f"times faster{ours}: " + "; ".join(f"{name} {ratio:.3g}" for name, ratio in ratios.items()))
+
+
+def at_error(entries: list[Entry], tool: str, error: float) -> float:
+    """Milliseconds a trajectory of a tool's cheapest setting that is as exact; infinite if none is."""
+    return min((e.milliseconds for e in entries if e.tool == tool and e.error <= error), default=math.inf)
+
+
+def write(path: Path, found: dict[float, list[Entry]]) -> None:
+    """Write the table of all entries, by friction."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        rows = csv.writer(stream)
+        rows.writerow(["mu", "tool", "setting", "runs", "ms_per_trajectory", "ms_least", "ms_most", "largest_error"])
+        for mu, entries in found.items():
+            for e in entries:
+                least, most = (1e3 * some / e.problem.size for some in (min(e.seconds), max(e.seconds)))
+                times = [f"{ms:.4g}" for ms in (e.milliseconds, least, most)]
+                rows.writerow([f"{mu:g}", e.tool, e.setting, e.problem.size, *times, f"{e.error:.2g}"])
+
+
+STYLES: dict[str, dict[str, Any]] = {
+    AUTO: {"color": "C3", "linewidth": 2.2, "marker": "o"},
+    f"{AUTO}{ALONE}": {"color": "C3", "linewidth": 1, "marker": "o", "fillstyle": "none"},
+    DOPRI5: {"color": "C1", "linewidth": 2.2, "marker": "s"},
+    f"{DOPRI5}{ALONE}": {"color": "C1", "linewidth": 1, "marker": "s", "fillstyle": "none"},
+    BATCH: {"color": "C0", "marker": "^"},
+    "numbalsoda DOP853": {"color": "C2", "marker": "v"},
+    "numbalsoda LSODA": {"color": "C2", "marker": "<", "linestyle": "--"},
+    "diffrax Tsit5": {"color": "C4", "marker": "D"},
+    "SciPy DOP853, 1 process": {"color": "0.5", "marker": "x"},
+    "SciPy LSODA, 1 process": {"color": "0.5", "marker": "+", "linestyle": "--"},
+}
+"""The curves of the picture."""
+
+
+def draw(path: Path, found: dict[float, list[Entry]]) -> None:
+    """Draw speed against error, a panel for each friction."""
+    from matplotlib.figure import Figure
+
+    figure = Figure((3.6 * len(found) + 0.6, 5), dpi=110, layout="constrained")
+    grid = figure.subplots(1, len(found), sharey=True, squeeze=False).ravel()
+    for axes, (mu, entries) in zip(grid, found.items(), strict=True):
+        for tool, style in STYLES.items():
+            some = sorted((e for e in entries if e.tool == tool), key=lambda e: e.milliseconds)
+            axes.loglog([e.error for e in some], [e.milliseconds for e in some], label=tool, markersize=5, **style)
+        axes.set(title=f"μ = {mu:g}", xlabel="largest error in spin", xlim=(2e-13, 1e-3))
+        axes.grid(alpha=0.3)
+    grid[0].set_ylabel("milliseconds per trajectory")
+    handles, names = grid[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    figure.savefig(path)
 
 
 def agreement(entry: Entry, counted: Entry) -> str:
@@ -502,20 +610,29 @@ def main() -> None:
     parser.add_argument("--mu", type=float, nargs="+", default=[60.0, 200.0, 1000.0])
     parser.add_argument("--bodies", type=int, default=1024, help=f"a multiple of {COMPARED}")
     parser.add_argument("--repeats", type=int, default=5, help="timed runs of each quick entry")
+    parser.add_argument("--output", type=Path, default=Path("runs/peers"), help="folder for peers.csv and peers.png")
     options = parser.parse_args()
     if find_spec("heyoka") is None or find_spec("scipy") is None:
         parser.error("the reference needs heyoka and scipy: pip install -e .[peers]")
     if options.bodies < COMPARED or options.bodies % COMPARED:
-        parser.error(f"--bodies {options.bodies}; allowed: multiples of {COMPARED}")
+        parser.error(f"--bodies must be a multiple of {COMPARED}, not {options.bodies}")
 
     if hasattr(os, "sched_setaffinity"):  # XLA cannot be limited to some of the processors otherwise.
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
     numba.set_num_threads(THREADS)
+    options.output.mkdir(parents=True, exist_ok=True)
+    found = dict[float, list[Entry]]()
     for mu in options.mu:
         print(f"\nμ = {mu:g}, T = {T_END:g}, {options.bodies} bodies with b = 2 … 8")
-        entries = prepare(Problem(mu, np.linspace(2.0, 8.0, options.bodies)))
-        measure(entries, options.repeats)
-        print_table(entries)
+        found[mu] = prepare(Problem(mu, np.linspace(2.0, 8.0, options.bodies)))
+        measure(found[mu], options.repeats)
+        print_table(found[mu])
+        for error in (1e-4, 1e-6, 1e-8):
+            times = {tool: at_error(found[mu], tool, error) for tool in STYLES}
+            ratios = ", ".join(f"{tool} {ms / times[AUTO]:.3g}" for tool, ms in times.items() if math.isfinite(ms))
+            print(f"at an error of {error:g}, times as long as {AUTO}: {ratios}")
+        write(options.output / "peers.csv", found)
+        draw(options.output / "peers.png", found)
 
 
 if __name__ == "__main__":

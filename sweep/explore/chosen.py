@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from html import escape
-from typing import Any
 
 import numpy as np
-from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, Spinner
+from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, TextInput
 
 from sweep.axis import Axis
 from sweep.explore.colours import CURVES
 from sweep.explore.controls import BARE, on
 from sweep.explore.runner import Curve
 from sweep.explore.slices import Source
-from sweep.explore.state import MAX_CELLS, Cell
+from sweep.explore.state import MAX_CELLS, Cell, number
 from sweep.parameters import Parameter
 from sweep.plots import labels
 
@@ -33,10 +32,14 @@ class CellControls:
         self._rows = [self._row(k, activate, remove) for k in range(MAX_CELLS)]
         self._title = Div(text="", margin=(8, 0, 0, 0))
         self._end = Div(text="", margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
-        self._inputs = {name: self._input(known[name], source.axes.get(name)) for name in self._order(source, base)}
+        self._inputs = {name: self._input(source, known[name]) for name in self._order(source, base)}
         wrap = {"gap": "4px 10px", "flex-wrap": "wrap", "align-items": "flex-end"}
-        dragged = [Row(*pair, sizing_mode="stretch_width", styles=wrap) for pair in self._inputs.values() if pair[1:]]
-        typed = [pair[0] for pair in self._inputs.values() if not pair[1:]]
+        dragged = [
+            Row(one.field, one.slider, sizing_mode="stretch_width", styles=wrap)
+            for one in self._inputs.values()
+            if one.slider
+        ]
+        typed = [one.field for one in self._inputs.values() if not one.slider]
         grid = Column(*dragged, Row(*typed, sizing_mode="stretch_width", styles=wrap), sizing_mode="stretch_width")
         self._editor = Column(self._title, grid, sizing_mode="stretch_width", visible=False, name="parameters")
         self.root = Column(self._keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
@@ -63,8 +66,7 @@ class CellControls:
             self._title.text = f"<b>Parameters of {active + 1}</b>"
             self._quiet = True
             for name, controls in self._inputs.items():
-                for control in controls:
-                    control.value = float(f"{cells[active][name]:.6g}")
+                controls.put(cells[active][name])
             self._quiet = False
 
     def tell(self, curves: Sequence[Curve | None]) -> None:
@@ -73,7 +75,8 @@ class CellControls:
         for k, curve in enumerate(curves):
             if curve:
                 status = labels.flag_words(curve.dataset, "status")[int(curve.dataset["status"])]
-                end = f"{status}, followed to t = {float(curve.dataset['t_stop']):.6g}"
+                unit = labels.si_unit(curve.dataset, "t_stop")
+                end = f"{status}, followed to t = {float(curve.dataset['t_stop']):.6g}{unit}"
                 told.append(f"{k + 1}: {escape(end)}, run in {curve.seconds:.2g} s")
         self._end.text = "<br>".join(told)
 
@@ -85,30 +88,40 @@ class CellControls:
         away.on_click(lambda: remove(k))
         return Row(button, away, visible=False, sizing_mode="stretch_width"), button
 
-    def _input(self, parameter: Parameter, axis: Axis | None) -> list[Any]:
-        """A field for the number, and on an axis of the dataset a slider as well."""
-        name = parameter.name
-        allowed = {"title": labels.symbol(name), "stylesheets": [BARE], "name": f"parameter {name}"}
-        field = Spinner(value=0, width=88, step=_step(axis), mode="float", **allowed)
-        on(field, "value", partial(self._edited, name))
-        if axis is None or len(axis.values) < 2:
-            return [field]
-        span = axis.values[-1] - axis.values[0]
-        ends = axis.values[[0, -1]] + np.array([-0.1, 0.1]) * span
-        low, high = (v if parameter.allows(v) else end for v, end in zip(ends, axis.values[[0, -1]], strict=True))
-        slider = Slider(start=float(low), end=float(high), step=float(span / 1000), value=float(low), title=None,
-                        show_value=False, sizing_mode="stretch_width", min_width=100, name=f"drag {name}",
-                        stylesheets=[BARE])  # fmt: skip
-        on(slider, "value", partial(self._edited, name))
-        return [field, slider]
+    def _input(self, source: Source, parameter: Parameter) -> _Input:
+        unit = labels.si_unit(source.dataset, parameter.name).strip()
+        edited = partial(self._edited, parameter.name)
+        return _Input(parameter, source.axes.get(parameter.name), f" ({unit})" if unit else "", edited)
 
-    def _edited(self, name: str, value: Any) -> None:
-        if not self._quiet and isinstance(value, int | float) and np.isfinite(value):
+    def _edited(self, name: str, value: float) -> None:
+        if not self._quiet:
             self._edit(name, float(f"{value:.10g}"))
 
 
-def _step(axis: Axis | None) -> float:
-    """A step of a field: a round number, about a hundredth of the axis."""
-    if axis is None or len(axis.values) < 2:
-        return 0.01
-    return float(10 ** np.floor(np.log10((axis.values[-1] - axis.values[0]) / 50)))
+class _Input:
+    """A field for a number, and on an axis of the dataset a slider as well, logarithmic where the axis is."""
+
+    def __init__(self, parameter: Parameter, axis: Axis | None, unit: str, edited: Callable[[float], None]) -> None:
+        name, self._axis = parameter.name, axis
+        self.field = TextInput(value="", width=96, title=f"{labels.symbol(name)}{unit}", stylesheets=[BARE],
+                               name=f"parameter {name}")  # fmt: skip
+        on(self.field, "value", lambda text: edited(number(text)))
+        self.slider: Slider | None = None
+        if axis is None or len(axis.values) < 2:
+            return
+        first, last = axis.straight(axis.values[[0, -1]])
+        wider = axis.bent(np.array([first, last]) + np.array([-0.1, 0.1]) * (last - first))
+        ends = [w if parameter.allows(w) else v for w, v in zip(wider, axis.values[[0, -1]], strict=True)]
+        low, high = map(float, axis.straight(np.array(ends)))
+        self.slider = Slider(start=low, end=high, step=float(last - first) / 1000, value=low, title=None,
+                             show_value=False, sizing_mode="stretch_width", min_width=100, name=f"drag {name}",
+                             stylesheets=[BARE])  # fmt: skip
+        on(self.slider, "value", lambda place: edited(float(axis.bent(np.array(place)))))
+
+    def put(self, value: float) -> None:
+        """Show a value."""
+        self.field.value = f"{value:.6g}"
+        if self.slider and self._axis:
+            with np.errstate(divide="ignore", invalid="ignore"):  # a value that no logarithmic axis has
+                place = float(self._axis.straight(np.array(value)))
+            self.slider.value = place if np.isfinite(place) else self.slider.start

@@ -15,6 +15,7 @@ from sweep.axis import Axis
 from sweep.config.faults import brief
 from sweep.explore.slices import Source
 from sweep.parameters import PARAMETERS, Parameter
+from sweep.plots import labels
 from sweep.plots.quantities import subject
 
 MAX_CELLS = 6
@@ -62,9 +63,9 @@ class Choice:
         """The option that an address names, which may be any number on an axis; None if there is none."""
         if not self.axis:
             return self.options.index(text) if text in self.options else None
-        number, (low, high) = _number(text), self.axis.values[[0, -1]]
+        at, (low, high) = number(text), self.axis.values[[0, -1]]
         slack = 1e-9 * max(abs(low), abs(high))
-        return self.axis.nearest(number) if low - slack <= number <= high + slack else None
+        return self.axis.nearest(at) if low - slack <= at <= high + slack else None
 
     def of(self, state: State) -> int:
         """The option that is chosen in a state."""
@@ -92,7 +93,8 @@ def choices(source: Source) -> dict[str, Choice]:
     if len(source.dims) > 1:
         found.append(Choice("y", "vertical axis", *axes))
     for name, axis in source.axes.items():
-        exact, short = ([f"{v:.{digits}g}" for v in axis.values] for digits in (12, 6))
+        unit = labels.si_unit(source.dataset, name)
+        exact, short = [f"{v:.12g}" for v in axis.values], [f"{v:.6g}{unit}" for v in axis.values]
         found.append(Choice(name, source.words(name), exact, short, len(exact) * (len(exact) <= _BUTTONS), axis))
     return {choice.name: choice for choice in found}
 
@@ -161,13 +163,13 @@ def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell | str:
         name, _, value = pair.partition(":")
         if name not in cell:
             return f"{brief(name)} is no parameter; there are {', '.join(cell)}"
-        cell[name] = _number(value)
+        cell[name] = number(value)
         if fault := wrong_value(known[name], cell[name]):
             return fault
     return cell
 
 
-def _number(text: str) -> float:
+def number(text: str) -> float:
     """The number that a text spells, or else NaN."""
     try:
         return float(text) if len(text) <= 40 else math.nan

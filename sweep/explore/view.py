@@ -123,7 +123,8 @@ class View:
         if index is None:
             self._cell.text = str(PARTS.hint("" if self._setup else why_still(self._source)))
             return
-        here = [f"{labels.symbol(d)} = {self._source.axes[d].values[index[d]]:.6g}" for d in self._source.dims]
+        units = {d: labels.si_unit(self._source.dataset, d) for d in self._source.dims}
+        here = [f"{labels.symbol(d)} = {self._source.axes[d].values[index[d]]:.6g}{units[d]}" for d in units]
         told = self._source.describe(index)
         self._cell.text = str(PARTS.cell(", ".join(here), told.pop("note", ""), told))
 

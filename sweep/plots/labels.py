@@ -166,8 +166,13 @@ def reversals(count: int) -> str:
 
 def measured(dataset: xr.Dataset, name: str, at: float) -> str:
     """A parameter with its value and its unit, unless that is one of the paper's."""
-    unitless = dataset[name].attrs.get("units", "1") == "1"
-    return value(name, at) if unitless else f"{value(name, at)} {unit(dataset, name)}"
+    return f"{value(name, at)}{si_unit(dataset, name)}"
+
+
+def si_unit(dataset: xr.Dataset, name: str) -> str:
+    """The unit after a number, with the space before it; empty in the paper's units, and for a plain number."""
+    known = name in dataset.variables and dataset[name].attrs.get("units", "1") != "1"
+    return f" {unit(dataset, name)}" if known else ""
 
 
 def constants(dataset: xr.Dataset) -> str:
@@ -187,8 +192,7 @@ def _distributions(dataset: xr.Dataset) -> Iterator[str]:
     """What is known of each parameter that was sampled."""
     for name, coordinate in dataset.coords.items():
         if known := coordinate.attrs.get("distribution"):
-            units = "" if coordinate.attrs["units"] == "1" else f" {unit(dataset, str(name))}"
-            yield f"{symbol(str(name))}: {known}{units}"
+            yield f"{symbol(str(name))}: {known}{si_unit(dataset, str(name))}"
 
 
 def _fraction(units: str) -> str:
