@@ -19,14 +19,15 @@ if TYPE_CHECKING:
     from sweep.config import Config, ConfigError, ConfigLike, load_config
     from sweep.engine.cluster import Cluster
     from sweep.engine.reporter import Reporter
+    from sweep.explorer.server import Beside
     from sweep.plots.picture import plot
     from sweep.results.store import StoreError
     from sweep.studies.film import Film
     from sweep.studies.predictions import predict
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "boundaries", "critical", "fit", "indices", "load_config", "open", "plot",
-    "predict", "run", "trajectory",
+    "Config", "ConfigError", "StoreError", "boundaries", "critical", "explore", "fit", "indices", "load_config", "open",
+    "plot", "predict", "run", "trajectory",
 ]  # fmt: skip
 
 _HOMES = {
@@ -260,6 +261,37 @@ def fit(
 
     with shown(progress, reporter) as told:
         return fit(load_config(config, overrides, announce=told.note), film, free, told)
+
+
+def explore(dataset: xr.Dataset | str | Path, height: int = 950) -> Beside:
+    """Show the explorer of a dataset in a notebook: maps, and the trajectory of each cell that is clicked.
+
+    It needs the extra `explore`, and a browser on the same machine as the notebook's kernel.
+
+    Parameters
+    ----------
+    dataset : of a run or of critical spins, or the path of its file
+    height : of the page in the notebook, in pixels
+
+    Returns
+    -------
+    The explorer, of which a notebook shows the page; its `url` opens in a browser too.  It lives as long as the kernel.
+
+    Raises
+    ------
+    StoreError
+        if the file is no dataset with an axis.
+    ModuleNotFoundError
+        if Bokeh is not installed.
+    """
+    from pathlib import Path
+
+    from sweep.explorer.server import serve_beside
+    from sweep.explorer.setup import usable
+    from sweep.explorer.slices import Source, open_source
+
+    source = open_source(Path(dataset)) if isinstance(dataset, str | Path) else Source(dataset)
+    return serve_beside(source, usable(source), height)
 
 
 def indices(

@@ -86,9 +86,9 @@ def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -
     A click on a cell runs its trajectory.  Only this machine can open the page; Ctrl-C ends it.
     """
     with needs_bokeh("explore"):
-        from sweep.explore.server import serve
-    from sweep.explore.setup import Setup, usable
-    from sweep.explore.slices import open_source
+        from sweep.explorer.server import serve
+    from sweep.explorer.setup import Setup, usable
+    from sweep.explorer.slices import open_source
 
     with about(file):
         source = open_source(file)
@@ -105,7 +105,7 @@ def _plot_page(
 ) -> None:  # fmt: skip
     """Draw a map as a page of its own."""
     with needs_bokeh("--output"):
-        from sweep.explore.page import save_html
+        from sweep.explorer.page import save_html
     for option, value in (("--limits", limits), ("--cmap", cmap)):
         if value is not None:
             refuse(option, f"not for a page; write a {formats.A_PICTURE}")

@@ -1,6 +1,6 @@
 """Describes a map, from a dataset alone: its values and their colours, the marks of its cells, lines and words.
 
-Two draw it: `sweep.plots.maps` by matplotlib and `sweep.explore.figure` by Bokeh.
+Two draw it: `sweep.plots.maps` by matplotlib and `sweep.explorer.figure` by Bokeh.
 """
 
 from __future__ import annotations

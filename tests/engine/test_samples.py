@@ -17,8 +17,8 @@ from support.runs import Stop, same_numbers
 
 import sweep
 from sweep.config.distributions import Distribution, drawn
-from sweep.explore.setup import Setup
-from sweep.explore.slices import Source
+from sweep.explorer.setup import Setup
+from sweep.explorer.slices import Source
 from sweep.grid import CASE, SAMPLE, Grid
 from sweep.kernels.status import LIFT_OFF, SETTLED
 from sweep.parameters import START

@@ -13,8 +13,8 @@ from support.figures import entries
 
 import sweep
 from sweep.config import load_config
-from sweep.explore import state
-from sweep.explore.slices import Source
+from sweep.explorer import state
+from sweep.explorer.slices import Source
 from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
 from sweep.plots import labels, picture
 from sweep.plots.quantities import DERIVED, derivable, field, subject
@@ -137,7 +137,7 @@ def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None
     "name", ["reversals", "difference", "ratio", "t_first_reversal_predicted", "energy_error", "lyapunov"]
 )
 def test_pictures_and_explorer_have_the_same_colours(name: str, whole: xr.Dataset) -> None:
-    from sweep.explore.figure import MapFigure  # needs Bokeh
+    from sweep.explorer.figure import MapFigure  # needs Bokeh
 
     whole["reversals"] += xr.DataArray(np.arange(SIZE[1], dtype="int16") ** 3, dims="delta")
     part, shown = Source(whole).map(name, "delta", "n0", {}), MapFigure(Source(whole), "delta", "n0")

@@ -66,7 +66,7 @@ def test_a_run_of_edited_sources_is_refused(package: Path) -> None:
         return done.returncode, done.stderr
 
     assert run()[0] == 0
-    for room in ("explore", "plots"):
+    for room in ("explorer", "plots"):
         edit(package / room / "__init__.py")
     code, said = run()
     assert (code, "already complete" in said) == (0, True)

@@ -13,7 +13,7 @@ from support.cli import invoke
 
 import sweep
 from sweep.config import ConfigError
-from sweep.explore.slices import Source
+from sweep.explorer.slices import Source
 from sweep.kernels.samples import sampled
 from sweep.models import MODELS
 from sweep.models.ladder import slip

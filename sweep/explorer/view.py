@@ -11,17 +11,17 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.models import Column, ColumnDataSource, CustomJS, Div
 
-from sweep.explore import controls, export, figure, page, saving
-from sweep.explore import state as states
-from sweep.explore.chosen import CellControls
-from sweep.explore.colours import CURVES
-from sweep.explore.curves import Curves
-from sweep.explore.drawn import Drawn
-from sweep.explore.page import PARTS
-from sweep.explore.runner import Job, Runner
-from sweep.explore.setup import Setup, why_still
-from sweep.explore.slices import Source
-from sweep.explore.state import Cell, State
+from sweep.explorer import controls, export, figure, page, saving
+from sweep.explorer import state as states
+from sweep.explorer.chosen import CellControls
+from sweep.explorer.colours import CURVES
+from sweep.explorer.curves import Curves
+from sweep.explorer.drawn import Drawn
+from sweep.explorer.page import PARTS
+from sweep.explorer.runner import Job, Runner
+from sweep.explorer.setup import Setup, why_still
+from sweep.explorer.slices import Source
+from sweep.explorer.state import Cell, State
 from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 

@@ -6,10 +6,10 @@ from urllib.parse import parse_qs
 
 import pytest
 
-from sweep.explore import state
-from sweep.explore.setup import Setup
-from sweep.explore.slices import Source
-from sweep.explore.state import State
+from sweep.explorer import state
+from sweep.explorer.setup import Setup
+from sweep.explorer.slices import Source
+from sweep.explorer.state import State
 
 HOSTILE = {
     "show=../../etc/passwd": "show=../../etc/passwd is not there; choose reversals, ",

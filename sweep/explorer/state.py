@@ -13,7 +13,7 @@ from urllib.parse import urlencode
 
 from sweep.axis import Axis
 from sweep.config.faults import brief
-from sweep.explore.slices import Source
+from sweep.explorer.slices import Source
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.plots import labels
 from sweep.plots.quantities import subject

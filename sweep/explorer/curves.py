@@ -11,9 +11,9 @@ from bokeh import models
 from bokeh.core.properties import value
 from bokeh.plotting import figure
 
-from sweep.explore.colours import CURVES
-from sweep.explore.runner import Curve
-from sweep.explore.state import MAX_CELLS
+from sweep.explorer.colours import CURVES
+from sweep.explorer.runner import Curve
+from sweep.explorer.state import MAX_CELLS
 from sweep.grid import Array
 from sweep.plots import labels, theory
 

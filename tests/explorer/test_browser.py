@@ -500,6 +500,22 @@ def test_a_body_in_si_units_says_them(browser: Browser, tmp_path: Path) -> None:
             process.kill()
 
 
+def test_a_notebook_shows_the_explorer_of_a_dataset(browser: Browser, tmp_path: Path) -> None:
+    found = sweep.run(ROOT / "configs" / "mu.yaml", mu=[60, 70], n0=[0.04, 0.05], t_end=300)
+    shown = sweep.explore(found, height=700)
+    (tmp_path / "notebook.html").write_text(f"<!doctype html><title>n</title>{shown._repr_html_()}")
+    page = browser.new_page()
+    page.set_default_timeout(TIMEOUT)
+    page.goto(f"file://{tmp_path / 'notebook.html'}")
+    assert page.locator("iframe").bounding_box()["height"] == 700  # type: ignore[index]
+    frame = page.frames[1]
+    frame.wait_for_function(f"window.Bokeh?.documents[0]?.is_idle && {MAP}.inner_width > 10")
+    assert frame.title() == found.attrs["title"]
+    page.goto(f"{shown.url}?cell=mu:70,n0:0.05")
+    settle(page)
+    wait_for_curves(page, 1)
+
+
 # ---- files
 
 
@@ -535,7 +551,7 @@ def test_what_is_seen_is_saved(visit: Callable[..., Page], opened: xr.Dataset, t
 
 
 def test_a_map_is_one_file_that_needs_no_network(browser: Browser, opened: xr.Dataset, tmp_path: Path) -> None:
-    from sweep.explore.page import save_html
+    from sweep.explorer.page import save_html
 
     save_html(opened, tmp_path / "map.html", "reversals", at={"n0": 0.05})
     context = browser.new_context(offline=True, viewport={"width": 1000, "height": 800})

@@ -23,9 +23,9 @@ from bokeh.models import (
 )  # fmt: skip
 from bokeh.plotting import figure
 
-from sweep.explore.colours import is_logarithmic, mapping
-from sweep.explore.patterns import TILES
-from sweep.explore.slices import PlacedAxis, Source, plain
+from sweep.explorer.colours import is_logarithmic, mapping
+from sweep.explorer.patterns import TILES
+from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.grid import Array
 from sweep.plots import labels, levels, scales
 from sweep.plots.description import Map, common_scale

@@ -13,10 +13,10 @@ from support.own import PENDULUM
 
 import sweep
 from sweep.config import ConfigError
-from sweep.explore import export, runner, state
-from sweep.explore.setup import Setup, usable, why_still
-from sweep.explore.slices import Source, open_source
-from sweep.explore.state import State
+from sweep.explorer import export, runner, state
+from sweep.explorer.setup import Setup, usable, why_still
+from sweep.explorer.slices import Source, open_source
+from sweep.explorer.state import State
 from sweep.models.user import loading
 
 FEW = {"damping": [0.3, 0.5, 0.7], "torque": [0.5, 1.0, 1.2, 1.5], "t_end": 60}

@@ -10,11 +10,11 @@ import numpy as np
 from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, TextInput
 
 from sweep.axis import Axis
-from sweep.explore.colours import CURVES
-from sweep.explore.controls import BARE, on
-from sweep.explore.runner import Curve
-from sweep.explore.slices import Source
-from sweep.explore.state import MAX_CELLS, Cell, number
+from sweep.explorer.colours import CURVES
+from sweep.explorer.controls import BARE, on
+from sweep.explorer.runner import Curve
+from sweep.explorer.slices import Source
+from sweep.explorer.state import MAX_CELLS, Cell, number
 from sweep.parameters import Parameter
 from sweep.plots import labels
 

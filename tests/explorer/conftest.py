@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 import sweep
-from sweep.explore.setup import Setup
-from sweep.explore.slices import Source, open_source
+from sweep.explorer.setup import Setup
+from sweep.explorer.slices import Source, open_source
 from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
 
 TEXT = """\

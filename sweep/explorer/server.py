@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import logging
 import signal
+import threading
 import webbrowser
 from collections.abc import Callable
+from dataclasses import dataclass
+from queue import SimpleQueue
 from typing import Any
 
 from bokeh.application import Application
@@ -17,9 +20,9 @@ from bokeh.server.util import bind_sockets
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 
-from sweep.explore import view
-from sweep.explore.setup import Setup
-from sweep.explore.slices import Source
+from sweep.explorer import view
+from sweep.explorer.setup import Setup
+from sweep.explorer.slices import Source
 
 ADDRESS = "127.0.0.1"
 
@@ -35,11 +38,48 @@ def serve(source: Source, setup: Setup | None, port: int | None, *, browser: boo
     OSError
         if the port is in use.
     """
+    sockets, found = _bind(port)
+    loop, url = _started(source, setup, sockets, found)
+    say(f"exploring {source.name} at {url} (Ctrl-C ends it)")
+    if browser:
+        loop.add_callback(lambda: webbrowser.open(url))
+    for end in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(end, lambda *_: loop.add_callback_from_signal(loop.stop))
+    loop.start()
+
+
+@dataclass(frozen=True)
+class Beside:
+    """An explorer in a thread of this process; a notebook shows it as the value of a cell."""
+
+    url: str
+    height: int
+    """Pixels in a notebook."""
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.url}" width="100%" height="{self.height}" style="border: 0"></iframe>'
+
+
+def serve_beside(source: Source, setup: Setup | None, height: int) -> Beside:
+    """Serve for as long as this process lives, and return at once."""
+    sockets, port = _bind(None)
+    url = SimpleQueue[str]()
+
+    def work() -> None:
+        loop, address = _started(source, setup, sockets, port)
+        url.put(address)
+        loop.start()
+
+    threading.Thread(target=work, daemon=True, name="explorer").start()
+    return Beside(url.get(), height)
+
+
+def _started(source: Source, setup: Setup | None, sockets: list[Any], port: int) -> tuple[IOLoop, str]:
+    """A loop of this thread in which the pages are served once it runs, and their address."""
     # Its advice to name an option of Bokeh's own command helps nobody here; the browser is refused all the same.
     logging.getLogger("bokeh.server.views.ws").setLevel(logging.CRITICAL)
     logging.getLogger("tornado.access").setLevel(logging.ERROR)
-    sockets, found = _bind(port)
-    hosts = [f"{host}:{found}" for host in ("localhost", ADDRESS)]
+    hosts = [f"{host}:{port}" for host in ("localhost", ADDRESS)]
     url = f"http://{hosts[0]}/"
     loop = IOLoop()
     loop.make_current()
@@ -48,12 +88,7 @@ def serve(source: Source, setup: Setup | None, port: int | None, *, browser: boo
     http = HTTPServer(web)
     http.add_sockets(sockets)
     BaseServer(loop, web, http).start()
-    say(f"exploring {source.name} at {url} (Ctrl-C ends it)")
-    if browser:
-        loop.add_callback(lambda: webbrowser.open(url))
-    for end in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(end, lambda *_: loop.add_callback_from_signal(loop.stop))
-    loop.start()
+    return loop, url
 
 
 class _Web(BokehTornado):  # type: ignore[misc]  # Bokeh tells no types of it

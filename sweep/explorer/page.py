@@ -13,9 +13,9 @@ from bokeh.models import Column, Div
 from bokeh.resources import INLINE
 from jinja2 import Environment
 
-from sweep.explore import figure, patterns, state
-from sweep.explore.colours import beyond
-from sweep.explore.slices import Source
+from sweep.explorer import figure, patterns, state
+from sweep.explorer.colours import beyond
+from sweep.explorer.slices import Source
 from sweep.grid import Array
 from sweep.plots import labels
 from sweep.plots.description import Map
@@ -27,7 +27,7 @@ _MOST_VALUES = 8_000_000
 
 
 def _text(name: str) -> str:
-    return files("sweep.explore").joinpath(name).read_text(encoding="utf-8")
+    return files("sweep.explorer").joinpath(name).read_text(encoding="utf-8")
 
 
 PARTS: Any = Environment(autoescape=True).from_string(_text("page.parts.html")).module

@@ -15,8 +15,8 @@ from sweep.config import ConfigError, Values
 from sweep.config.faults import printable
 from sweep.config.schema import FOREVER
 from sweep.engine.reporter import Progress, Reporter
-from sweep.explore.setup import Setup
-from sweep.explore.state import Cell
+from sweep.explorer.setup import Setup
+from sweep.explorer.state import Cell
 from sweep.grid import Array
 from sweep.jit import showing
 from sweep.kernels import measures

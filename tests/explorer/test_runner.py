@@ -11,11 +11,11 @@ import xarray as xr
 
 import sweep
 from sweep.engine.reporter import Progress
-from sweep.explore import export, runner
-from sweep.explore.runner import COMPILING, Curve, Job, Runner
-from sweep.explore.setup import Setup, usable
-from sweep.explore.slices import Source
-from sweep.explore.state import Cell, State
+from sweep.explorer import export, runner
+from sweep.explorer.runner import COMPILING, Curve, Job, Runner
+from sweep.explorer.setup import Setup, usable
+from sweep.explorer.slices import Source
+from sweep.explorer.state import Cell, State
 from sweep.jit import compiling
 from sweep.kernels.status import LIFT_OFF
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from bokeh.models import Column, CustomJS, Div, RadioButtonGroup, Row, Select, Slider
 
-from sweep.explore.slices import Source
-from sweep.explore.state import Choice, State, choices
+from sweep.explorer.slices import Source
+from sweep.explorer.state import Choice, State, choices
 from sweep.plots import labels
 
 BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }"

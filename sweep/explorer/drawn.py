@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from sweep.explore.runner import Curve, Job, Runner
-from sweep.explore.state import MAX_CELLS, Cell
+from sweep.explorer.runner import Curve, Job, Runner
+from sweep.explorer.state import MAX_CELLS, Cell
 
 
 class Drawn:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sweep.explore import slices
-from sweep.explore.slices import PlacedAxis, Source, open_source
+from sweep.explorer import slices
+from sweep.explorer.slices import PlacedAxis, Source, open_source
 from sweep.plots import marks
 from sweep.results.store import StoreError
 

@@ -9,10 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from sweep.config import Config, Values
-from sweep.explore.runner import Curve
-from sweep.explore.setup import Setup
-from sweep.explore.slices import Source
-from sweep.explore.state import Cell, State
+from sweep.explorer.runner import Curve
+from sweep.explorer.setup import Setup
+from sweep.explorer.slices import Source
+from sweep.explorer.state import Cell, State
 
 
 def stem(source: Source) -> str:
