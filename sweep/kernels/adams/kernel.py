@@ -45,6 +45,7 @@ from sweep.models.model import Array, Columns, stack
 from sweep.models.stiff.form import StiffForm
 from sweep.models.stiff.modes import bending
 from sweep.models.theory import linear
+from sweep.models.theory.rocking import frequencies, implicit
 
 _PREDICT = tuple(f"predict{j}" for j in range(len(PREDICTOR_NODES)))
 _CORRECT = tuple(f"correct{j}" for j in range(len(CORRECTOR_NODES)))
@@ -102,11 +103,13 @@ class AdamsKernel(Kernel):
     def _set_method(self, table: Table, constants: Any) -> None:
         """Set the weights of the formulas and the matrix P."""
         step = table["step"]
-        phase = self.form.fastest_rocking(constants) * step
+        rocking = self.form.rocking(constants)
+        _, fastest = frequencies(rocking)
+        phase = fastest * step
         correct = step[:, None] * weights.fitted_weights(CORRECTOR_NODES, phase)
         table.set_columns(_PREDICT, step[:, None] * weights.fitted_weights(PREDICTOR_NODES, phase))
         table.set_columns(_CORRECT, correct)
-        table.set_columns(MATRIX, stack(self.form.implicit(correct[:, 0], constants)).T)
+        table.set_columns(MATRIX, stack(implicit(correct[:, 0], rocking)).T)
         table["per_weight"] = 1 / correct[:, 0]
         table["gamma"] = BDF_GAMMA * step
 

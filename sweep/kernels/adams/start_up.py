@@ -37,6 +37,7 @@ from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5
 from sweep.models.model import Array
 from sweep.models.stiff.form import StiffForm
+from sweep.models.theory.rocking import implicit
 
 # Steps of dopri5, in widths of the layer, and their number.  A step is at least half as long as that, unless the final
 # one is shorter.  Every second one of the last steps is a point of the history.  The slip has forgotten how it began
@@ -212,7 +213,7 @@ def _set_step(form: StiffForm, at: At) -> list[str]:
         f"h = ticks * {at('spacing')}",
         f"{at('h')} = h",
         f"{at('per_weight')} = 1.0 / {at('correct0')}",
-        f"matrix = implicit({at('correct0')}, p)",
+        f"matrix = implicit({at('correct0')}, rocking(p))",
         *(f"{at(name)} = matrix[{i}]" for i, name in enumerate(MATRIX)),
     ]
 
@@ -233,7 +234,7 @@ def compiled_start_up(form: StiffForm) -> Cached:
     """Compiled (group, points, steps) -> None: takes a group through all its levels."""
     at = _places(form)
     known = names(form) | {"slow": form.slow, "newton": form.newton, "power": form.power}
-    known |= {"momentum": form.momentum, "implicit": form.implicit}
+    known |= {"momentum": form.momentum, "implicit": implicit, "rocking": form.rocking}
     known["step"] = make_step(DOPRI5, form.full.rhs, len(form.model.states))
     record = compile_lanes("record", "group, points", _record(form, at), known)
     replace = compile_lanes("replace", "group", _replace(form, at), known)

@@ -31,7 +31,7 @@ POINT = (*SLOPES, *SLIPS)
 """Quantities of a point of the history, to be formatted with its slot: the slopes of (u, M), and the slip."""
 
 MATRIX = tuple(f"P{i}{j}" for i in range(4) for j in range(4))
-"""Elements of P, the implicit part of the corrector (see `StiffForm.implicit`)."""
+"""Elements of P, the implicit part of the corrector (see `sweep.models.theory.rocking.implicit`)."""
 
 At = Callable[[str], str]
 """Tells where a quantity of one lane is kept: (name) -> an expression that can be read and assigned to."""

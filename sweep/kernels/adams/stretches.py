@@ -29,7 +29,7 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import Table
 from sweep.kernels.measures.measurement import Stretch
 from sweep.kernels.status import QUIET, RUNNING
-from sweep.models.ladder import friction
+from sweep.models.ladder import slip
 from sweep.models.model import Array, Columns
 from sweep.models.stiff.modes import RATTLE, Rattle, fastest_growth
 from sweep.models.stiff.slip import STIFF_MODEL, Constants
@@ -313,4 +313,4 @@ def _move_powers(table: Table, constants: Constants) -> None:
     """Set the power of friction at the last points, for a normal force of one."""
     for j, name in enumerate(POWERS):
         v1, v2 = (table[slip.format((-1 - j) % HISTORY)] for slip in SLIPS)
-        table[name] = friction.dissipation(1.0, v1, v2, 0.0, constants)
+        table[name] = slip.dissipation(1.0, v1, v2, 0.0, constants)

@@ -20,7 +20,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch, measured
-from sweep.models.ladder import friction, slip
+from sweep.models.ladder import slip
 from sweep.models.model import MODES, Array, Columns, Model, stack
 from sweep.models.theory import linear
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
@@ -35,7 +35,7 @@ SEEN = 1e-4
 _LOGS, _DEPTHS = ("log_amplitude0", "log_amplitude1"), ("depth0", "depth1")
 _RATES = tuple(f"rate{k}_{i}" for k in (0, 1) for i in range(len(linear.NODES)))
 
-_BODY = ("a", "b", "c", "delta", *friction.PARAMETERS)
+_BODY = ("a", "b", "c", "delta", "mu")
 _ZERO = 1e-300
 
 

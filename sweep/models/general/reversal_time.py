@@ -44,6 +44,7 @@ import numpy as np
 from sweep.models.general import rigid_body, starts
 from sweep.models.general.surfaces import ELLIPSOID, Surface
 from sweep.models.model import Array, Columns
+from sweep.models.theory.rocking import frequencies
 
 PREDICTED, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL, NOT_KNOWN = range(6)
 REASONS = {
@@ -62,7 +63,7 @@ def growth(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array
     """σ of the slower and of the faster mode, half the rate per spin at which its energy grows, shape (cells,)."""
     height, M11, M22, M12 = _inertia(columns)
     k1, k2 = rigid_body.stiffness(columns, surface)  # R1 - height and R2 - height
-    lower, higher = rigid_body.frequencies(columns, surface)
+    lower, higher = frequencies(rigid_body.rocking(columns, surface))
     with np.errstate(divide="ignore", invalid="ignore"):
         shared = -height * (k1 - k2) * M12 / (M11 * M22 - M12**2) / (2 * (higher**2 - lower**2))
     # Of a body that is round both ways the modes are arbitrary, and nothing is coupled.

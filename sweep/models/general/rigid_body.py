@@ -15,6 +15,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models.general.surfaces import ELLIPSOID, Surface, offset
 from sweep.models.model import Array, Columns
+from sweep.models.theory.rocking import Rocking, longer_period
 
 INERTIA = ("J11", "J22", "J33", "J12", "J13", "J23")
 
@@ -94,30 +95,20 @@ def stiffness(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Ar
     return first + offset(columns), second + offset(columns)
 
 
-def frequencies(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
-    """The lower and the higher frequency of rocking about upright rest without slip, each of shape (cells,).
-
-    With the coordinates u1 and u2 the angular velocity is (-u2', u1', ω3), and ω3 is such that the angular momentum
-    about the vertical vanishes.
-    """
+def rocking(columns: Columns, surface: Surface = ELLIPSOID) -> Rocking:
+    """The rocking about upright rest without slip, at zero angular momentum about the vertical."""
     J11, J22, J33, J12, J13, J23 = inertia(columns)
     h2, g = height(columns) ** 2, gravity(columns)
-    M11, M22, M12 = J22 + h2 - J23**2 / J33, J11 + h2 - J13**2 / J33, J13 * J23 / J33 - J12
+    P11, P22, P12 = J11 + h2 - J13**2 / J33, J22 + h2 - J23**2 / J33, J12 - J13 * J23 / J33
+    det = P11 * P22 - P12**2
     k1, k2 = stiffness(columns, surface)
-    determinant, first, second = M11 * M22 - M12**2, k1 * M22, k2 * M11
-    with np.errstate(divide="ignore", invalid="ignore"):
-        higher = first + second + np.sqrt((first - second) ** 2 + 4 * k1 * k2 * M12**2)
-        # The product of the squares is k1 k2 g² / det M.  A difference would lose the lower one.
-        lower = 4 * k1 * k2 * determinant / higher
-        scale = g / (2 * determinant)
-    return np.sqrt(np.maximum(scale * lower, 0.0)), np.sqrt(np.maximum(scale * higher, 0.0))
+    # u1' = ω2, u2' = -ω1
+    return Rocking(-P12 / det, P11 / det, -P22 / det, P12 / det, 0.0, g * k2, -g * k1, 0.0)
 
 
 def slower_period(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
     """Period of the slower rocking, shape (cells,); infinite for a body that is round about one axis."""
-    lower, _ = frequencies(columns, surface)
-    with np.errstate(divide="ignore"):
-        return np.asarray(2 * np.pi / lower)
+    return longer_period(rocking(columns, surface))
 
 
 @inline

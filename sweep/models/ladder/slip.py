@@ -14,34 +14,39 @@ q = u × x_p is computed only once: (x_p × α) · u = q · α.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.models import ellipsoid, model
 from sweep.models.ellipsoid import contact
-from sweep.models.ladder import friction
-from sweep.models.model import COUNT, ENERGY, FORMULAS, MODES, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple, named
+from sweep.models.model import COUNT, ENERGY, FORMULAS, MODES, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple
 from sweep.models.theory.ripple import FORM, form, ripple
-from sweep.models.theory.rocking import Body, frequencies, slower_period
-
-SHAPE = ("A11", "A12", "A22", "A33")
-INVERSE_INERTIA = ("inv_I1", "inv_I2", "inv_I3")
-RATIOS = ("ratio1", "ratio2", "ratio3")
+from sweep.models.theory.rocking import Body, frequencies, rocking, slower_period
 
 
-class Constants(named(*SHAPE, *INVERSE_INERTIA, *RATIOS, *friction.CONSTANTS)):  # type: ignore[misc]
-    """Shape, inverse moments of inertia, the ratios in Euler's equations, friction.
+class Constants(NamedTuple):
+    """Shape, inverse moments of inertia, the ratios in Euler's equations, and μ of the friction."""
 
-    `ratio1` is (I2 - I3) / I1; the others follow by cyclic permutation.
-    """
+    A11: Any
+    A12: Any
+    A22: Any
+    A33: Any
+    inv_I1: Any
+    inv_I2: Any
+    inv_I3: Any
+    ratio1: Any
+    """(I2 - I3) / I1; the others follow by cyclic permutation."""
+    ratio2: Any
+    ratio3: Any
+    mu: Any
 
     @classmethod
     def of(cls, columns: Columns) -> Constants:
         I1, I2, I3 = ellipsoid.inertia(columns)
         ratios = (I2 - I3) / I1, (I3 - I1) / I2, (I1 - I2) / I3
-        return cls(*ellipsoid.shape(columns), 1 / I1, 1 / I2, 1 / I3, *ratios, *friction.constants(columns))
+        return cls(*ellipsoid.shape(columns), 1 / I1, 1 / I2, 1 / I3, *ratios, columns["mu"])
 
 
 def start(columns: Columns) -> tuple[Array, ...]:
@@ -61,12 +66,19 @@ def rhs(y: Any, p: Any) -> Any:
     u1, u2, w1, w2, w3, v1, v2 = y
     (u3, inv_u3), (x, y_, z), du, dx = contact(u1, u2, w1, w2, w3, p)
     v3 = -(v1 * u1 + v2 * u2) * inv_u3
-    g1, g2, g3 = friction.contact_force(u1, u2, u3, v1, v2, v3, p)
+    # u + f with f = -μ v_p (visf), the contact force per unit of R
+    g1, g2, g3 = u1 - p.mu * v1, u2 - p.mu * v2, u3 - p.mu * v3
     # Euler's gyroscopic terms, and the torque of the contact force
     alpha = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
     beta = p.inv_I1 * (y_ * g3 - z * g2), p.inv_I2 * (z * g1 - x * g3), p.inv_I3 * (x * g2 - y_ * g1)
     slopes, spin, R, denominator = motion(y, u3, v3, (x, y_, z), du, dx, (g1, g2), alpha, beta, 1.0)
-    return slopes, (spin, friction.dissipation(R, v1, v2, v3, p), R, denominator)
+    return slopes, (spin, dissipation(R, v1, v2, v3, p), R, denominator)
+
+
+@inline
+def dissipation(R: Any, v1: Any, v2: Any, v3: Any, p: Any) -> Any:
+    """Power that friction dissipates, -R f · v_p >= 0."""
+    return p.mu * R * (v1 * v1 + v2 * v2 + v3 * v3)
 
 
 @inline
@@ -147,7 +159,7 @@ def observe(y: Array, p: Constants) -> dict[str, Array]:
 
 def fastest_decay(columns: Columns) -> Array:
     """Bound on the rate at which friction stops the slip, over the whole trajectory, in sqrt(g/c), shape (cells,)."""
-    return np.asarray(friction.strongest_resistance(columns) * strongest_grip(columns))
+    return np.asarray(columns["mu"] * strongest_grip(columns))
 
 
 def strongest_grip(columns: Columns) -> Array:
@@ -170,7 +182,7 @@ def strongest_grip(columns: Columns) -> Array:
     smallest = np.minimum(I1, I2)
     spin, rattle, inertia = energy(start(columns), Constants.of(columns))
     energy_start = rattle + 0.5 * inertia * spin**2
-    _, nu = frequencies(Body.of(columns))
+    _, nu = frequencies(rocking(Body.of(columns)))
     worst = np.zeros_like(energy_start)
     with np.errstate(divide="ignore", invalid="ignore"):
         long = np.fmin(I2, (a**2 - c**2) / (c * nu**2) - c**2)
@@ -193,7 +205,7 @@ MODEL = Model(
     summary="full equations with viscous slip friction (Takano 2011, Ldot … visf)",
     states=("u1", "u2", "omega1", "omega2", "omega3", "v1", "v2"),
     spin_state=4,
-    parameters=("a", "b", "c", "delta", *friction.PARAMETERS, "n0", "x0", "y0"),
+    parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
     offers=frozenset({COUNT, SPIN, ENERGY, MODES, FORMULAS, REVERSAL_TIME, model.LINEAR}),
     constants=Constants,
     start=start,

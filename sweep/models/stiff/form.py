@@ -65,11 +65,8 @@ class StiffForm:
     the old v): one Newton step from v for v = b + γ v_p'(v)."""
     power: Callable[..., Any]
     """Inline, (R, v1, v2, geometry, p) -> the power that friction dissipates."""
-    implicit: Callable[..., Any]
-    """Inline, (weight, p) -> (1 - weight J)⁻¹ row by row, sixteen numbers, where J is the matrix of the rocking about
-    upright rest without slip in (u1, u2, M1, M2)."""
-    fastest_rocking: Callable[[Any], Array]
-    """(p) -> the higher frequency of that rocking, shape (cells,)."""
+    rocking: Callable[[Any], Any]
+    """Inline, (p) -> the `Rocking` about upright rest without slip."""
     time_unit: Callable[[Columns], Array]
     """(columns) -> sqrt(c/g) in the model's units, shape (cells,)."""
     slip_decay: Callable[[Columns], Array]

@@ -29,9 +29,11 @@ from sweep.models.general.rigid_body import gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.model import Array, Columns, Model, Ripple, named
 from sweep.models.stiff.form import Geometry, StiffForm, in_momentum, newton_step
+from sweep.models.theory.ripple import ripple
+from sweep.models.theory.rocking import Rocking
 
 ROCKING = ("B11", "B12", "B21", "B22", "C12", "C21")
-"""Elements of B and C in u' = B M, M' = C u: rocking about upright rest without slip.  C has no others."""
+"""The elements of a `Rocking` in the axes of the surface that do not vanish."""
 
 
 def form_of(model: Model) -> StiffForm | None:
@@ -59,7 +61,8 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
 
         @classmethod
         def of(cls, columns: Columns) -> Constants:
-            return cls(*full.constants.of(columns), *_rocking(columns, surface))
+            rocking = rigid_body.rocking(columns, surface)
+            return cls(*full.constants.of(columns), *(getattr(rocking, name) for name in ROCKING))
 
     @inline
     def momentum(y: Any, p: Any) -> Any:
@@ -123,16 +126,15 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
         return general_energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
 
-    ripple = Ripple(general_ripple.NAMES, lambda columns: general_ripple.form(columns, surface), _ripple)
+    rippling = Ripple(general_ripple.NAMES, lambda columns: general_ripple.form(columns, surface), _ripple)
     return StiffForm(
         full=full,
-        model=in_momentum(full, Constants, momentum, slow, energy, ripple),
+        model=in_momentum(full, Constants, momentum, slow, energy, rippling),
         momentum=momentum,
         slow=slow,
         newton=newton,
         power=power,
-        implicit=implicit,
-        fastest_rocking=_fastest_rocking,
+        rocking=_rocking,
         time_unit=lambda columns: 1 / rigid_body.spin_unit(columns),
         slip_decay=lambda columns: full.fastest_decay(columns) + 2.2 * rigid_body.spin_unit(columns),
         rise=lambda columns: _rise(columns, surface),
@@ -168,15 +170,9 @@ def _compliance(x: Any, y: Any, z: Any, p: Any) -> Any:
     return T11, T12, T13, T22, T23, T33
 
 
-def _rocking(columns: Columns, surface: Surface) -> tuple[Array, ...]:
-    """Values of `ROCKING`, each of shape (cells,), at zero angular momentum about the vertical."""
-    J11, J22, J33, J12, J13, J23 = rigid_body.inertia(columns)
-    h2, g = rigid_body.height(columns) ** 2, rigid_body.gravity(columns)
-    P11, P22, P12 = J11 + h2 - J13**2 / J33, J22 + h2 - J23**2 / J33, J12 - J13 * J23 / J33
-    det = P11 * P22 - P12**2
-    k1, k2 = rigid_body.stiffness(columns, surface)
-    # u1' = ω2, u2' = -ω1
-    return -P12 / det, P11 / det, -P22 / det, P12 / det, g * k2, -g * k1
+@inline
+def _rocking(p: Any) -> Any:
+    return Rocking(p.B11, p.B12, p.B21, p.B22, 0.0, p.C12, p.C21, 0.0)
 
 
 @inline
@@ -186,15 +182,7 @@ def _ripple(y: Any, p: Any, k: Any) -> Any:
     w3 = M3 / p.J33
     m1, m2 = M1 - k[7] * v2 - k[8] * w3 * u1 - k[10] * M3, M2 + k[7] * v1 - k[9] * w3 * u2 - k[11] * M3
     w1, w2 = -(p.B21 * m1 + p.B22 * m2), p.B11 * m1 + p.B12 * m2
-    return (k[0] * u1 + k[2] * u2) * M1 + (k[1] * u1 + k[3] * u2) * M2 + k[10] * w1 + k[11] * w2
-
-
-def _fastest_rocking(p: Any) -> Array:
-    """By -ν² the eigenvalues of B C."""
-    trace = p.B12 * p.C21 + p.B21 * p.C12
-    determinant = (p.B11 * p.B22 - p.B12 * p.B21) * -p.C12 * p.C21
-    square = -0.5 * trace + np.sqrt(np.maximum(0.25 * trace**2 - determinant, 0.0))
-    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+    return ripple(u1, u2, M1, M2, k) + k[10] * w1 + k[11] * w2
 
 
 def _rise(columns: Columns, surface: Surface) -> Array:
@@ -202,22 +190,3 @@ def _rise(columns: Columns, surface: Surface) -> Array:
     i11, i22, _, i12, _, _ = rigid_body.inverse(rigid_body.inertia(columns))
     largest = 0.5 * (i11 + i22) + np.sqrt(0.25 * (i11 - i22) ** 2 + i12**2)
     return np.asarray(strongest_grip(columns, surface) / (rigid_body.gravity(columns) * (1 + h2 * largest)) - 1)
-
-
-@inline
-def implicit(weight: Any, p: Any) -> Any:
-    """As `StiffForm.implicit`."""
-    square = weight * weight
-    # E = (1 - w² B C)⁻¹; the other blocks are w E B, w C E and 1 + w² C E B.  C has only C12 and C21.
-    N11, N12 = 1.0 - square * p.B12 * p.C21, -square * p.B11 * p.C12
-    N21, N22 = -square * p.B22 * p.C21, 1.0 - square * p.B21 * p.C12
-    inv_det = 1.0 / (N11 * N22 - N12 * N21)
-    E11, E12, E21, E22 = N22 * inv_det, -N12 * inv_det, -N21 * inv_det, N11 * inv_det
-    F11, F12, F21, F22 = weight * p.C12 * E21, weight * p.C12 * E22, weight * p.C21 * E11, weight * p.C21 * E12
-    b11, b12, b21, b22 = weight * p.B11, weight * p.B12, weight * p.B21, weight * p.B22
-    return (
-        E11, E12, E11 * b11 + E12 * b21, E11 * b12 + E12 * b22,
-        E21, E22, E21 * b11 + E22 * b21, E21 * b12 + E22 * b22,
-        F11, F12, 1.0 + F11 * b11 + F12 * b21, F11 * b12 + F12 * b22,
-        F21, F22, F21 * b11 + F22 * b21, 1.0 + F21 * b12 + F22 * b22,
-    )  # fmt: skip

@@ -25,11 +25,11 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models import ellipsoid
-from sweep.models.ladder import friction, slip
+from sweep.models.ladder import slip
 from sweep.models.model import Array, Columns, Ripple, named, zeros
 from sweep.models.stiff.form import Geometry, StiffForm, in_momentum, newton_step
 from sweep.models.theory.ripple import FORM, form, ripple
-from sweep.models.theory.rocking import frequencies, rocking
+from sweep.models.theory.rocking import rocking
 
 
 class Constants(named("I1", "I2", "I3", *slip.Constants._fields)):  # type: ignore[misc]
@@ -112,7 +112,7 @@ def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any
 def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
     """Power of friction at a point with slip (v1, v2) and normal force R."""
     v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
-    return friction.dissipation(R, v1, v2, v3, p)
+    return slip.dissipation(R, v1, v2, v3, p)
 
 
 @inline
@@ -124,38 +124,12 @@ def energy(y: Any, p: Any) -> Any:
 
 
 @inline
-def implicit(weight: Any, p: Any) -> Any:
-    """(1 - weight J)⁻¹ row by row, sixteen numbers, where J is the matrix of `rocking` in (u1, u2, M1, M2)."""
-    B12, B21, C11, C12, C21, C22 = rocking(p)
-    square = weight * weight
-    # E = (1 - w² B C)⁻¹; the other blocks are w E B, w C E and 1 + w² C E B.
-    E11, E12 = 1.0 - square * B21 * C12, square * B12 * C22
-    E21, E22 = square * B21 * C11, 1.0 - square * B12 * C21
-    inv_det = 1.0 / (E11 * E22 - E12 * E21)
-    E11, E12, E21, E22 = E11 * inv_det, E12 * inv_det, E21 * inv_det, E22 * inv_det
-    F11, F12 = weight * (C11 * E11 + C12 * E21), weight * (C11 * E12 + C12 * E22)
-    F21, F22 = weight * (C21 * E11 + C22 * E21), weight * (C21 * E12 + C22 * E22)
-    b12, b21 = weight * B12, weight * B21
-    return (
-        E11, E12, E12 * b21, E11 * b12,
-        E21, E22, E22 * b21, E21 * b12,
-        F11, F12, 1.0 + F12 * b21, F11 * b12,
-        F21, F22, F22 * b21, 1.0 + F21 * b12,
-    )  # fmt: skip
-
-
-@inline
 def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
     return ripple(y[0], y[1], y[2], y[3], k)
 
 
 STIFF_MODEL = in_momentum(slip.MODEL, Constants, momentum, slow, energy, Ripple(FORM, form, _ripple))
 """The slip model in these variables, for methods that use `slow` and `newton` in place of a right-hand side."""
-
-
-def _fastest_rocking(p: Constants) -> Array:
-    _, fastest = frequencies(p)
-    return fastest
 
 
 def _rise(columns: Columns) -> Array:
@@ -170,10 +144,9 @@ PAPER_FORM = StiffForm(
     slow=slow,
     newton=newton,
     power=power,
-    implicit=implicit,
-    fastest_rocking=_fastest_rocking,
+    rocking=rocking,
     time_unit=lambda columns: np.sqrt(columns["c"]),
-    slip_decay=lambda columns: 2.2 * friction.strongest_resistance(columns) + 2.2,
+    slip_decay=lambda columns: 2.2 * columns["mu"] + 2.2,
     rise=_rise,
     damping=zeros,
     resolves_modes=True,

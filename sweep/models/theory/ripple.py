@@ -26,35 +26,45 @@ order.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
 from sweep.models.model import Array, Columns, stack
-from sweep.models.theory.rocking import Body, rocking
+from sweep.models.theory.rocking import Body, Rocking, rocking
 
 FORM = ("K11", "K12", "K21", "K22")
 
-_SHAPE = ("a", "b", "c", "delta")
+_APART = 1e-9
+"""Share by which the squares of two frequencies have to differ: the ripple at their difference is slow otherwise."""
 
 
-def form(columns: Columns) -> tuple[Array, Array, Array, Array]:
+def form(columns: Columns) -> tuple[Array, ...]:
     """K11, K12, K21 and K22, in 1/(m c^2), each of shape (cells,)."""
-    shapes, which = np.unique(stack(tuple(columns[name] for name in _SHAPE)), axis=1, return_inverse=True)
-    K = _form(Body.of(dict(zip(_SHAPE, shapes, strict=True))))[which.reshape(-1)]
-    return K[:, 0, 0], K[:, 0, 1], K[:, 1, 0], K[:, 1, 1]
+    return for_each_body(_form, {name: columns[name] for name in ("a", "b", "c", "delta")})
 
 
-def _form(p: Body) -> Array:
-    """K, shape (bodies, 2, 2)."""
+def for_each_body(of: Callable[[Columns], tuple[Array, ...]], columns: Columns) -> tuple[Array, ...]:
+    """What `of` gives of columns, computed once for cells that are alike."""
+    bodies, which = np.unique(stack(tuple(columns.values())), axis=1, return_inverse=True)
+    return tuple(each[which.reshape(-1)] for each in of(dict(zip(columns, bodies, strict=True))))
+
+
+def _form(columns: Columns) -> tuple[Array, ...]:
+    p = Body.of(columns)
     J1, J2 = p.I1 + p.A33, p.I2 + p.A33
-    P = _matrix(1 - (p.I3 + p.A11) / J1, -p.A12 / J2, -p.A12 / J1, 1 - (p.I3 + p.A22) / J2)
+    P = matrix(1 - (p.I3 + p.A11) / J1, -p.A12 / J2, -p.A12 / J1, 1 - (p.I3 + p.A22) / J2)
     off = (p.A22 - p.A11) / (2 * J1 * J2)
-    H = _matrix(p.A12 / J1**2, off, off, -p.A12 / J2**2)
-    B12, B21, C11, C12, C21, C22 = rocking(p)
-    B, C = _matrix(0 * B12, B12, B21, 0 * B12), _matrix(C11, C12, C21, C22)
+    H = matrix(p.A12 / J1**2, off, off, -p.A12 / J2**2)
+    return ripple_free(rocking(p), H, P, p.I3)
 
+
+def ripple_free(of: Rocking, H: Array, P: Array, I3: Array) -> tuple[Array, ...]:
+    """K11, K12, K21 and K22, each of shape (bodies,), for the forms H of M and P of u and M, shape (bodies, 2, 2)."""
+    B11, B12, B21, B22, C11, C12, C21, C22 = of
+    B, C = matrix(B11, B12, B21, B22), matrix(C11, C12, C21, C22)
     minus_squares, e = np.linalg.eig(B @ C)
     # A body that is round about one axis has one mode only, and no slower period to average over.
     round_ = np.asarray((minus_squares.real >= 0).any(axis=1))
@@ -64,14 +74,16 @@ def _form(p: Body) -> Array:
     f = np.linalg.inv(B) @ e * nu[:, None, :]
     h = np.swapaxes(f, 1, 2) @ H @ f
     apart = squares[:, 0] - squares[:, 1]
-    mixed = np.divide(2 * h[:, 0, 1], apart, out=np.zeros_like(apart), where=apart != 0)
-    kappa = _matrix(h[:, 0, 0] / (2 * nu[:, 0]), mixed * nu[:, 0], -mixed * nu[:, 1], h[:, 1, 1] / (2 * nu[:, 1]))
+    mixed = np.divide(2 * h[:, 0, 1], apart, out=np.zeros_like(apart), where=np.abs(apart) > _APART * squares[:, 0])
+    kappa = matrix(h[:, 0, 0] / (2 * nu[:, 0]), mixed * nu[:, 0], -mixed * nu[:, 1], h[:, 1, 1] / (2 * nu[:, 1]))
     kappa[round_] = 0
-    return np.asarray((np.linalg.inv(np.swapaxes(e, 1, 2)) @ kappa @ np.linalg.inv(f) - P) / p.I3[:, None, None])
+    K = (np.linalg.inv(np.swapaxes(e, 1, 2)) @ kappa @ np.linalg.inv(f) - P).real / I3[:, None, None]
+    return K[:, 0, 0], K[:, 0, 1], K[:, 1, 0], K[:, 1, 1]
 
 
-def _matrix(first: Array, second: Array, third: Array, fourth: Array) -> Array:
-    return np.stack([np.stack([first, second], -1), np.stack([third, fourth], -1)], -2)
+def matrix(first: Any, second: Any, third: Any, fourth: Any) -> Array:
+    """Matrices, shape (bodies, 2, 2), of their elements row by row."""
+    return np.moveaxis(stack((first, second, third, fourth)), 0, -1).reshape(-1, 2, 2)
 
 
 @inline

@@ -2,8 +2,11 @@
 
     u' = B M,   M' = C u
 
-to first order in u1, u2, M1, M2.  -ν² are the eigenvalues of B C.  The paper's ν1, ν2 neglect c² beside a² and b² in
-C: at a = 10, b = 3 they give 3.65 for the period of the slower mode, which is 3.87.
+to first order in u1, u2, M1, M2.  -ν² are the eigenvalues of B C.  In the axes of inertia, which are those of the
+paper's body, the diagonal of B vanishes; in those of the surface, which are those of other bodies, that of C does.
+
+The paper's ν1, ν2 neglect c² beside a² and b² in C: at a = 10, b = 3 they give 3.65 for the period of the slower mode,
+which is 3.87.
 """
 
 from __future__ import annotations
@@ -15,6 +18,19 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.model import Array, Columns
+
+
+class Rocking(NamedTuple):
+    """The elements of B and C."""
+
+    B11: Any
+    B12: Any
+    B21: Any
+    B22: Any
+    C11: Any
+    C12: Any
+    C21: Any
+    C22: Any
 
 
 class Body(NamedTuple):
@@ -35,26 +51,54 @@ class Body(NamedTuple):
 
 @inline
 def rocking(p: Any) -> Any:
-    """(B12, B21, C11, C12, C21, C22); the diagonal of B vanishes.  `p` holds I1, I2 and A11 … A33."""
+    """The rocking of the paper's body; `p` holds I1, I2 and A11 … A33."""
     A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
     inv_c = 1.0 / np.sqrt(A33)
-    return 1.0 / (p.I2 + A33), -1.0 / (p.I1 + A33), A12 * inv_c, (A22 - A33) * inv_c, (A33 - A11) * inv_c, -A12 * inv_c
+    B12, B21 = 1.0 / (p.I2 + A33), -1.0 / (p.I1 + A33)
+    return Rocking(0.0, B12, B21, 0.0, A12 * inv_c, (A22 - A33) * inv_c, (A33 - A11) * inv_c, -A12 * inv_c)
 
 
-def frequencies(p: Any) -> tuple[Array, Array]:
-    """The lower and the higher frequency ν, in sqrt(g/c), each of shape (cells,); `p` as in `rocking`."""
-    B12, B21, C11, C12, C21, C22 = rocking(p)
-    first, second = -B12 * C21, -B21 * C12
-    half_split = np.sqrt((0.5 * (first - second)) ** 2 + B12 * C22 * B21 * C11)
+def frequencies(of: Rocking) -> tuple[Array, Array]:
+    """The lower and the higher frequency ν, each of shape (cells,)."""
+    B11, B12, B21, B22, C11, C12, C21, C22 = of
+    first, second = -B12 * C21 - B11 * C11, -B21 * C12 - B22 * C22
+    half_split = np.sqrt((0.5 * (first - second)) ** 2 + (B12 * C22 * B21 * C11 + B11 * C12 * B22 * C21))
     higher = 0.5 * (first + second) + half_split
     # The product of the squares is det(B C).  A difference would lose the lower one where a body is nearly round.
-    determinant = B12 * B21 * (C12 * C21 - C11 * C22)
+    determinant = (B12 * B21 - B11 * B22) * (C12 * C21 - C11 * C22)
     lower = np.divide(determinant, higher, out=np.zeros_like(higher), where=higher > 0)
     return np.sqrt(np.maximum(lower, 0.0)), np.sqrt(np.maximum(higher, 0.0))
 
 
-def slower_period(columns: Columns) -> Array:
-    """Period of the slower mode, in sqrt(c/g), shape (cells,); infinite for a body that is round about one axis."""
-    lower, _ = frequencies(Body.of(columns))
+def longer_period(of: Rocking) -> Array:
+    """Period of the slower mode, shape (cells,); infinite for a body that is round about one axis."""
+    lower, _ = frequencies(of)
     with np.errstate(divide="ignore"):
         return np.asarray(2 * np.pi / lower)
+
+
+def slower_period(columns: Columns) -> Array:
+    """Period of the slower mode of the paper's body, in sqrt(c/g), shape (cells,)."""
+    return longer_period(rocking(Body.of(columns)))
+
+
+@inline
+def implicit(weight: Any, of: Any) -> Any:
+    """(1 - weight J)⁻¹ row by row, sixteen numbers, where J is the matrix of the rocking `of` in (u1, u2, M1, M2)."""
+    B11, B12, B21, B22, C11, C12, C21, C22 = of
+    b11, b12, b21, b22 = weight * B11, weight * B12, weight * B21, weight * B22
+    square = weight * weight
+    s11, s12, s21, s22 = square * B11, square * B12, square * B21, square * B22
+    # E = (1 - w² B C)⁻¹; the other blocks are w E B, w C E and 1 + w² C E B.
+    E11, E12 = 1.0 - s21 * C12 - s22 * C22, s12 * C22 + s11 * C12
+    E21, E22 = s21 * C11 + s22 * C21, 1.0 - s12 * C21 - s11 * C11
+    inv_det = 1.0 / (E11 * E22 - E12 * E21)
+    E11, E12, E21, E22 = E11 * inv_det, E12 * inv_det, E21 * inv_det, E22 * inv_det
+    F11, F12 = weight * (C11 * E11 + C12 * E21), weight * (C11 * E12 + C12 * E22)
+    F21, F22 = weight * (C21 * E11 + C22 * E21), weight * (C21 * E12 + C22 * E22)
+    return (
+        E11, E12, E12 * b21 + E11 * b11, E11 * b12 + E12 * b22,
+        E21, E22, E22 * b21 + E21 * b11, E21 * b12 + E22 * b22,
+        F11, F12, 1.0 + F12 * b21 + F11 * b11, F11 * b12 + F12 * b22,
+        F21, F22, F22 * b21 + F21 * b11, 1.0 + F21 * b12 + F22 * b22,
+    )  # fmt: skip
