@@ -74,14 +74,30 @@ def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
 def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any) -> Any:
     """(spin n, energy of the rattle, I3), where the energy above rest is the energy of the rattle + I3 n²/2.
 
-    E = ωᵀIω/2 + |v_g|²/2 + (r - c) is split by means of ω = n u + w, w ⊥ u.  Every term except I3 n²/2 is quadratic
-    in small quantities and is computed as such: no difference of numbers of order one is taken.  `p` holds A11 … A33
-    and the inverse moments of inertia, inv_I1 … inv_I3.
+    `p` holds A11 … A33 and the inverse moments of inertia, inv_I1 … inv_I3.
     """
     A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
     I1, I2, I3 = 1.0 / p.inv_I1, 1.0 / p.inv_I2, 1.0 / p.inv_I3
 
     u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
+    au1, au2, au3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
+    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
+    # r - c = (r² - c²)/(r + c)
+    c = np.sqrt(A33)
+    height = ((A11 - A33) * u1 * u1 + 2.0 * A12 * u1 * u2 + (A22 - A33) * u2 * u2) / (r + c)
+    x_p = -au1 / r, -au2 / r, -au3 / r
+    n, rattle = split_energy((u1, u2, u3), (w1, w2, w3), (v1, v2), x_p, (I1, I2, I3), height)
+    return n, rattle, I3
+
+
+@inline
+def split_energy(u: Any, w: Any, v: Any, x_p: Any, moments: Any, height: Any) -> Any:
+    """(spin n, energy of the rattle) of any body whose energy of height is `height`, without products of inertia.
+
+    E = ωᵀIω/2 + |v_g|²/2 + `height` is split by means of ω = n u + o, o ⊥ u.  Every term except I3 n²/2 is quadratic in
+    small quantities and is computed as such: no difference of numbers of order one is taken.
+    """
+    (u1, u2, u3), (w1, w2, w3), (v1, v2), (x, y, z), (I1, I2, I3) = u, w, v, x_p, moments
     n = u1 * w1 + u2 * w2 + u3 * w3
     o1, o2 = w1 - n * u1, w2 - n * u2
     o3 = -(u1 * o1 + u2 * o2) / u3
@@ -89,14 +105,7 @@ def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any
     cross_part = n * ((I1 - I3) * u1 * o1 + (I2 - I3) * u2 * o2)
     tilt_part = 0.5 * (I1 * o1 * o1 + I2 * o2 * o2 + I3 * o3 * o3)
 
-    au1, au2, au3 = A11 * u1 + A12 * u2, A12 * u1 + A22 * u2, A33 * u3
-    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
-    # r - c = (r² - c²)/(r + c)
-    c = np.sqrt(A33)
-    height = ((A11 - A33) * u1 * u1 + 2.0 * A12 * u1 * u2 + (A22 - A33) * u2 * u2) / (r + c)
-
-    x, y, z = -au1 / r, -au2 / r, -au3 / r
     v3 = -(v1 * u1 + v2 * u2) / u3
     g1, g2, g3 = v1 + y * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y * w1
     drift = 0.5 * (g1 * g1 + g2 * g2 + g3 * g3)
-    return n, spin_part + cross_part + tilt_part + height + drift, I3
+    return n, spin_part + cross_part + tilt_part + height + drift

@@ -6,12 +6,11 @@ The step of an explicit method, and the energy below which a law of friction is 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 
 from sweep.models.general import rigid_body, starts
+from sweep.models.general.common import record
 from sweep.models.general.couples import Couple
 from sweep.models.general.surfaces import ELLIPSOID, Surface
 from sweep.models.model import Array, Columns
@@ -27,9 +26,9 @@ def faint_energy(speed: Array, columns: Columns, surface: Surface) -> Array:
     """
     c, g = columns["c"], rigid_body.gravity(columns)
     inverse = np.linalg.eigvalsh(rigid_body.matrix(rigid_body.inverse(rigid_body.inertia(columns))))[:, -1]
-    grip, arm = 1 + rigid_body.height(columns) ** 2 * inverse, np.maximum(*surface.radii(columns))
-    stiffness = np.minimum(*rigid_body.stiffness(columns, surface))
-    per_root = np.sqrt(2 * grip) + np.sqrt(g / c) * arm * np.sqrt(2 / (g * stiffness))
+    stiffness, height = rigid_body.stiffness(columns, surface), rigid_body.height(columns)
+    grip, arm = 1 + height**2 * inverse, height + np.maximum(*stiffness)
+    per_root = np.sqrt(2 * grip) + np.sqrt(g / c) * arm * np.sqrt(2 / (g * np.minimum(*stiffness)))
     return np.asarray((speed / per_root) ** 2)
 
 
@@ -47,10 +46,8 @@ def couples_decay(couples: Sequence[Couple], columns: Columns, surface: Surface)
 
 def _energy_start(columns: Columns, surface: Surface) -> Array:
     """Energy above rest at the start, per unit mass, shape (cells,)."""
-    J = rigid_body.inertia(columns)
     y = starts.slipping(columns, surface) if "slip1" in columns else (*starts.rolling(columns, surface), 0.0, 0.0)
-    names, values = (*rigid_body.shape_names(surface), *rigid_body.INERTIA), (*rigid_body.shape(columns, surface), *J)
-    spin, rattle, inertia = rigid_body.energy_on(surface)(*y, SimpleNamespace(**dict(zip(names, values, strict=True))))
+    spin, rattle, inertia = rigid_body.energy_on(surface)(*y, record(surface).of(columns))
     return np.asarray(rattle + 0.5 * inertia * spin**2)
 
 
@@ -61,23 +58,26 @@ def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Array, Arra
     """Attitudes that a body may reach: normals u, shape (cells, 3), with bounds on the normal force R, shape (cells,).
 
     A body tilts at most until the height of G takes up the whole energy at the start, E0.  If it tilts towards the
-    azimuth ψ at the rate φ', then R - g <= r'' φ'², where r is the height of G at the tilt φ, and
+    azimuth ψ at the rate φ', then R - g <= r'' φ'², where r is the height of G at the tilt φ above that at rest, and
 
-        φ'² <= 2 (E0 - g (r - r0)) / (J_t + r'²),
+        φ'² <= 2 (E0 - g r) / (J_t + r'²),
 
     where J_t is the least moment of inertia about the axis of tilting, with free spin.
     """
-    shape, g, J = surface.of(columns), rigid_body.gravity(columns), rigid_body.matrix(rigid_body.inertia(columns))
-    E0, r0 = _energy_start(columns, surface), rigid_body.height(columns)
+    constants, g = record(surface).of(columns), rigid_body.gravity(columns)
+    E0, J = _energy_start(columns, surface), rigid_body.matrix(rigid_body.inertia(columns))
     for psi in np.linspace(0, np.pi, _AZIMUTHS, endpoint=False):
         cos, sin = np.cos(psi), np.sin(psi)
-        height = partial(surface.height, shape, cos, sin)
+
+        def height(phi: Array, cos: float = cos, sin: float = sin) -> Array:
+            """The height of G above that at rest, if the body is tilted by φ."""
+            return np.asarray(surface.elevation(cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi), constants))
 
         # The largest tilt that the energy allows, by bisection; heights grow with the tilt, at least at first.
         low, high = np.zeros_like(E0), np.full_like(E0, 1.5)
         for _ in range(40):
             middle = (low + high) / 2
-            within = g * (height(middle) - r0) < E0
+            within = g * height(middle) < E0
             low, high = np.where(within, middle, low), np.where(within, high, middle)
         axis = np.array([-sin, cos, 0.0])
         for share in np.linspace(0, 1, _SHARES):
@@ -86,7 +86,7 @@ def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Array, Arra
             slope, bend = (ahead - behind) / (2 * d), (ahead - 2 * r + behind) / d**2
             u = np.stack([cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi)], axis=-1)
             tt, tu, uu = (np.einsum("...i,...ij,...j->...", p, J, q) for p, q in ((axis, axis), (axis, u), (u, u)))
-            square = 2 * np.maximum(E0 - g * (r - r0), 0) / (tt - tu**2 / uu + slope**2)
+            square = 2 * np.maximum(E0 - g * r, 0) / (tt - tu**2 / uu + slope**2)
             yield u, g + np.maximum(bend, 0) * square
 
 
@@ -108,11 +108,11 @@ def strongest_grip(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
 
     Friction on a slip v changes it by -R k (1 - [x_p] J⁻¹ [x_p]) v, where [x] is the matrix of x ×.
     """
-    shape = SimpleNamespace(**dict(zip(surface.constants, surface.of(columns), strict=True)))
+    constants = record(surface).of(columns)
     inverse = rigid_body.matrix(rigid_body.inverse(rigid_body.inertia(columns)))
     worst = np.zeros_like(columns["a"])
     for u, R in _attitudes(columns, surface):
-        _, *point = surface.elevation(*u.T, shape)
+        _, point, _, _ = surface.contact(u[:, 0], u[:, 1], 0.0, 0.0, 0.0, constants)
         x_p = np.stack(point, axis=-1)
         X = np.cross(np.eye(3), x_p[:, None, :])
         G = X @ inverse @ np.swapaxes(X, 1, 2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,25 +13,21 @@ from sweep.models.general.surfaces import Surface
 from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, zeros
 
 
-def record(surface: Surface, constants: Sequence[str], more: Any) -> type[Any]:
-    """The constants of a variant: shape, inertia, its inverse, and `more`, a function of the columns."""
-    shape = rigid_body.shape_names(surface)
-    inverse = tuple(name.replace("J", "inv_J") for name in rigid_body.INERTIA)
+def record(
+    surface: Surface, couples: Sequence[Couple] = (), more: Sequence[str] = (),
+    of_more: Callable[[Columns], tuple[Array, ...]] = lambda columns: (),  # noqa: ARG005
+) -> type[Any]:  # fmt: skip
+    """The constants of a variant: of the surface, the inertia, its inverse and the couples, and `more`."""
+    body = (*surface.constants, "g", *rigid_body.INERTIA, *(name.replace("J", "inv_J") for name in rigid_body.INERTIA))
 
-    class Constants(named(*shape, *rigid_body.INERTIA, *inverse, *constants)):  # type: ignore[misc]
+    class Constants(named(*body, *(name for couple in couples for name in couple.constants), *more)):  # type: ignore[misc]
         @classmethod
         def of(cls, columns: Columns) -> Constants:
-            J = rigid_body.inertia(columns)
-            return cls(*rigid_body.shape(columns, surface), *J, *rigid_body.inverse(J), *more(columns))
+            J, g = rigid_body.inertia(columns), rigid_body.gravity(columns)
+            of_couples = (value for couple in couples for value in couple.of(columns))
+            return cls(*surface.of(columns), g, *J, *rigid_body.inverse(J), *of_couples, *of_more(columns))
 
     return Constants
-
-
-def couple_constants(couples: Sequence[Couple]) -> tuple[tuple[str, ...], Any]:
-    def values(columns: Columns) -> tuple[Array, ...]:
-        return tuple(value for couple in couples for value in couple.of(columns))
-
-    return tuple(name for couple in couples for name in couple.constants), values
 
 
 def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:

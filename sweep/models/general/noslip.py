@@ -16,10 +16,10 @@ from sweep.jit import inline
 from sweep.models.general import rigid_body, starts, validity
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay
-from sweep.models.general.common import couple_constants, offers, record, seen, turned
-from sweep.models.general.couples import Couple, no_resistance
-from sweep.models.general.resistance import drag_of, isotropic_drag, resistances
-from sweep.models.general.rigid_body import gyroscopic
+from sweep.models.general.common import offers, record, seen, turned
+from sweep.models.general.couples import Couple
+from sweep.models.general.resistance import damping_of, friction_of
+from sweep.models.general.rigid_body import about_contact, gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.ladder import noslip
 from sweep.models.model import REVERSAL_TIME, Model, Ripple
@@ -28,9 +28,9 @@ from sweep.models.model import REVERSAL_TIME, Model, Ripple
 def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     """The variant of `noslip` of this name; `parameters` are those of the body and the start."""
     contact, general_energy = surface.contact, rigid_body.energy_on(surface)
-    (plain, loaded), drag = resistances(couples), drag_of(couples)
-    damps, drags = plain is not no_resistance, loaded is not no_resistance or drag is not isotropic_drag
-    names, values = couple_constants(couples)
+    friction, damping = friction_of(couples), damping_of(couples)
+    # A product with 0.0 would remain: the compiler has to allow for infinity.
+    drags = any(couple.needs_normal_force for couple in couples)
 
     @inline
     def rhs(y: Any, p: Any) -> Any:
@@ -40,39 +40,21 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         s1, s2, s3 = y_ * w3 - z * w2 - dx, z * w1 - x * w3 - dy, x * w2 - y_ * w1 - dz
         c1, c2, c3 = w2 * s3 - w3 * s2, w3 * s1 - w1 * s3, w1 * s2 - w2 * s1
         h1, h2, h3 = p.g * u1 + c1, p.g * u2 + c2, p.g * u3 + c3
-        turn_square = w1 * w1 + w2 * w2 + w3 * w3
-        k0, k1 = plain(turn_square, p), loaded(turn_square, p)
-        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, 0.0, p)
-        m1, m2, m3 = gyroscopic(w1, w2, w3, p)
-        t1, t2, t3 = m1 + y_ * h3 - z * h2, m2 + z * h1 - x * h3, m3 + x * h2 - y_ * h1
-        if damps:
-            t1, t2, t3 = t1 - k0 * w1, t2 - k0 * w2, t3 - k0 * w3
-
-        # P = J + |x_p|² - x_p x_pᵀ, and the adjugate C of it
-        P11, P22, P33 = p.J11 + y_ * y_ + z * z, p.J22 + z * z + x * x, p.J33 + x * x + y_ * y_
-        P12, P13, P23 = p.J12 - x * y_, p.J13 - x * z, p.J23 - y_ * z
-        C11, C22, C33 = P22 * P33 - P23 * P23, P11 * P33 - P13 * P13, P11 * P22 - P12 * P12
-        C12, C13, C23 = P13 * P23 - P12 * P33, P12 * P23 - P13 * P22, P12 * P13 - P11 * P23
-        inv = 1.0 / (P11 * C11 + P12 * C12 + P13 * C13)
-        a1 = inv * (C11 * t1 + C12 * t2 + C13 * t3)
-        a2 = inv * (C12 * t1 + C22 * t2 + C23 * t3)
-        a3 = inv * (C13 * t1 + C23 * t2 + C33 * t3)
+        (m1, m2, m3), ((t1, t2, t3), power) = gyroscopic(w1, w2, w3, p), damping(w1, w2, w3, p)
+        t1, t2, t3 = t1 + m1 + (y_ * h3 - z * h2), t2 + m2 + (z * h1 - x * h3), t3 + m3 + (x * h2 - y_ * h1)
+        a1, a2, a3 = about_contact(t1, t2, t3, x, y_, z, p)
         q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
         R = p.g + (u1 * c1 + u2 * c2 + u3 * c3) + (q1 * a1 + q2 * a2 + q3 * a3)
-        spin = u1 * w1 + u2 * w2 + u3 * w3
-        denominator, power = 1.0, 0.0
+        denominator = 1.0
         if drags:
-            # ω' = a - R k1 b
-            b1 = inv * (C11 * d1 + C12 * d2 + C13 * d3)
-            b2 = inv * (C12 * d1 + C22 * d2 + C23 * d3)
-            b3 = inv * (C13 * d1 + C23 * d2 + C33 * d3)
-            denominator = 1.0 + k1 * (q1 * b1 + q2 * b2 + q3 * b3)
+            # ω' = a - R b
+            _, (d1, d2, d3), turning = friction(0.0, w1, w2, w3, u1, u2, u3, p)
+            b1, b2, b3 = about_contact(d1, d2, d3, x, y_, z, p)
+            denominator = 1.0 + (q1 * b1 + q2 * b2 + q3 * b3)
             R = R / denominator
-            load = R * k1
-            a1, a2, a3 = a1 - load * b1, a2 - load * b2, a3 - load * b3
-            power = load * (d1 * w1 + d2 * w2 + d3 * w3)
-        if damps:
-            power = power + k0 * turn_square
+            a1, a2, a3 = a1 - R * b1, a2 - R * b2, a3 - R * b3
+            power = power + R * turning
+        spin = u1 * w1 + u2 * w2 + u3 * w3
         return (du1, du2, a1, a2, a3), (spin, power, R, denominator)
 
     @inline
@@ -87,7 +69,7 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         spin_state=noslip.MODEL.spin_state,
         parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=bool(couples)) | {REVERSAL_TIME},
-        constants=record(surface, names, values),
+        constants=record(surface, couples),
         start=lambda columns: starts.rolling(columns, surface),
         slower_period=lambda columns: rigid_body.slower_period(columns, surface),
         fastest_decay=lambda columns: couples_decay(couples, columns, surface),

@@ -10,66 +10,60 @@ from sweep.models.general.couples import Couple, no_resistance
 from sweep.models.general.laws import Law
 
 
-def resistances(couples: Sequence[Couple]) -> tuple[Any, Any]:
-    """The resistance by itself and the one per unit of the normal force."""
-    found: list[Any] = [no_resistance, no_resistance]
-    for couple in couples:
-        if not couple.about_normal:
-            found[couple.needs_normal_force] = couple.resistance
-    return found[0], found[1]
-
-
-def resistance_of(law: Law) -> Any:
-    """Inline, (v², ω, u, constants) -> the law's resistance k."""
-    alone, coupled = law.resistance, law.coupled
-    if coupled is None:
-
-        @inline
-        def isotropic(
-            square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any  # noqa: ARG001
-        ) -> Any:  # fmt: skip
-            return alone(square, p)
-
-        return isotropic
+def damping_of(couples: Sequence[Couple]) -> Any:
+    """Inline, (ω, constants) -> the couple by itself, τ0, and the power that it takes."""
+    resistance = _resistance([couple for couple in couples if not couple.needs_normal_force])
+    # A product with 0.0 would remain: the compiler has to allow for infinity.  A sum with it does not.
+    damps = resistance is not no_resistance
 
     @inline
-    def resistance(square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
-        n = u1 * w1 + u2 * w2 + u3 * w3
-        k, _ = coupled(square, n * n, p)
-        return k
+    def damping(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+        c1, c2, c3, power = 0.0, 0.0, 0.0, 0.0
+        if damps:
+            square = w1 * w1 + w2 * w2 + w3 * w3
+            k = resistance(square, p)
+            c1, c2, c3, power = -k * w1, -k * w2, -k * w3, k * square
+        return (c1, c2, c3), power
 
-    return resistance
+    return damping
 
 
-def drag_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
-    """Inline, (k, ω, u, v², constants) -> (k', d): the couple per unit of the normal force is -k' d.
+def friction_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
+    """Inline, (v², ω, u, constants) -> (k, d, power): the friction -k v and the couple -d, per unit of normal force.
 
-    It is -k ω, and where `couples` have one about the normal, or the law, also that one.
+    The power is that of the couple.
     """
-    about_normal = [couple.resistance for couple in couples if couple.about_normal]
-    coupled = law.coupled if law else None
-    if not about_normal and coupled is None:
-        return isotropic_drag
-    spinning = about_normal[0] if about_normal else no_resistance
-    of_slip = coupled or _no_couple
+    of_slip = (law and law.coupled) or _without_couple(law.resistance if law else no_resistance)
+    rolling, spinning = (
+        _resistance([couple for couple in couples if couple.needs_normal_force and couple.about_normal == about_normal])
+        for about_normal in (False, True)
+    )
+    rolls, spins = rolling is not no_resistance, spinning is not no_resistance or bool(law and law.coupled)
 
     @inline
-    def drag(k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, square: Any, p: Any) -> Any:
+    def friction(square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
         n = u1 * w1 + u2 * w2 + u3 * w3
-        _, of_law = of_slip(square, n * n, p)
-        m = (spinning(n * n, p) + of_law) * n
-        return 1.0, k * w1 + m * u1, k * w2 + m * u2, k * w3 + m * u3
+        k, m = of_slip(square, n * n, p)
+        d1, d2, d3, power = 0.0, 0.0, 0.0, 0.0
+        if rolls:
+            turn_square = w1 * w1 + w2 * w2 + w3 * w3
+            r = rolling(turn_square, p)
+            d1, d2, d3, power = r * w1, r * w2, r * w3, r * turn_square
+        if spins:
+            m = (m + spinning(n * n, p)) * n
+            d1, d2, d3, power = d1 + m * u1, d2 + m * u2, d3 + m * u3, power + m * n
+        return k, (d1, d2, d3), power
 
-    return drag
+    return friction
 
 
-@inline
-def _no_couple(square: Any, spin_square: Any, p: Any) -> Any:  # noqa: ARG001
-    return 0.0, 0.0
+def _resistance(couples: Sequence[Couple]) -> Any:
+    return couples[0].resistance if couples else no_resistance
 
 
-@inline
-def isotropic_drag(
-    k: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, square: Any, p: Any  # noqa: ARG001
-) -> Any:  # fmt: skip
-    return k, w1, w2, w3
+def _without_couple(resistance: Any) -> Any:
+    @inline
+    def of_slip(square: Any, spin_square: Any, p: Any) -> Any:  # noqa: ARG001
+        return resistance(square, p), 0.0
+
+    return of_slip

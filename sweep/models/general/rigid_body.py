@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
+from sweep.models.ellipsoid import split_energy
 from sweep.models.general.surfaces import ELLIPSOID, Surface, offset
 from sweep.models.model import Array, Columns
 from sweep.models.theory.rocking import Rocking, longer_period
@@ -40,16 +41,6 @@ def mass(columns: Columns) -> Array:
 def spin_unit(columns: Columns) -> Array:
     """sqrt(g/c), shape (cells,)."""
     return np.asarray(np.sqrt(gravity(columns) / columns["c"]))
-
-
-def shape_names(surface: Surface) -> tuple[str, ...]:
-    """The constants of a surface, and g."""
-    return *surface.constants, "g"
-
-
-def shape(columns: Columns, surface: Surface) -> tuple[Array, ...]:
-    """Values of `shape_names`, each of shape (cells,)."""
-    return *surface.of(columns), gravity(columns)
 
 
 def inertia(columns: Columns) -> tuple[Array, ...]:
@@ -112,47 +103,54 @@ def slower_period(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
 
 
 @inline
-def gyroscopic(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
-    """-ω × J ω."""
+def momentum(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+    """J ω."""
     L1 = p.J11 * w1 + p.J12 * w2 + p.J13 * w3
     L2 = p.J12 * w1 + p.J22 * w2 + p.J23 * w3
-    L3 = p.J13 * w1 + p.J23 * w2 + p.J33 * w3
+    return L1, L2, p.J13 * w1 + p.J23 * w2 + p.J33 * w3
+
+
+@inline
+def gyroscopic(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+    """-ω × J ω."""
+    L1, L2, L3 = momentum(w1, w2, w3, p)
     return w3 * L2 - w2 * L3, w1 * L3 - w3 * L1, w2 * L1 - w1 * L2
+
+
+@inline
+def about_centre(t1: Any, t2: Any, t3: Any, p: Any) -> Any:
+    """J⁻¹ t: ω' by a torque about the centre of mass."""
+    a1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
+    a2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
+    return a1, a2, p.inv_J13 * t1 + p.inv_J23 * t2 + p.inv_J33 * t3
+
+
+@inline
+def about_contact(t1: Any, t2: Any, t3: Any, x: Any, y: Any, z: Any, p: Any) -> Any:
+    """J_P⁻¹ t with J_P = J + |x_p|² - x_p x_pᵀ, by the adjugate: ω' by a torque about a contact point at rest."""
+    P11, P22, P33 = p.J11 + y * y + z * z, p.J22 + z * z + x * x, p.J33 + x * x + y * y
+    P12, P13, P23 = p.J12 - x * y, p.J13 - x * z, p.J23 - y * z
+    C11, C22, C33 = P22 * P33 - P23 * P23, P11 * P33 - P13 * P13, P11 * P22 - P12 * P12
+    C12, C13, C23 = P13 * P23 - P12 * P33, P12 * P23 - P13 * P22, P12 * P13 - P11 * P23
+    inv = 1.0 / (P11 * C11 + P12 * C12 + P13 * C13)
+    a1 = inv * (C11 * t1 + C12 * t2 + C13 * t3)
+    a2 = inv * (C12 * t1 + C22 * t2 + C23 * t3)
+    return a1, a2, inv * (C13 * t1 + C23 * t2 + C33 * t3)
 
 
 @cache
 def energy_on(surface: Surface) -> Any:
     """Inline (u1, u2, ω1, ω2, ω3, v1, v2, constants) -> (spin n, energy of the rattle, J33), per unit mass.
 
-    As `sweep.models.ellipsoid.energy`.
-
-    With ω = n u + o, o ⊥ u, every term except J33 n²/2 is quadratic in small quantities and is computed as such.  (If
-    J13 or J23 does not vanish, one is n² times a small quantity.)
+    As `sweep.models.ellipsoid.energy`; but if J13 or J23 does not vanish, one term is n² times a small quantity.
     """
-    elevation = surface.elevation
+    contact, elevation = surface.contact, surface.elevation
 
     @inline
     def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any) -> Any:
-        u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-        n = u1 * w1 + u2 * w2 + u3 * w3
-        o1, o2 = w1 - n * u1, w2 - n * u2
-        o3 = -(u1 * o1 + u2 * o2) / u3
-        D1, D2 = p.J11 - p.J33, p.J22 - p.J33
-        spin_part = n * n * (
-            0.5 * (D1 * u1 * u1 + D2 * u2 * u2) + p.J12 * u1 * u2 + u3 * (p.J13 * u1 + p.J23 * u2)
-        )  # fmt: skip
-        cross_part = n * (
-            D1 * u1 * o1 + D2 * u2 * o2 + p.J12 * (u1 * o2 + u2 * o1)
-            + p.J13 * (u1 * o3 + u3 * o1) + p.J23 * (u2 * o3 + u3 * o2)
-        )  # fmt: skip
-        tilt_part = 0.5 * (p.J11 * o1 * o1 + p.J22 * o2 * o2 + p.J33 * o3 * o3) + (
-            p.J12 * o1 * o2 + p.J13 * o1 * o3 + p.J23 * o2 * o3
-        )
-
-        height, x, y, z = elevation(u1, u2, u3, p)
-        v3 = -(v1 * u1 + v2 * u2) / u3
-        g1, g2, g3 = v1 + y * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y * w1
-        drift = 0.5 * (g1 * g1 + g2 * g2 + g3 * g3)
-        return n, spin_part + cross_part + tilt_part + p.g * height + drift, p.J33
+        (u3, _), x_p, _, _ = contact(u1, u2, w1, w2, w3, p)
+        height = p.g * elevation(u1, u2, u3, p)
+        n, rattle = split_energy((u1, u2, u3), (w1, w2, w3), (v1, v2), x_p, (p.J11, p.J22, p.J33), height)
+        return n, rattle + (p.J12 * w1 * w2 + p.J13 * w1 * w3 + p.J23 * w2 * w3), p.J33
 
     return energy

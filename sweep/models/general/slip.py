@@ -27,11 +27,11 @@ from sweep.jit import inline
 from sweep.models.general import rigid_body, starts, validity
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
-from sweep.models.general.common import couple_constants, offers, record, seen, turned
-from sweep.models.general.couples import Couple, no_resistance
+from sweep.models.general.common import offers, record, seen, turned
+from sweep.models.general.couples import Couple
 from sweep.models.general.laws import Law
-from sweep.models.general.resistance import drag_of, isotropic_drag, resistance_of, resistances
-from sweep.models.general.rigid_body import gyroscopic
+from sweep.models.general.resistance import damping_of, friction_of
+from sweep.models.general.rigid_body import about_centre, gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.ladder import slip
 from sweep.models.model import REVERSAL_TIME, Array, Columns, Model, Ripple
@@ -40,45 +40,22 @@ from sweep.models.model import REVERSAL_TIME, Array, Columns, Model, Ripple
 def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     """The variant of `slip` of this name; `parameters` are those of the body and the start."""
     contact, general_energy = surface.contact, rigid_body.energy_on(surface)
-    resistance, (plain, loaded), drag = resistance_of(law), resistances(couples), drag_of(couples, law)
-    # A product with 0.0 would remain: the compiler has to allow for infinity.  A branch on these does not.
-    damps, drags = plain is not no_resistance, loaded is not no_resistance or drag is not isotropic_drag
-    names, values = couple_constants(couples)
+    friction, damping = friction_of(couples, law), damping_of(couples)
 
     @inline
     def rhs(y: Any, p: Any) -> Any:
         u1, u2, w1, w2, w3, v1, v2 = y
         (u3, inv_u3), (x, y_, z), du, dx = contact(u1, u2, w1, w2, w3, p)
         v3 = -(v1 * u1 + v2 * u2) * inv_u3
-        slip_square = v1 * v1 + v2 * v2 + v3 * v3
-        k = resistance(slip_square, w1, w2, w3, u1, u2, u3, p)
-        # f = u - k v, the contact force per unit of R
-        f1, f2, f3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
-        turn_square = w1 * w1 + w2 * w2 + w3 * w3
-        k0, k1 = plain(turn_square, p), loaded(turn_square, p)
-        k1, d1, d2, d3 = drag(k1, w1, w2, w3, u1, u2, u3, slip_square, p)
-        m1, m2, m3 = gyroscopic(w1, w2, w3, p)
-        if damps:
-            m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
-        t1, t2, t3 = y_ * f3 - z * f2, z * f1 - x * f3, x * f2 - y_ * f1
-        if drags:
-            t1, t2, t3 = t1 - k1 * d1, t2 - k1 * d2, t3 - k1 * d3
-        al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
-        al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
-        al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
-        be1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
-        be2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
-        be3 = p.inv_J13 * t1 + p.inv_J23 * t2 + p.inv_J33 * t3
-        alpha, beta = (al1, al2, al3), (be1, be2, be3)
-        slopes, spin, R, denominator = slip.motion(y, u3, v3, (x, y_, z), du, dx, (f1, f2), alpha, beta, p.g)
-
-        per_load = k * slip_square
-        if drags:
-            per_load = per_load + k1 * (d1 * w1 + d2 * w2 + d3 * w3)
-        power = R * per_load
-        if damps:
-            power = power + k0 * turn_square
-        return slopes, (spin, power, R, denominator)
+        square = v1 * v1 + v2 * v2 + v3 * v3
+        k, (d1, d2, d3), turning = friction(square, w1, w2, w3, u1, u2, u3, p)
+        # u + f, the contact force per unit of R
+        g1, g2, g3 = u1 - k * v1, u2 - k * v2, u3 - k * v3
+        (m1, m2, m3), ((c1, c2, c3), lost) = gyroscopic(w1, w2, w3, p), damping(w1, w2, w3, p)
+        alpha = about_centre(m1 + c1, m2 + c2, m3 + c3, p)
+        beta = about_centre(y_ * g3 - z * g2 - d1, z * g1 - x * g3 - d2, x * g2 - y_ * g1 - d3, p)
+        slopes, spin, R, denominator = slip.motion(y, u3, v3, (x, y_, z), du, dx, (g1, g2), alpha, beta, p.g)
+        return slopes, (spin, R * (k * square + turning) + lost, R, denominator)
 
     @inline
     def energy(y: Any, p: Any) -> Any:
@@ -97,9 +74,9 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
 
     def more(columns: Columns) -> tuple[Array, ...]:
         faint = () if law.linear_to is None else (faint_energy(law.linear_to(columns), columns, surface),)
-        return (*(columns[each] for each in law.parameters), *values(columns), *faint)
+        return (*(columns[each] for each in law.parameters), *faint)
 
-    fields = (*law.parameters, *names, *(() if law.linear_to is None else ("faint",)))
+    fields = (*law.parameters, *(() if law.linear_to is None else ("faint",)))
     return Model(
         name=name,
         summary=f"{slip.MODEL.summary}, for any body",
@@ -107,7 +84,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
         spin_state=slip.MODEL.spin_state,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=law.coupled is None) | ({REVERSAL_TIME} if law.name == "viscous" else set()),
-        constants=record(surface, fields, more),
+        constants=record(surface, couples, fields, more),
         start=lambda columns: starts.slipping(columns, surface),
         slower_period=lambda columns: rigid_body.slower_period(columns, surface),
         fastest_decay=fastest_decay,

@@ -36,18 +36,15 @@ class Surface:
     constants: tuple[str, ...]
     of: Callable[[Columns], tuple[Array, ...]]
     """(columns) -> values of `constants`, each of shape (cells,)."""
-    radii: Callable[[Columns], tuple[Array, Array]]
-    """(columns) -> radii of curvature along x and y at the lowest point of the body at rest, each of shape (cells,)."""
     excess: Callable[[Columns], tuple[Array, Array]]
-    """(columns) -> these radii less c, without loss of digits, each of shape (cells,)."""
+    """(columns) -> radii of curvature along x and y at the lowest point of the body at rest, less c and without loss of
+    digits, each of shape (cells,)."""
     contact: Callable[..., Any]
     """Inline, (u1, u2, ω1, ω2, ω3, constants) -> (u3, 1/u3), the contact point x_p, u' = u × ω, and x_p', the velocity
     of the contact point in the body."""
     elevation: Callable[..., Any]
     """Inline, (u1, u2, u3, constants) -> the height above that at rest, quadratic in u1 and u2 and precise however
-    small they are, and x, y and z of x_p."""
-    height: Callable[[tuple[Array, ...], Any, Any, Array], Array]
-    """(values of `constants`, cos ψ, sin ψ, φ) -> the height if the body is tilted by φ towards the azimuth ψ."""
+    small they are."""
     normal: Callable[[Columns, Array, Array], tuple[Array, Array, Array]]
     """(columns, x, y) -> u for the contact point at x and y, which has to be one."""
     homogeneous: bool
@@ -80,10 +77,6 @@ def _semi_axes(columns: Columns) -> tuple[Array, ...]:
     return a**2, b**2, c**2, offset(columns)
 
 
-def _ellipsoid_radii(columns: Columns) -> tuple[Array, Array]:
-    return columns["a"] ** 2 / columns["c"], columns["b"] ** 2 / columns["c"]
-
-
 def _ellipsoid_excess(columns: Columns) -> tuple[Array, Array]:
     a, b, c = columns["a"], columns["b"], columns["c"]
     return (a**2 - c**2) / c, (b**2 - c**2) / c
@@ -109,20 +102,11 @@ def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
 
 @inline
 def _ellipsoid_elevation(u1: Any, u2: Any, u3: Any, p: Any) -> Any:
-    au1, au2, au3 = p.a2 * u1, p.b2 * u2, p.c2 * u3
-    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
+    r = np.sqrt(p.a2 * u1 * u1 + p.b2 * u2 * u2 + p.c2 * u3 * u3)
     # r - c = (r² - c²) / (r + c) and 1 + u3 = (u1² + u2²) / (1 - u3)
     c = np.sqrt(p.c2)
     height = ((p.a2 - p.c2) * u1 * u1 + (p.b2 - p.c2) * u2 * u2) / (r + c)
-    height = height + p.offset * (u1 * u1 + u2 * u2) / (1.0 - u3)
-    x, y, z = -au1 / r, -au2 / r, -au3 / r - p.offset
-    return height, x, y, z
-
-
-def _ellipsoid_height(shape: tuple[Array, ...], cos: Any, sin: Any, phi: Array) -> Array:
-    a2, b2, c2, below = shape[:4]
-    flat = a2 * cos**2 + b2 * sin**2
-    return np.asarray(np.sqrt(flat * np.sin(phi) ** 2 + c2 * np.cos(phi) ** 2) - below * np.cos(phi))
+    return height + p.offset * (u1 * u1 + u2 * u2) / (1.0 - u3)
 
 
 def _ellipsoid_normal(columns: Columns, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -157,16 +141,9 @@ def _paraboloid_contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> 
 
 @inline
 def _paraboloid_elevation(u1: Any, u2: Any, u3: Any, p: Any) -> Any:
-    t1, t2 = u1 / u3, u2 / u3
-    x, y = p.radius1 * t1, p.radius2 * t2
+    x, y = p.radius1 * u1 / u3, p.radius2 * u2 / u3
     # 1 + u3 = (u1² + u2²) / (1 - u3)
-    height = -0.5 * (x * u1 + y * u2) - p.h * (u1 * u1 + u2 * u2) / (1.0 - u3)
-    return height, x, y, p.h - 0.5 * (x * t1 + y * t2)
-
-
-def _paraboloid_height(shape: tuple[Array, ...], cos: Any, sin: Any, phi: Array) -> Array:
-    radius1, radius2, h = shape[:3]
-    return np.asarray(h * np.cos(phi) + 0.5 * (radius1 * cos**2 + radius2 * sin**2) * np.sin(phi) * np.tan(phi))
+    return -0.5 * (x * u1 + y * u2) - p.h * (u1 * u1 + u2 * u2) / (1.0 - u3)
 
 
 def _paraboloid_normal(columns: Columns, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -180,11 +157,9 @@ ELLIPSOID = Surface(
     name="ellipsoid",
     constants=("a2", "b2", "c2", "offset"),
     of=_semi_axes,
-    radii=_ellipsoid_radii,
     excess=_ellipsoid_excess,
     contact=contact,
     elevation=_ellipsoid_elevation,
-    height=_ellipsoid_height,
     normal=_ellipsoid_normal,
     homogeneous=True,
     interior="the ellipsoid; keep |offset| < c",
@@ -198,11 +173,9 @@ PARABOLOID = Surface(
     name="paraboloid",
     constants=("radius1", "radius2", "h"),
     of=lambda columns: (*_paraboloid_radii(columns), columns["c"] - offset(columns)),
-    radii=_paraboloid_radii,
     excess=_paraboloid_excess,
     contact=_paraboloid_contact,
     elevation=_paraboloid_elevation,
-    height=_paraboloid_height,
     normal=_paraboloid_normal,
     homogeneous=False,
     interior="the paraboloid; keep offset < c",

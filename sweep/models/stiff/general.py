@@ -22,10 +22,10 @@ from sweep.jit import inline
 from sweep.models.general import rigid_body, variants
 from sweep.models.general import ripple as general_ripple
 from sweep.models.general.bounds import couples_decay, strongest_grip
-from sweep.models.general.couples import Couple, no_resistance
+from sweep.models.general.couples import Couple
 from sweep.models.general.laws import LAWS, Law
-from sweep.models.general.resistance import resistances
-from sweep.models.general.rigid_body import gyroscopic
+from sweep.models.general.resistance import damping_of
+from sweep.models.general.rigid_body import about_centre, about_contact, gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.model import Array, Columns, Model, Ripple, named
 from sweep.models.stiff.form import Geometry, StiffForm, in_momentum, newton_step
@@ -52,8 +52,7 @@ def form_of(model: Model) -> StiffForm | None:
 @cache
 def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface) -> StiffForm:
     resistance, contact, general_energy = law.resistance, surface.contact, rigid_body.energy_on(surface)
-    couple, _ = resistances(couples)
-    damps = couple is not no_resistance
+    damping = damping_of(couples)
     fields = (*full.constants._fields, *ROCKING)
 
     class Constants(named(*fields)):  # type: ignore[misc]
@@ -70,10 +69,8 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         (_, inv_u3), (x, y_, z), _, _ = contact(u1, u2, 0.0, 0.0, 0.0, p)
         v3 = -(v1 * u1 + v2 * u2) * inv_u3
         g1, g2, g3 = v1 + y_ * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y_ * w1
-        M1 = p.J11 * w1 + p.J12 * w2 + p.J13 * w3 - (y_ * g3 - z * g2)
-        M2 = p.J12 * w1 + p.J22 * w2 + p.J23 * w3 - (z * g1 - x * g3)
-        M3 = p.J13 * w1 + p.J23 * w2 + p.J33 * w3 - (x * g2 - y_ * g1)
-        return u1, u2, M1, M2, M3, v1, v2
+        L1, L2, L3 = rigid_body.momentum(w1, w2, w3, p)
+        return u1, u2, L1 - (y_ * g3 - z * g2), L2 - (z * g1 - x * g3), L3 - (x * g2 - y_ * g1), v1, v2
 
     @inline
     def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) -> Any:
@@ -81,44 +78,35 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         (u3, inv_u3), (x, y, z), _, _ = contact(u1, u2, 0.0, 0.0, 0.0, p)
         t1, t2 = u1 * inv_u3, u2 * inv_u3
         v3 = -(v1 * t1 + v2 * t2)
-        w1, w2, w3 = _turn(M1 + (y * v3 - z * v2), M2 + (z * v1 - x * v3), M3 + (x * v2 - y * v1), x, y, z, p)
+        K1, K2, K3 = M1 + (y * v3 - z * v2), M2 + (z * v1 - x * v3), M3 + (x * v2 - y * v1)
+        w1, w2, w3 = about_contact(K1, K2, K3, x, y, z, p)
         _, _, (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
         s1, s2, s3 = y * w3 - z * w2, z * w1 - x * w3, x * w2 - y * w1
         g1, g2, g3 = s1 + v1, s2 + v2, s3 + v3
         s1, s2, s3 = s1 - dx, s2 - dy, s3 - dz
         q1, q2, q3 = u2 * z - u3 * y, u3 * x - u1 * z, u1 * y - u2 * x
-        k0 = couple(w1 * w1 + w2 * w2 + w3 * w3, p)
-        dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - p.g * q1
-        dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - p.g * q2
-        dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - p.g * q3
-        if damps:
-            dM1, dM2, dM3 = dM1 - k0 * w1, dM2 - k0 * w2, dM3 - k0 * w3
+        (c1, c2, c3), _ = damping(w1, w2, w3, p)
+        dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - p.g * q1 + c1
+        dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - p.g * q2 + c2
+        dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - p.g * q3 + c3
         geometry = Geometry(u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
         return (du1, du2, dM1, dM2, dM3), geometry
 
     @inline
     def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
         w1, w2, w3, v3 = geometry.w1, geometry.w2, geometry.w3, geometry.v3
-        m1, m2, m3 = gyroscopic(w1, w2, w3, p)
-        k0 = couple(w1 * w1 + w2 * w2 + w3 * w3, p)
-        if damps:
-            m1, m2, m3 = m1 - k0 * w1, m2 - k0 * w2, m3 - k0 * w3
-        al1 = p.inv_J11 * m1 + p.inv_J12 * m2 + p.inv_J13 * m3
-        al2 = p.inv_J12 * m1 + p.inv_J22 * m2 + p.inv_J23 * m3
-        al3 = p.inv_J13 * m1 + p.inv_J23 * m2 + p.inv_J33 * m3
+        (m1, m2, m3), ((c1, c2, c3), _) = gyroscopic(w1, w2, w3, p), damping(w1, w2, w3, p)
+        alpha = about_centre(m1 + c1, m2 + c2, m3 + c3, p)
         T = _compliance(geometry.x, geometry.y, geometry.z, p)
         k = resistance(v1 * v1 + v2 * v2 + v3 * v3, p)
-        return newton_step(u1, u2, v1, v2, geometry, (al1, al2, al3), T, k, p.g, gamma, b1, b2)
+        return newton_step(u1, u2, v1, v2, geometry, alpha, T, k, p.g, gamma, b1, b2)
 
     @inline
     def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
         v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
         slip_square = v1 * v1 + v2 * v2 + v3 * v3
-        turn_square = geometry.w1 * geometry.w1 + geometry.w2 * geometry.w2 + geometry.w3 * geometry.w3
-        lost = R * resistance(slip_square, p) * slip_square
-        if damps:
-            lost = lost + couple(turn_square, p) * turn_square
-        return lost
+        _, lost = damping(geometry.w1, geometry.w2, geometry.w3, p)
+        return R * resistance(slip_square, p) * slip_square + lost
 
     @inline
     def energy(y: Any, p: Any) -> Any:
@@ -141,19 +129,6 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         damping=lambda columns: couples_decay(couples, columns, surface),
         resolves_modes=False,
     )
-
-
-@inline
-def _turn(K1: Any, K2: Any, K3: Any, x: Any, y: Any, z: Any, p: Any) -> Any:
-    """ω = J_P⁻¹ K, by the adjugate."""
-    P11, P22, P33 = p.J11 + y * y + z * z, p.J22 + z * z + x * x, p.J33 + x * x + y * y
-    P12, P13, P23 = p.J12 - x * y, p.J13 - x * z, p.J23 - y * z
-    C11, C22, C33 = P22 * P33 - P23 * P23, P11 * P33 - P13 * P13, P11 * P22 - P12 * P12
-    C12, C13, C23 = P13 * P23 - P12 * P33, P12 * P23 - P13 * P22, P12 * P13 - P11 * P23
-    inv = 1.0 / (P11 * C11 + P12 * C12 + P13 * C13)
-    w1 = inv * (C11 * K1 + C12 * K2 + C13 * K3)
-    w2 = inv * (C12 * K1 + C22 * K2 + C23 * K3)
-    return w1, w2, inv * (C13 * K1 + C23 * K2 + C33 * K3)
 
 
 @inline
