@@ -29,16 +29,20 @@ def inertia(columns: Columns) -> tuple[Array, Array, Array]:
     return (b2 + c2) / 5, (a2 + c2) / 5, (a2 + b2) / 5
 
 
-def start(columns: Columns) -> tuple[Array, Array, Array]:
-    """u for the contact point (x0, y0), which has to lie within the outline of the body seen from above."""
+def start(columns: Columns) -> tuple[Array, ...]:
+    """u1, u2, ω1, ω2 and ω3 at rest except for the spin n0, ω = n0 u, with the contact point at (x0, y0).
+
+    That has to lie within the outline of the body seen from above.
+    """
     A11, A12, A22, A33 = shape(columns)
-    x, y = columns["x0"], columns["y0"]
+    x, y, n0 = columns["x0"], columns["y0"], columns["n0"]
     det = A11 * A22 - A12**2
     # x_p = -A u / r means u ∝ -A⁻¹ x_p.
     w1, w2 = (A22 * x - A12 * y) / det, (A11 * y - A12 * x) / det
     w3 = np.sqrt(1 - (x * w1 + y * w2)) / np.sqrt(A33)
     norm = np.sqrt(w1**2 + w2**2 + w3**2)
-    return -w1 / norm, -w2 / norm, -w3 / norm
+    u1, u2, u3 = -w1 / norm, -w2 / norm, -w3 / norm
+    return u1, u2, n0 * u1, n0 * u2, n0 * u3
 
 
 @inline

@@ -47,7 +47,7 @@ def couples_decay(couples: Sequence[Couple], columns: Columns, surface: Surface)
 def _energy_start(columns: Columns, surface: Surface) -> Array:
     """Energy above rest at the start, per unit mass, shape (cells,)."""
     y = starts.slipping(columns, surface) if "slip1" in columns else (*starts.rolling(columns, surface), 0.0, 0.0)
-    spin, rattle, inertia = rigid_body.energy_on(surface)(*y, record(surface).of(columns))
+    spin, rattle, inertia = rigid_body.energy_on(surface)(y, record(surface).of(columns))
     return np.asarray(rattle + 0.5 * inertia * spin**2)
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from sweep.models.general import rigid_body
+from sweep.models.general import rigid_body, validity
 from sweep.models.general.couples import Couple
 from sweep.models.general.surfaces import Surface
-from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, zeros
+from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, named, zeros
 
 
 def record(
@@ -36,9 +37,19 @@ def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
     return frozenset({COUNT, SPIN, ENERGY} | theory)
 
 
-def turned(columns: Columns) -> Array:
-    """`Model.turned`: x and y are the axes of inertia of a body given by δ, and those of the surface otherwise."""
-    return np.asarray(columns.get("delta", zeros(columns)))
+def of_any_body(base: Model, name: str, surface: Surface, **made: Any) -> Model:
+    """The variant of `base` of this name; `made` are the fields that `slip` and `noslip` have of their own."""
+    return replace(
+        base,
+        name=name,
+        summary=f"{base.summary}, for any body",
+        slower_period=lambda columns: rigid_body.slower_period(columns, surface),
+        # x and y are the axes of inertia of a body given by δ, and those of the surface otherwise.
+        turned=lambda columns: np.asarray(columns.get("delta", zeros(columns))),
+        spin_unit=rigid_body.spin_unit,
+        impossible=lambda columns: validity.impossible(columns, surface),
+        **made,
+    )
 
 
 def seen(contact: Any, rhs: Any, y: Array, p: Any) -> dict[str, Array]:

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from sweep.jit import inline
-from sweep.models.general import rigid_body, starts, validity
+from sweep.models.general import rigid_body, starts
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay
-from sweep.models.general.common import offers, record, seen, turned
+from sweep.models.general.common import of_any_body, offers, record, seen
 from sweep.models.general.couples import Couple
 from sweep.models.general.resistance import damping_of, friction_of
 from sweep.models.general.rigid_body import about_contact, gyroscopic
@@ -27,7 +27,7 @@ from sweep.models.model import REVERSAL_TIME, Model, Ripple
 
 def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     """The variant of `noslip` of this name; `parameters` are those of the body and the start."""
-    contact, general_energy = surface.contact, rigid_body.energy_on(surface)
+    contact, slipping_energy = surface.contact, rigid_body.energy_on(surface)
     friction, damping = friction_of(couples), damping_of(couples)
     # A product with 0.0 would remain: the compiler has to allow for infinity.
     drags = any(couple.needs_normal_force for couple in couples)
@@ -60,27 +60,17 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
     @inline
     def energy(y: Any, p: Any) -> Any:
         u1, u2, w1, w2, w3 = y
-        return general_energy(u1, u2, w1, w2, w3, 0.0, 0.0, p)
+        return slipping_energy((u1, u2, w1, w2, w3, 0.0, 0.0), p)
 
-    return Model(
-        name=name,
-        summary=f"{noslip.MODEL.summary}, for any body",
-        states=noslip.MODEL.states,
-        spin_state=noslip.MODEL.spin_state,
+    return of_any_body(
+        noslip.MODEL, name, surface,
         parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=bool(couples)) | {REVERSAL_TIME},
         constants=record(surface, couples),
         start=lambda columns: starts.rolling(columns, surface),
-        slower_period=lambda columns: rigid_body.slower_period(columns, surface),
         fastest_decay=lambda columns: couples_decay(couples, columns, surface),
-        upright=noslip.MODEL.upright,
         rhs=rhs,
         energy=energy,
-        tilt=noslip.MODEL.tilt,
-        radians_a_step=noslip.MODEL.radians_a_step,
         ripple=Ripple(ripples.NAMES, lambda columns: ripples.form(columns, surface), ripples.rolling),
         observe=lambda y, p: seen(contact, rhs, y, p),
-        turned=turned,
-        spin_unit=rigid_body.spin_unit,
-        impossible=lambda columns: validity.impossible(columns, surface),
-    )
+    )  # fmt: skip

@@ -14,7 +14,7 @@ second order in the motion of that point, with the height h of G and the radii o
 
     J n' = h (R1 - R2) u1' u2'   on average (compare H in `sweep.models.theory.ripple`).
 
-A mode u = e q of u1, u2 with the matrix of inertia M (`rigid_body.frequencies`) has E = q'² eᵀ M e on average, hence
+A mode u = e q of u1, u2 with the matrix of inertia M has E = q'² eᵀ M e on average, hence
 2 σ_k = -h (R1 - R2) e1 e2 / (eᵀ M e).  Summed over both modes e eᵀ / (eᵀ M e) is M⁻¹; divided by ν_k² first, it is the
 inverse of the stiffness, which is diagonal.  These two sums give e1 e2 for each mode, and for any misalignment
 
@@ -44,6 +44,7 @@ import numpy as np
 from sweep.models.general import rigid_body, starts
 from sweep.models.general.surfaces import ELLIPSOID, Surface
 from sweep.models.model import Array, Columns
+from sweep.models.theory.ripple import matrix
 from sweep.models.theory.rocking import frequencies
 
 PREDICTED, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL, NOT_KNOWN = range(6)
@@ -61,36 +62,30 @@ would grow has no energy; friction stops the reversal; or body or friction have 
 
 def growth(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """σ of the slower and of the faster mode, half the rate per spin at which its energy grows, shape (cells,)."""
-    height, M11, M22, M12 = _inertia(columns)
-    k1, k2 = rigid_body.stiffness(columns, surface)  # R1 - height and R2 - height
-    lower, higher = frequencies(rigid_body.rocking(columns, surface))
+    k1, k2 = rigid_body.stiffness(columns, surface)  # R1 - h and R2 - h
+    rocking = rigid_body.rocking(columns, surface)
+    lower, higher = frequencies(rocking)
     with np.errstate(divide="ignore", invalid="ignore"):
-        shared = -height * (k1 - k2) * M12 / (M11 * M22 - M12**2) / (2 * (higher**2 - lower**2))
+        shared = -rigid_body.height(columns) * (k1 - k2) * rocking.B11 / (2 * (higher**2 - lower**2))
     # Of a body that is round both ways the modes are arbitrary, and nothing is coupled.
-    shared = np.where((k1 == k2) | (M12 == 0), 0.0, shared)
+    shared = np.where((k1 == k2) | (rocking.B11 == 0), 0.0, shared)
     return shared * lower**2, -shared * higher**2
 
 
 def energies(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """Energies of the slower and of the faster mode at the start, per unit mass, shape (cells,)."""
-    _, M11, M22, M12 = _inertia(columns)
+    J11, J22, _, J12, _, _ = rigid_body.inertia(columns)
+    h2 = rigid_body.height(columns) ** 2
     k1, k2 = (np.sqrt(rigid_body.gravity(columns) * k) for k in rigid_body.stiffness(columns, surface))
     # In the coordinates (k1 u1, k2 u2) the stiffness is one, and the eigenvalues of the inertia are 1/ν².
-    rows = ((M11 / k1**2, M12 / (k1 * k2)), (M12 / (k1 * k2), M22 / k2**2))
-    values, modes = np.linalg.eigh(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2))
+    M11, M22, M12 = (J22 + h2) / k1**2, (J11 + h2) / k2**2, -J12 / (k1 * k2)
+    values, modes = np.linalg.eigh(matrix(M11, M12, M12, M22))
     u1, u2, w1, w2, w3 = starts.rolling(columns, surface)
     u3 = -np.sqrt(1 - u1**2 - u2**2)
     moves = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3  # u' = u × ω
     q, p = (np.einsum("...i,...ik->...k", np.stack([k1 * x, k2 * y], axis=-1), modes) for x, y in ((u1, u2), moves))
     found = 0.5 * (q**2 + values * p**2)
     return found[..., 1], found[..., 0]
-
-
-def _inertia(columns: Columns) -> tuple[Array, Array, Array, Array]:
-    """The height of G at rest, and M11, M22 and M12, as in `rigid_body.frequencies` for J13 = J23 = 0."""
-    J11, J22, _, J12, _, _ = rigid_body.inertia(columns)
-    height = rigid_body.height(columns)
-    return height, J22 + height**2, J11 + height**2, -J12
 
 
 def first_reversal(columns: Columns, n_c: tuple[Array, Array], surface: Surface = ELLIPSOID) -> tuple[Array, Array]:

@@ -140,14 +140,15 @@ def about_contact(t1: Any, t2: Any, t3: Any, x: Any, y: Any, z: Any, p: Any) -> 
 
 @cache
 def energy_on(surface: Surface) -> Any:
-    """Inline (u1, u2, ω1, ω2, ω3, v1, v2, constants) -> (spin n, energy of the rattle, J33), per unit mass.
+    """Inline (states of `slip`, constants) -> (spin n, energy of the rattle, J33), per unit mass.
 
     As `sweep.models.ellipsoid.energy`; but if J13 or J23 does not vanish, one term is n² times a small quantity.
     """
     contact, elevation = surface.contact, surface.elevation
 
     @inline
-    def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any) -> Any:
+    def energy(y: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3, v1, v2 = y
         (u3, _), x_p, _, _ = contact(u1, u2, w1, w2, w3, p)
         height = p.g * elevation(u1, u2, u3, p)
         n, rattle = split_energy((u1, u2, u3), (w1, w2, w3), (v1, v2), x_p, (p.J11, p.J22, p.J33), height)

@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.general import rigid_body, starts, validity
+from sweep.models.general import rigid_body, starts
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
-from sweep.models.general.common import offers, record, seen, turned
+from sweep.models.general.common import of_any_body, offers, record, seen
 from sweep.models.general.couples import Couple
 from sweep.models.general.laws import Law
 from sweep.models.general.resistance import damping_of, friction_of
@@ -39,8 +39,7 @@ from sweep.models.model import REVERSAL_TIME, Array, Columns, Model, Ripple
 
 def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
     """The variant of `slip` of this name; `parameters` are those of the body and the start."""
-    contact, general_energy = surface.contact, rigid_body.energy_on(surface)
-    friction, damping = friction_of(couples, law), damping_of(couples)
+    contact, friction, damping = surface.contact, friction_of(couples, law), damping_of(couples)
 
     @inline
     def rhs(y: Any, p: Any) -> Any:
@@ -57,11 +56,6 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
         slopes, spin, R, denominator = slip.motion(y, u3, v3, (x, y_, z), du, dx, (g1, g2), alpha, beta, p.g)
         return slopes, (spin, R * (k * square + turning) + lost, R, denominator)
 
-    @inline
-    def energy(y: Any, p: Any) -> Any:
-        u1, u2, w1, w2, w3, v1, v2 = y
-        return general_energy(u1, u2, w1, w2, w3, v1, v2, p)
-
     def observe(y: Array, p: Any) -> dict[str, Array]:
         return {**seen(contact, rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
 
@@ -77,29 +71,20 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
         return (*(columns[each] for each in law.parameters), *faint)
 
     fields = (*law.parameters, *(() if law.linear_to is None else ("faint",)))
-    return Model(
-        name=name,
-        summary=f"{slip.MODEL.summary}, for any body",
-        states=slip.MODEL.states,
-        spin_state=slip.MODEL.spin_state,
+    return of_any_body(
+        slip.MODEL, name, surface,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=law.coupled is None) | ({REVERSAL_TIME} if law.name == "viscous" else set()),
         constants=record(surface, couples, fields, more),
         start=lambda columns: starts.slipping(columns, surface),
-        slower_period=lambda columns: rigid_body.slower_period(columns, surface),
         fastest_decay=fastest_decay,
-        upright=slip.MODEL.upright,
         rhs=rhs,
-        energy=energy,
+        energy=rigid_body.energy_on(surface),
         ripple=Ripple(ripples.NAMES, lambda columns: ripples.form(columns, surface), ripples.slipping),
-        tilt=slip.MODEL.tilt,
         observe=observe,
-        turned=turned,
-        spin_unit=rigid_body.spin_unit,
-        impossible=lambda columns: validity.impossible(columns, surface),
         faint="" if law.linear_to is None else "faint",
         extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
-    )
+    )  # fmt: skip
 
 
 def _with_and_without(law: Law) -> Any:

@@ -36,13 +36,6 @@ class Constants(NamedTuple):
         return cls(*ellipsoid.shape(columns), *(1 / moment for moment in ellipsoid.inertia(columns)))
 
 
-def start(columns: Columns) -> tuple[Array, ...]:
-    """At rest except for the spin n0, with the contact point at (x0, y0): ω = n0 u."""
-    u1, u2, u3 = ellipsoid.start(columns)
-    n0 = columns["n0"]
-    return u1, u2, n0 * u1, n0 * u2, n0 * u3
-
-
 @inline
 def upright(n: Any) -> Any:
     return (0.0, 0.0, 0.0, 0.0, -n)
@@ -110,7 +103,7 @@ MODEL = Model(
     parameters=("a", "b", "c", "delta", "n0", "x0", "y0"),
     offers=frozenset({COUNT, SPIN, ENERGY, REVERSAL_TIME}),
     constants=Constants,
-    start=start,
+    start=ellipsoid.start,
     slower_period=slower_period,
     upright=upright,
     rhs=rhs,

@@ -50,10 +50,10 @@ class Constants(NamedTuple):
 
 
 def start(columns: Columns) -> tuple[Array, ...]:
-    """At rest except for the spin n0, with the contact point at (x0, y0): ω = n0 u, v_p = 0."""
-    u1, u2, u3 = ellipsoid.start(columns)
-    n0, rest = columns["n0"], np.zeros_like(u1)
-    return u1, u2, n0 * u1, n0 * u2, n0 * u3, rest, rest
+    """As that of the body, and v_p = 0."""
+    states = ellipsoid.start(columns)
+    rest = np.zeros_like(states[0])
+    return *states, rest, rest
 
 
 @inline

@@ -84,6 +84,27 @@ class StiffForm:
 
 
 @inline
+def slopes(u: Any, M: Any, v: Any, t: Any, x_p: Any, w: Any, du: Any, dx: Any, gravity: Any) -> Any:
+    """`StiffForm.slow` from what a model computes on its way, without the torque of couples.
+
+    Parameters
+    ----------
+    u, M, v, x_p, w, du, dx : u, M, v_p, x_p, ω, u' and x_p', three components each
+    t : u1/u3 and u2/u3
+    """
+    (u1, u2, u3), (M1, M2, M3), (v1, v2, v3), (x, y, z), (w1, w2, w3), (du1, du2, du3) = u, M, v, x_p, w, du
+    s1, s2, s3 = y * w3 - z * w2, z * w1 - x * w3, x * w2 - y * w1
+    g1, g2, g3 = s1 + v1, s2 + v2, s3 + v3
+    s1, s2, s3 = s1 - dx[0], s2 - dx[1], s3 - dx[2]
+    q1, q2, q3 = u2 * z - u3 * y, u3 * x - u1 * z, u1 * y - u2 * x
+    dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - gravity * q1
+    dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - gravity * q2
+    dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - gravity * q3
+    geometry = Geometry(u3, x, y, z, t[0], t[1], v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
+    return (du1, du2, dM1, dM2, dM3), geometry
+
+
+@inline
 def newton_step(
     u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, alpha: Any, T: Any, k: Any, g: Any, gamma: Any, b1: Any, b2: Any
 ) -> Any:  # fmt: skip
@@ -122,7 +143,7 @@ def subset(constants: type[Any], p: Any) -> Any:
     return constants(*(getattr(p, name) for name in constants._fields))
 
 
-def in_momentum(full: Model, constants: type[Any], momentum: Any, slow: Any, energy: Any, ripple: Ripple) -> Model:
+def in_momentum(full: Model, constants: type[Any], momentum: Any, slow: Any, ripple: Ripple) -> Model:
     """The model `full` in the variables `STATES`; the other arguments are as of `StiffForm` and `Model`."""
 
     def start(columns: Columns) -> tuple[Array, ...]:
@@ -131,6 +152,14 @@ def in_momentum(full: Model, constants: type[Any], momentum: Any, slow: Any, ene
 
     def observe(y: Array, p: Any) -> dict[str, Array]:
         return full.observe(_velocities(slow, y, p), subset(full.constants, p))
+
+    full_energy = full.energy
+
+    @inline
+    def energy(y: Any, p: Any) -> Any:
+        u1, u2, M1, M2, M3, v1, v2 = y
+        _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
+        return full_energy((u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2), p)
 
     return replace(
         full, states=STATES, constants=constants, start=start, energy=energy, observe=observe, ripple=ripple

@@ -13,6 +13,7 @@ A couple in proportion to the normal force would make M' stiff too: there is no 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -20,16 +21,15 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.general import rigid_body, variants
-from sweep.models.general import ripple as general_ripple
 from sweep.models.general.bounds import couples_decay, strongest_grip
 from sweep.models.general.couples import Couple
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.resistance import damping_of
 from sweep.models.general.rigid_body import about_centre, about_contact, gyroscopic
 from sweep.models.general.surfaces import Surface
-from sweep.models.model import Array, Columns, Model, Ripple, named
-from sweep.models.stiff.form import Geometry, StiffForm, in_momentum, newton_step
-from sweep.models.theory.ripple import ripple
+from sweep.models.model import Array, Columns, Model, named
+from sweep.models.stiff.form import StiffForm, in_momentum, newton_step, slopes
+from sweep.models.theory.ripple import ripple as rippling
 from sweep.models.theory.rocking import Rocking
 
 ROCKING = ("B11", "B12", "B21", "B22", "C12", "C21")
@@ -51,8 +51,7 @@ def form_of(model: Model) -> StiffForm | None:
 
 @cache
 def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface) -> StiffForm:
-    resistance, contact, general_energy = law.resistance, surface.contact, rigid_body.energy_on(surface)
-    damping = damping_of(couples)
+    resistance, contact, damping = law.resistance, surface.contact, damping_of(couples)
     fields = (*full.constants._fields, *ROCKING)
 
     class Constants(named(*fields)):  # type: ignore[misc]
@@ -80,17 +79,12 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         v3 = -(v1 * t1 + v2 * t2)
         K1, K2, K3 = M1 + (y * v3 - z * v2), M2 + (z * v1 - x * v3), M3 + (x * v2 - y * v1)
         w1, w2, w3 = about_contact(K1, K2, K3, x, y, z, p)
-        _, _, (du1, du2, du3), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
-        s1, s2, s3 = y * w3 - z * w2, z * w1 - x * w3, x * w2 - y * w1
-        g1, g2, g3 = s1 + v1, s2 + v2, s3 + v3
-        s1, s2, s3 = s1 - dx, s2 - dy, s3 - dz
-        q1, q2, q3 = u2 * z - u3 * y, u3 * x - u1 * z, u1 * y - u2 * x
+        _, _, du, dx = contact(u1, u2, w1, w2, w3, p)
         (c1, c2, c3), _ = damping(w1, w2, w3, p)
-        dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - p.g * q1 + c1
-        dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - p.g * q2 + c2
-        dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - p.g * q3 + c3
-        geometry = Geometry(u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
-        return (du1, du2, dM1, dM2, dM3), geometry
+        (du1, du2, dM1, dM2, dM3), geometry = slopes(
+            (u1, u2, u3), (M1, M2, M3), (v1, v2, v3), (t1, t2), (x, y, z), (w1, w2, w3), du, dx, p.g
+        )
+        return (du1, du2, dM1 + c1, dM2 + c2, dM3 + c3), geometry
 
     @inline
     def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
@@ -108,16 +102,10 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         _, lost = damping(geometry.w1, geometry.w2, geometry.w3, p)
         return R * resistance(slip_square, p) * slip_square + lost
 
-    @inline
-    def energy(y: Any, p: Any) -> Any:
-        u1, u2, M1, M2, M3, v1, v2 = y
-        _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
-        return general_energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
-
-    rippling = Ripple(general_ripple.NAMES, lambda columns: general_ripple.form(columns, surface), _ripple)
+    ripple = replace(full.ripple, value=_ripple)
     return StiffForm(
         full=full,
-        model=in_momentum(full, Constants, momentum, slow, energy, rippling),
+        model=in_momentum(full, Constants, momentum, slow, ripple),
         momentum=momentum,
         slow=slow,
         newton=newton,
@@ -152,12 +140,12 @@ def _rocking(p: Any) -> Any:
 
 @inline
 def _ripple(y: Any, p: Any, k: Any) -> Any:
-    """As `general_ripple.slipping`, with ω1 and ω2 from M to first order in the rattle."""
+    """As `sweep.models.general.ripple.slipping`, with ω1 and ω2 from M to first order in the rattle."""
     u1, u2, M1, M2, M3, v1, v2 = y
     w3 = M3 / p.J33
     m1, m2 = M1 - k[7] * v2 - k[8] * w3 * u1 - k[10] * M3, M2 + k[7] * v1 - k[9] * w3 * u2 - k[11] * M3
     w1, w2 = -(p.B21 * m1 + p.B22 * m2), p.B11 * m1 + p.B12 * m2
-    return ripple(u1, u2, M1, M2, k) + k[10] * w1 + k[11] * w2
+    return rippling(u1, u2, M1, M2, k) + k[10] * w1 + k[11] * w2
 
 
 def _rise(columns: Columns, surface: Surface) -> Array:

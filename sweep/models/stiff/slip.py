@@ -27,7 +27,7 @@ from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.ladder import slip
 from sweep.models.model import Array, Columns, Ripple, named, zeros
-from sweep.models.stiff.form import Geometry, StiffForm, in_momentum, newton_step
+from sweep.models.stiff.form import StiffForm, in_momentum, newton_step, slopes
 from sweep.models.theory.ripple import FORM, form, ripple
 from sweep.models.theory.rocking import rocking
 
@@ -84,17 +84,11 @@ def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) 
 
     du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
     dux = du1 * x + du2 * y + du3 * z
-    s1, s2, s3 = y * w3 - z * w2, z * w1 - x * w3, x * w2 - y * w1
-    g1, g2, g3 = s1 + v1, s2 + v2, s3 + v3
-    s1 = s1 - minus_inv_r * ((A11 * du1 + A12 * du2) - x * dux)
-    s2 = s2 - minus_inv_r * ((A12 * du1 + A22 * du2) - y * dux)
-    s3 = s3 - minus_inv_r * (A33 * du3 - z * dux)
-    q1, q2, q3 = u2 * z - u3 * y, u3 * x - u1 * z, u1 * y - u2 * x
-    dM1 = (s2 * g3 - s3 * g2) - (w2 * M3 - w3 * M2) - q1
-    dM2 = (s3 * g1 - s1 * g3) - (w3 * M1 - w1 * M3) - q2
-    dM3 = (s1 * g2 - s2 * g1) - (w1 * M2 - w2 * M1) - q3
-    geometry = Geometry(u3, x, y, z, t1, t2, v3, w1, w2, w3, du1, du2, du3, s1, s2, s3, q1, q2, q3)
-    return (du1, du2, dM1, dM2, dM3), geometry
+    dx = minus_inv_r * ((A11 * du1 + A12 * du2) - x * dux)
+    dy = minus_inv_r * ((A12 * du1 + A22 * du2) - y * dux)
+    dz = minus_inv_r * (A33 * du3 - z * dux)
+    u, M, v, w, du = (u1, u2, u3), (M1, M2, M3), (v1, v2, v3), (w1, w2, w3), (du1, du2, du3)
+    return slopes(u, M, v, (t1, t2), (x, y, z), w, du, (dx, dy, dz), 1.0)
 
 
 @inline
@@ -116,19 +110,11 @@ def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
 
 
 @inline
-def energy(y: Any, p: Any) -> Any:
-    """(spin, energy of the rattle, I3), as in the slip model."""
-    u1, u2, M1, M2, M3, v1, v2 = y
-    _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
-    return ellipsoid.energy(u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2, p)
-
-
-@inline
 def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
     return ripple(y[0], y[1], y[2], y[3], k)
 
 
-STIFF_MODEL = in_momentum(slip.MODEL, Constants, momentum, slow, energy, Ripple(FORM, form, _ripple))
+STIFF_MODEL = in_momentum(slip.MODEL, Constants, momentum, slow, Ripple(FORM, form, _ripple))
 """The slip model in these variables, for methods that use `slow` and `newton` in place of a right-hand side."""
 
 
