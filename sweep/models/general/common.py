@@ -50,10 +50,3 @@ def of_any_body(base: Model, name: str, surface: Surface, **made: Any) -> Model:
         impossible=lambda columns: validity.impossible(columns, surface),
         **made,
     )
-
-
-def seen(contact: Any, rhs: Any, y: Array, p: Any) -> dict[str, Array]:
-    """The contact point and the normal force."""
-    _, point, _, _ = contact(*y[:5], p)
-    _, (_, _, R, _) = rhs(y, p)
-    return {"contact_x": point[0], "contact_y": point[1], "normal_force": R}

@@ -1,18 +1,18 @@
-"""Couples that resist the motion of a general body beside slip friction, with the power that they take from it.
+"""What resists the motion of a general body: couples beside slip friction, and both together, with the power they take.
 
 A couple is given per unit mass, either by itself or per unit of the normal force.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.general.laws import rounded
+from sweep.models.general.laws import Law, rounded
 from sweep.models.general.rigid_body import mass
 from sweep.models.model import Array, Columns
 
@@ -79,3 +79,62 @@ COUPLES: dict[str, Couple] = {
         ),
     )
 }  # fmt: skip
+
+
+def damping_of(couples: Sequence[Couple]) -> Any:
+    """Inline, (ω, constants) -> the couple by itself, τ0, and the power that it takes."""
+    resistance = _resistance([couple for couple in couples if not couple.needs_normal_force])
+    # A product with 0.0 would remain: the compiler has to allow for infinity.  A sum with it does not.
+    damps = resistance is not no_resistance
+
+    @inline
+    def damping(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+        c1, c2, c3, power = 0.0, 0.0, 0.0, 0.0
+        if damps:
+            square = w1 * w1 + w2 * w2 + w3 * w3
+            k = resistance(square, p)
+            c1, c2, c3, power = -k * w1, -k * w2, -k * w3, k * square
+        return (c1, c2, c3), power
+
+    return damping
+
+
+def friction_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
+    """Inline, (v², ω, u, constants) -> (k, d, power): the friction -k v and the couple -d, per unit of normal force.
+
+    The power is that of the couple.
+    """
+    of_slip = (law and law.coupled) or _without_couple(law.resistance if law else no_resistance)
+    rolling, spinning = (
+        _resistance([couple for couple in couples if couple.needs_normal_force and couple.about_normal == about_normal])
+        for about_normal in (False, True)
+    )
+    rolls, spins = rolling is not no_resistance, spinning is not no_resistance or bool(law and law.coupled)
+
+    @inline
+    def friction(square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+        n = u1 * w1 + u2 * w2 + u3 * w3
+        k, m = of_slip(square, n * n, p)
+        d1, d2, d3, power = 0.0, 0.0, 0.0, 0.0
+        if rolls:
+            turn_square = w1 * w1 + w2 * w2 + w3 * w3
+            r = rolling(turn_square, p)
+            d1, d2, d3, power = r * w1, r * w2, r * w3, r * turn_square
+        if spins:
+            m = (m + spinning(n * n, p)) * n
+            d1, d2, d3, power = d1 + m * u1, d2 + m * u2, d3 + m * u3, power + m * n
+        return k, (d1, d2, d3), power
+
+    return friction
+
+
+def _resistance(couples: Sequence[Couple]) -> Any:
+    return couples[0].resistance if couples else no_resistance
+
+
+def _without_couple(resistance: Any) -> Any:
+    @inline
+    def of_slip(square: Any, spin_square: Any, p: Any) -> Any:  # noqa: ARG001
+        return resistance(square, p), 0.0
+
+    return of_slip

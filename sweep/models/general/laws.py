@@ -155,8 +155,13 @@ _LINEAR = 0.1
 """Share of its own speed up to which a law counts as linear: the cubic is off by 0.03 there, the others by 0.01."""
 
 
-def _below_speed(columns: Columns) -> Array:
-    return np.asarray(_LINEAR * columns["speed"])
+def _coulomb(regularisation: str, resistance: Callable[..., Any], steepest: float) -> Law:
+    """Coulomb's law with a width `speed`, where k v grows by `steepest` times μ/speed at most."""
+    return Law(
+        f"coulomb-{regularisation}", ("mu", "speed"), resistance,
+        lambda columns: steepest * columns["mu"] / columns["speed"],
+        linear_to=lambda columns: np.asarray(_LINEAR * columns["speed"]), pure=frozenset({"mu"}),
+    )  # fmt: skip
 
 
 def _below_both_speeds(columns: Columns) -> Array:
@@ -168,18 +173,9 @@ LAWS: dict[str, Law] = {
     for law in (
         Law("viscous", ("mu",), _viscous, lambda columns: columns["mu"]),
         Law("none", (), _none, lambda columns: np.zeros_like(columns["a"])),
-        Law(
-            "coulomb-sqrt", ("mu", "speed"), _sqrt,
-            lambda columns: columns["mu"] / columns["speed"], linear_to=_below_speed, pure=frozenset({"mu"}),
-        ),
-        Law(
-            "coulomb-tanh", ("mu", "speed"), _tanh,
-            lambda columns: columns["mu"] / columns["speed"], linear_to=_below_speed, pure=frozenset({"mu"}),
-        ),
-        Law(
-            "coulomb-cubic", ("mu", "speed"), _cubic,
-            lambda columns: 3 * columns["mu"] / columns["speed"], linear_to=_below_speed, pure=frozenset({"mu"}),
-        ),
+        _coulomb("sqrt", _sqrt, 1.0),
+        _coulomb("tanh", _tanh, 1.0),
+        _coulomb("cubic", _cubic, 3.0),
         Law(
             "stribeck", ("mu", "mu_static", "speed", "speed_stick", "mu_viscous"), _stribeck,
             lambda columns: columns["mu_static"] / columns["speed_stick"] + columns["mu_viscous"],

@@ -10,15 +10,15 @@ whatever it has to be.  Its torque gives
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from sweep.jit import inline
 from sweep.models.general import rigid_body, starts
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay
-from sweep.models.general.common import of_any_body, offers, record, seen
-from sweep.models.general.couples import Couple
-from sweep.models.general.resistance import damping_of, friction_of
+from sweep.models.general.common import of_any_body, offers, record
+from sweep.models.general.couples import Couple, damping_of, friction_of
 from sweep.models.general.rigid_body import about_contact, gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.ladder import noslip
@@ -41,8 +41,8 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         c1, c2, c3 = w2 * s3 - w3 * s2, w3 * s1 - w1 * s3, w1 * s2 - w2 * s1
         h1, h2, h3 = p.g * u1 + c1, p.g * u2 + c2, p.g * u3 + c3
         (m1, m2, m3), ((t1, t2, t3), power) = gyroscopic(w1, w2, w3, p), damping(w1, w2, w3, p)
-        t1, t2, t3 = t1 + m1 + (y_ * h3 - z * h2), t2 + m2 + (z * h1 - x * h3), t3 + m3 + (x * h2 - y_ * h1)
-        a1, a2, a3 = about_contact(t1, t2, t3, x, y_, z, p)
+        m1, m2, m3 = m1 + y_ * h3 - z * h2, m2 + z * h1 - x * h3, m3 + x * h2 - y_ * h1
+        a1, a2, a3 = about_contact(m1 + t1, m2 + t2, m3 + t3, x, y_, z, p)
         q1, q2, q3 = u2 * z - u3 * y_, u3 * x - u1 * z, u1 * y_ - u2 * x
         R = p.g + (u1 * c1 + u2 * c2 + u3 * c3) + (q1 * a1 + q2 * a2 + q3 * a3)
         denominator = 1.0
@@ -72,5 +72,5 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         rhs=rhs,
         energy=energy,
         ripple=Ripple(ripples.NAMES, lambda columns: ripples.form(columns, surface), ripples.rolling),
-        observe=lambda y, p: seen(contact, rhs, y, p),
+        observe=partial(noslip.seen, contact, rhs),
     )  # fmt: skip

@@ -27,13 +27,12 @@ from sweep.jit import inline
 from sweep.models.general import rigid_body, starts
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
-from sweep.models.general.common import of_any_body, offers, record, seen
-from sweep.models.general.couples import Couple
+from sweep.models.general.common import of_any_body, offers, record
+from sweep.models.general.couples import Couple, damping_of, friction_of
 from sweep.models.general.laws import Law
-from sweep.models.general.resistance import damping_of, friction_of
 from sweep.models.general.rigid_body import about_centre, gyroscopic
 from sweep.models.general.surfaces import Surface
-from sweep.models.ladder import slip
+from sweep.models.ladder import noslip, slip
 from sweep.models.model import REVERSAL_TIME, Array, Columns, Model, Ripple
 
 
@@ -57,7 +56,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
         return slopes, (spin, R * (k * square + turning) + lost, R, denominator)
 
     def observe(y: Array, p: Any) -> dict[str, Array]:
-        return {**seen(contact, rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
+        return {**noslip.seen(contact, rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
 
     def fastest_decay(columns: Columns) -> Array:
         grip = strongest_grip(columns, surface)

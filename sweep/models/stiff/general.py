@@ -22,9 +22,8 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models.general import rigid_body, variants
 from sweep.models.general.bounds import couples_decay, strongest_grip
-from sweep.models.general.couples import Couple
+from sweep.models.general.couples import Couple, damping_of
 from sweep.models.general.laws import LAWS, Law
-from sweep.models.general.resistance import damping_of
 from sweep.models.general.rigid_body import about_centre, about_contact, gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.model import Array, Columns, Model, named

@@ -113,14 +113,17 @@ class Rattle:
 
     def rippled(self, amplitudes: Array) -> Array:
         """The part of M3 that ripples with a rattle of these amplitudes, shape (cells,): without the slow change."""
-        rates = np.concatenate([self.rates, self.rates.conj()], axis=1)
         slow = np.roll(np.eye(4, dtype=bool), 2, axis=1)  # a mode and its own conjugate
-        return _form(np.where(slow, 0, self.turning / (rates[:, :, None] + rates[:, None, :])), amplitudes)
+        return _form(np.where(slow, 0, self._turned), amplitudes)
 
     def turned(self, amplitudes: Array) -> Array:
         """The part of M3 that comes and goes with a rattle of these amplitudes, shape (cells,)."""
+        return _form(self._turned, amplitudes)
+
+    @property
+    def _turned(self) -> Array:
         rates = np.concatenate([self.rates, self.rates.conj()], axis=1)
-        return _form(self.turning / (rates[:, :, None] + rates[:, None, :]), amplitudes)
+        return np.asarray(self.turning / (rates[:, :, None] + rates[:, None, :]))
 
 
 def slow_rates(constants: Constants, spin: Array) -> tuple[Array, Array, Array]:
