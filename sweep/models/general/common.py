@@ -1,4 +1,4 @@
-"""Holds what the variants with slip and without share: constants, offers, and what a trajectory shows."""
+"""Holds what the variants with slip and without share: their constants, what they offer, and how they are made."""
 
 from __future__ import annotations
 
