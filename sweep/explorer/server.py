@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import signal
 import threading
@@ -26,6 +27,9 @@ from sweep.explorer.slices import Source
 
 ADDRESS = "127.0.0.1"
 
+_SECONDS = 60.0
+"""Longest wait for an explorer in a thread to start or to end."""
+
 FIRST_PORT, LAST_PORT = 5006, 5105
 """Tried in turn where no port is asked for, so that a link to the only explorer holds."""
 
@@ -39,7 +43,9 @@ def serve(source: Source, setup: Setup | None, port: int | None, *, browser: boo
         if the port is in use.
     """
     sockets, found = _bind(port)
-    loop, url = _started(source, setup, sockets, found)
+    loop = IOLoop()
+    loop.make_current()
+    _, url = _started(loop, source, setup, sockets, found)
     say(f"exploring {source.name} at {url} (Ctrl-C ends it)")
     if browser:
         loop.add_callback(lambda: webbrowser.open(url))
@@ -55,40 +61,56 @@ class Beside:
     url: str
     height: int
     """Pixels in a notebook."""
+    close: Callable[[], None]
+    """Ends it."""
 
     def _repr_html_(self) -> str:
         return f'<iframe src="{self.url}" width="100%" height="{self.height}" style="border: 0"></iframe>'
 
 
 def serve_beside(source: Source, setup: Setup | None, height: int) -> Beside:
-    """Serve for as long as this process lives, and return at once."""
+    """Serve until it is closed or this process ends, and return at once."""
     sockets, port = _bind(None)
-    url = SimpleQueue[str]()
+    ready = SimpleQueue[tuple[IOLoop, str]]()
 
-    def work() -> None:
-        loop, address = _started(source, setup, sockets, port)
-        url.put(address)
-        loop.start()
+    closed = asyncio.Event()
 
-    threading.Thread(target=work, daemon=True, name="explorer").start()
-    return Beside(url.get(), height)
+    async def work() -> None:
+        loop = IOLoop.current()
+        server, url = _started(loop, source, setup, sockets, port)
+        ready.put((loop, url))
+        await closed.wait()
+        server.stop()
+        for one in sockets:
+            one.close()
+
+    thread = threading.Thread(target=lambda: asyncio.run(work()), daemon=True, name="explorer")
+    thread.start()
+    loop, url = ready.get(timeout=_SECONDS)
+
+    def close() -> None:
+        loop.add_callback(closed.set)
+        thread.join(_SECONDS)
+
+    return Beside(url, height, close)
 
 
-def _started(source: Source, setup: Setup | None, sockets: list[Any], port: int) -> tuple[IOLoop, str]:
-    """A loop of this thread in which the pages are served once it runs, and their address."""
+def _started(
+    loop: IOLoop, source: Source, setup: Setup | None, sockets: list[Any], port: int
+) -> tuple[BaseServer, str]:
+    """The server of the pages, for as long as the loop of this thread runs, and its address."""
     # Its advice to name an option of Bokeh's own command helps nobody here; the browser is refused all the same.
     logging.getLogger("bokeh.server.views.ws").setLevel(logging.CRITICAL)
     logging.getLogger("tornado.access").setLevel(logging.ERROR)
     hosts = [f"{host}:{port}" for host in ("localhost", ADDRESS)]
     url = f"http://{hosts[0]}/"
-    loop = IOLoop()
-    loop.make_current()
     application = Application(FunctionHandler(view.make(source, setup)))
     web = _Web({"/": application}, extra_websocket_origins=hosts, absolute_url=url)
     http = HTTPServer(web)
     http.add_sockets(sockets)
-    BaseServer(loop, web, http).start()
-    return loop, url
+    server = BaseServer(loop, web, http)
+    server.start()
+    return server, url
 
 
 class _Web(BokehTornado):  # type: ignore[misc]  # Bokeh tells no types of it
