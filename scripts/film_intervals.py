@@ -21,7 +21,7 @@ from short_steps import bodies
 
 import sweep
 from sweep.grid import Grid
-from sweep.studies.film import Film
+from sweep.kernels.measures.misfit import Film
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from support import newton

@@ -31,6 +31,7 @@ from sweep.kernels.measures import MEASURES
 
 STANDARD = {"friction": {"mu": 60}, "start": {"n0": 0.05}, "integrator": {"method": "dopri5"}}
 CELLS, BLOCKS, ROUNDS = 160, 120, 5
+FILM = Path(__file__).parent.parent / "configs" / "wooden_film.csv"
 
 Work = tuple[Choice, float]
 
@@ -38,8 +39,9 @@ Work = tuple[Choice, float]
 def works(files: list[str]) -> dict[str, Work]:
     """What is timed, by name: a measurement beside those that it needs, a method, or the methods of a configuration."""
     found = {}
-    measures = [[], *([*kind.needs, name] for name, kind in MEASURES.items() if kind().in_kernel)]
-    configs = [("+".join(each) or "nothing", load_config(STANDARD, {"measure": each})) for each in measures]
+    names = [name for name, kind in MEASURES.items() if kind().in_kernel]
+    measures = [[], *([*MEASURES[name].needs, {name: str(FILM)} if name == "misfit" else name] for name in names)]
+    configs = [("+".join(map(str, each)) or "nothing", load_config(STANDARD, {"measure": each})) for each in measures]
     configs += [("adams", load_config(STANDARD, {"measure": [], "method": "adams"}))]
     configs += [(Path(file).stem, load_config(file)) for file in files]
     for name, config in configs:

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from sweep.engine.cluster import Cluster
     from sweep.engine.reporter import Reporter
     from sweep.explorer.server import Beside
+    from sweep.kernels.measures.misfit import Film
     from sweep.plots.picture import plot
     from sweep.results.store import StoreError
-    from sweep.studies.film import Film
     from sweep.studies.predictions import predict
 
 __all__ = [
@@ -241,7 +241,7 @@ def fit(
         where it may be negative.  All others have one value
     film : a table of numbers with a header: a time, and a spin ("Gyroscope z (rad/s)") or a heading ("angle (deg)");
         with a column "error", intervals follow from that, and else from the residuals.  Or a
-        `sweep.studies.film.Film`
+        `sweep.kernels.measures.misfit.Film`
     free : names of the parameters to find
 
     Returns

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from sweep.config import cases, cross_checks, document, schema, user_models
+from sweep.config import cases, cross_checks, document, film, schema, user_models
 from sweep.config.configuration import FIRST_AXES, Config, model_of
 from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
@@ -26,6 +26,7 @@ from sweep.grid import Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
+from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.models.general.laws import LAWS
 from sweep.models.general.selection import PAPER_LAW, Physics
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
@@ -117,7 +118,8 @@ def _source(config: ConfigLike) -> document.Document:
     if config.cases is not None and not config.samples:
         values["cases"] = config.cases_file or "cases"
         table = values["cases"], config.cases
-    return document.Document("", values, table=table, model=config.origin)
+    seen = (config.film_file, config.film) if config.film else None
+    return document.Document("", values, table=table, film=seen, model=config.origin)
 
 
 def _full_path(key: str, known: Mapping[str, Parameter]) -> tuple[str, ...]:
@@ -155,6 +157,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         cases_file=values.cases,
         samples=samples,
         seed=values.seed,
+        film=_film(values.measure or (), source),
         units=physics.units,
         law=physics.law.name,
         surface=physics.surface.name,
@@ -194,6 +197,14 @@ def _table(name: str, source: document.Document, known: Mapping[str, Parameter])
     return source.table[1]
 
 
+def _film(measure: Iterable[str], source: document.Document) -> Film | None:
+    """Read the film that is measured against, once for all that is made from `source`."""
+    name = next((setting for kind, _, setting in (spec.partition("=") for spec in measure) if kind == Misfit.name), "")
+    if name and (not source.film or source.film[0] != name):
+        source.film = name, film.read(Path(source.file).parent / name)
+    return source.film[1] if name and source.film else None
+
+
 def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physics:
     """Collect what a configuration that names these parameters says beside numbers."""
     made = loading.load(origin) if origin else None
@@ -224,7 +235,7 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
     """
     integrator, said, found = values.integrator, values.integrator.model_fields_set, dict[str, Any]()
     asked = [spec.partition("=")[0] for spec in values.measure or ()]
-    alone = any(MEASURES[name].follows_tangent for name in asked)
+    alone = any(MEASURES[name].every_step for name in asked)
     if "method" not in said or (alone and integrator.method == methods.AUTO):
         choice = isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
         found["method"] = methods.AUTO if choice and not alone else methods.PLAIN

@@ -16,6 +16,7 @@ from sweep.config.faults import Fault, Path
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
 from sweep.grid import CASE, SAMPLE
+from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.models import TIERS
 from sweep.models.general import laws
 from sweep.models.general.selection import PAPER_LAW, Physics
@@ -58,6 +59,8 @@ class Config:
     samples: int | None = None
     """How many samples are drawn of the parameters that are distributions, if there are such."""
     seed: int = 0
+    film: Film | None = None
+    """What the misfit is measured against."""
     units: str = PAPER_UNITS
     law: str = PAPER_LAW
     """Name of the law of friction, as in `sweep.models.general.laws.LAWS`."""
@@ -95,6 +98,11 @@ class Config:
         names = frozenset((*self.parameters, *(self.cases or ())))
         law = self.own_law or laws.LAWS[self.law]
         return model_of(self.model, self.origin, Physics(self.units, law, SURFACES[self.surface], names))
+
+    @property
+    def film_file(self) -> str:
+        """The name of the film, as the configuration has it; "" if there is none."""
+        return next((spec.partition("=")[2] for spec in self.measure if spec.startswith(f"{Misfit.name}=")), "")
 
     @property
     def simulated(self) -> bool:
@@ -157,7 +165,10 @@ class Config:
             **({"samples": self.samples, "seed": self.seed} if self.samples else {}),
             **{section: values for section, values in found.items() if values},
             "integrator": self.integrator.model_dump(),
-            "measure": [{name: int(n)} if n else name for name, _, n in (m.partition("=") for m in self.measure)],
+            "measure": [
+                {name: n if name == Misfit.name else int(n)} if n else name
+                for name, _, n in (m.partition("=") for m in self.measure)
+            ],
             "verify": self.verify,
             "refine": self.refine,
             "max_failed_fraction": self.max_failed_fraction,
@@ -177,5 +188,6 @@ class Config:
         # What the file of a model says, which its SHA-256 tells, not where it lies.
         for key in ("name", "max_failed_fraction", "cases", *(["model"] if self.origin else [])):
             decisive.pop(key, None)
-        text = json.dumps([decisive, list(self.axes), self.cases], sort_keys=True)
+        seen = [self.film.sha256] if self.film else []
+        text = json.dumps([decisive, list(self.axes), self.cases, *seen], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]

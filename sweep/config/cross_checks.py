@@ -18,6 +18,7 @@ from sweep.config.values import Values
 from sweep.grid import BODY, Grid, distinct
 from sweep.kernels import measures, methods
 from sweep.kernels.differentiate import undifferentiable
+from sweep.kernels.measures import misfit
 from sweep.models.general.selection import Physics
 from sweep.models.general.variants import BASES
 from sweep.models.model import Model
@@ -135,9 +136,15 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
         yield f"{name} cannot be measured on the {model.name} model; choose from {', '.join(possible)}"
     for needed in set(kind.needs) - {spec.partition("=")[0] for spec in config.measure}:
         yield f"{name} is measured with the {needed}; add {needed}"
-    if kind.follows_tangent and method and not method.follows_tangents:
-        able = either(each for each, found in methods.METHODS.items() if found.follows_tangents)
+    if kind.every_step and method and not method.takes_every_step:
+        able = either(each for each, found in methods.METHODS.items() if found.takes_every_step)
         yield f"{name} cannot be measured with method: {method.name}; choose {able}"
+    elif kind is misfit.Misfit and config.film:
+        last, end = config.film.time[-1], config.integrator.patient.t_end
+        if config.film.heading:
+            yield f"the film {config.film_file} has headings, and a misfit is one of spins; fit it instead (sweep fit)"
+        if last > end:
+            yield f"the film {config.film_file} lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
     elif kind.follows_tangent and isinstance(model, Model) and (reason := undifferentiable(model)):
         yield f"{name} cannot be measured on the {model.name} model: {reason}; leave it out"
 

@@ -48,6 +48,8 @@ class Document:
     """For each value that an argument gave, and each section that it added: the argument, and the path that it set."""
     table: tuple[str, Any] | None = None
     """Name and columns of the table of cases, once it is read."""
+    film: tuple[str, Any] | None = None
+    """Name and content of the film that is measured against, once it is read."""
     model: Origin | None = None
     """Where the model comes from that a user brings, once it is read."""
 

@@ -76,7 +76,8 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     # Of a user's model, `model_sha256` tells what `model` only names.
     free = _FREE | ({"model"} if config.origin else set())
     changed = {key for key in {**old, **new} if old.get(key) != new.get(key)} - free
-    less = set(old["measure"]) - set(new["measure"]) or (
+    changed |= {"film"} if config.film and there.attrs.get("film_sha256", "") not in ("", config.film.sha256) else set()
+    less = [each for each in old["measure"] if each not in new["measure"]] or (
         new["integrator.t_end"] < old["integrator.t_end"] and not rerun
     )
     if rerun:

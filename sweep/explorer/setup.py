@@ -72,12 +72,13 @@ def _named(source: Source, model: str) -> dict[str, str]:
 
 
 def _configuration(source: Source, named: dict[str, str], announce: Announce | None) -> Config:
-    """The configuration in the dataset; a table of cases, which is another file, gives way to the first case.
+    """The configuration in the dataset, without a film; a table of cases, another file too, gives way to the first.
 
     It may come from anybody, so that a model in it that is a file or an entry point is refused, not run, unless the
     user has named it.
     """
     text, overrides = str(source.dataset.attrs.get("config", "")), dict[str, Any](named)
+    text = re.sub(r"^- {misfit:.*(\n +.*)*", "", text, flags=re.MULTILINE)
     if "case" in source.dims:
         text = re.sub("^cases:.*", "", text, flags=re.MULTILINE)
         coordinates = [str(n) for n, c in source.dataset.coords.items() if n != "case"]

@@ -10,6 +10,7 @@ handled a cell.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,11 @@ class Kernel:
         """The specs of the measurements."""
         return tuple(each.spec for each in self.measurements)
 
+    @cached_property
+    def shared(self) -> Array:
+        """What the measurements compare with."""
+        return next((each.shared for each in self.measurements if each.shared.size), np.empty((0, 0)))
+
     @property
     def follows_work(self) -> bool:
         """True if a measurement needs the work of friction in each step."""
@@ -99,6 +105,10 @@ class Kernel:
 
         return watch
 
+    def _make_note(self) -> Any:
+        """Inline (group, number): what all measurements do when all lanes have taken a step."""
+        return call_all("note", "group, number", [f for m in self.measurements if (f := m.make_note(self.layout))])
+
     def _make_steady(self) -> Any:
         """Inline (group, lane, y, p, spin) -> the ripple-free spin, or the spin if no measurement needs that."""
         if not self.follows_ripple:
@@ -115,10 +125,11 @@ class Kernel:
         """Set up `advance` around `run_block`, compiled (group) -> None."""
         settles = [f for each in self.measurements if (f := each.make_may_settle(self.layout))]
         looks = [f for each in self.measurements if (f := each.make_look(self.layout))]
+        compares = [f for each in self.measurements if (f := each.make_compare(self.layout))]
         may_settle = all_true("may_settle", "group, lane, spin, at_rest", settles)
         measure = call_all("measure", "group, lane, running, ended, spin, rattle, J, total", looks)
         look = make_look(self.model, self.constants, self.layout, may_settle, measure, self.energy_gain)
-        advance = make_advance(run_block, look, self.layout)
+        advance = make_advance(run_block, look, call_all("compare", "group, lane, shared", compares), self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
         self.advancing = parallel(advance, name, *self.model.files)
@@ -168,7 +179,7 @@ class Kernel:
 
         Returns after `blocks` blocks of steps in every lane, or earlier when all cells have ended.
         """
-        self.advancing(images, cells, blocks, stop_when_settled, threads())
+        self.advancing(images, cells, blocks, stop_when_settled, threads(), self.shared)
 
     def carry(self, images: Array) -> None:
         """Carry the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""

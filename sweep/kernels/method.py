@@ -75,7 +75,6 @@ class Method:
     foresight: float = 0.0
     """Number of steps ahead of the time limit from which on it may decide by what is left.  A trajectory that has
     ended before does not depend on the limit."""
-    stops_anywhere: bool = False
-    """A run may stop after any step and go on from there towards another goal."""
-    follows_tangents: bool = False
-    """It can carry a tangent along each trajectory (`sweep.kernels.tangent`)."""
+    takes_every_step: bool = False
+    """It takes equal steps from t = 0 to the end, each by itself: a run may stop after any and go on from there towards
+    another goal, and a tangent can be carried along (`sweep.kernels.tangent`)."""

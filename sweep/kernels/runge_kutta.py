@@ -66,13 +66,14 @@ class RungeKuttaKernel(Kernel):
         load_constants = make_load(self.constants, layout, model.constants)
         store_states = make_store(model.states, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), self._make_watch()
+        note = self._make_note()
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         block, lanes, wide = BLOCK, LANES, full_width()
 
         @exactly_compiled
         def run_block(group: Any) -> None:
             wide()
-            for _ in range(block):
+            for number in range(block):
                 for lane in range(lanes):
                     y = load_states(group, lane)
                     p = load_constants(group, lane)
@@ -85,6 +86,7 @@ class RungeKuttaKernel(Kernel):
                     failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
                     group[STATUS + lane] = failure if active & (not sound) else status
                     watch(group, lane, accepted, y, p, spin, work, h, (done + 1.0) * h)
+                note(group, number)
 
         return run_block
 
@@ -145,8 +147,7 @@ def method(tableau: Tableau) -> Method:
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",
         step_cost=tableau.stages / DOPRI5.stages,
         error_order=tableau.order,
-        stops_anywhere=True,
-        follows_tangents=True,
+        takes_every_step=True,
     )
 
 

@@ -45,7 +45,7 @@ class Identity:
             changed = [f"- {printable(line.strip())}" for line in old if line not in new]
             changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
             changed += [] if self.of_one_run else ["some cells were computed again (--rerun)"]
-            return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs"])
+            return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs, or the film"])
         if self.versions != other.versions:
             return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
         return "other sources of the model or kernel" if self.source_hash != other.source_hash else ""

@@ -87,6 +87,7 @@ def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] =
         "measured": " ".join(config.measure),
         "source_hash": identity.source_hash,
         "versions": identity.versions,
+        **({"film_sha256": film.sha256, "film_instants": len(film.time)} if (film := config.film) else {}),
         **_brought(config),
         "integrator": _integrator_words(config),
         "sweep_version": _version("rattleback-sweep"),

@@ -138,6 +138,10 @@ def _summary(dataset: xr.Dataset) -> Iterator[str]:
             yield _reversals(dataset, valid)
     if "probability" in dataset and dataset["probability"].dims == ("count",):
         yield f"probability: {', '.join(_probabilities(dataset))}"
+    if "misfit" in dataset and np.isfinite(dataset["misfit"]).any():
+        least = dataset["misfit"].isel(dataset["misfit"].argmin(...))
+        where = ", ".join(f"{name} = {least[name].item():g}" for name in dataset["misfit"].dims)
+        yield f"misfit: {least.item():.6g} at least, of {dataset.attrs.get('film_instants', '?')} instants, at {where}"
     if "spin_error" in dataset:
         error = np.ravel(dataset["spin_error"].values)
         if np.isfinite(error).any():

@@ -21,13 +21,14 @@ from scipy.stats import qmc
 
 from sweep.config import Config, ConfigError, Values
 from sweep.config.faults import brief, fault_of, suggestion
+from sweep.config.film import read
 from sweep.config.user_models import explained
 from sweep.engine.reporter import Reporter
 from sweep.grid import Array
 from sweep.interrupt import deferred
+from sweep.kernels.measures.misfit import Film
 from sweep.results import dataset
 from sweep.results.provenance import provenance
-from sweep.studies.film import Film, read
 from sweep.studies.misfit import Minimum, Problem
 from sweep.studies.search import require_certain, require_simulated
 from sweep.variables import Variable

@@ -18,11 +18,11 @@ from scipy.optimize import least_squares
 from sweep.config import Config
 from sweep.grid import Array
 from sweep.interrupt import point
+from sweep.kernels.measures.misfit import Film
 from sweep.kernels.methods import PLAIN, automatic_step
 from sweep.kernels.samples import sampled
 from sweep.models.model import Columns
 from sweep.models.theory.linear import fastest_motion
-from sweep.studies.film import Film
 
 # Samples per radian of the fastest motion, so that splines through them are good to 1e-6 of a ripple.
 _SAMPLES = 8.0

@@ -194,7 +194,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     require_simulated(config)
     config = replace(config, integrator=config.integrator.patient)
     method = METHODS.get(config.integrator.method)
-    if not (method and method.stops_anywhere):
+    if not (method and method.takes_every_step):
         # A step that was fixed for another method may be unstable with this one.
         plain = config.integrator.model_copy(update={"method": PLAIN, "step": "auto"})
         config = replace(config, integrator=plain)

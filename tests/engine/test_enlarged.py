@@ -54,6 +54,13 @@ def test_a_grown_run_is_the_run_of_all_at_once(write: Write, tmp_path: Path, tex
     same_numbers(found, sweep.run(write(text)))
 
 
+def test_a_run_grows_whose_measurement_has_a_setting(write: Write, tmp_path: Path) -> None:
+    measure = "measure: [reversals, {reversal_times: 3}]\n"
+    found, (note,) = grown(write, tmp_path / "out", ONE + measure, MORE + measure)
+    assert note.startswith("12 of 24 cells are taken over")
+    same_numbers(found, sweep.run(write(MORE + measure)))
+
+
 def test_a_single_cell_runs_on(write: Write, tmp_path: Path) -> None:
     short = "name: small\nfriction: {mu: 60}\nintegrator: {method: dopri5, t_end: 100}\n"
     long = short.replace("100", "300")

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.config import ConfigError
-from sweep.studies import film
+from sweep.config import ConfigError, film
 
 Write = Callable[..., Path]
 

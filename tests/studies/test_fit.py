@@ -14,12 +14,12 @@ from support.cli import invoke
 import sweep
 from sweep.config import ConfigError
 from sweep.explorer.slices import Source
+from sweep.kernels.measures.misfit import Film
 from sweep.kernels.samples import sampled
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import take
 from sweep.results.store import StoreError
-from sweep.studies.film import Film
 from sweep.studies.misfit import Problem
 
 Write = Callable[..., Path]

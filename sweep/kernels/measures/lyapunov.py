@@ -36,7 +36,7 @@ class Lyapunov(Measurement):
     name = "lyapunov"
     summary = "largest Lyapunov exponent, with its statistical error, at three times the cost; with dopri5 alone"
     asks = SPIN
-    follows_tangent = True
+    follows_tangent = every_step = True
 
     variables = {
         "lyapunov": measured(

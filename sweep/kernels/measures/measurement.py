@@ -10,8 +10,10 @@ them in hooks, all of which are optional:
     start              once, when the images are made
     make_step          for one lane after every step
     make_at_reversal   for one lane after every step, by way of the measurement `reversals`
+    make_note          for all lanes after every step
     make_may_settle    for one lane at every look, before it is decided whether the trajectory ends
     make_look          for one lane at every look, after that decision
+    make_compare       for one lane after every look, with numbers that all trajectories share
     skip               for many images, when they have covered a stretch without steps
     mode_lost          for many images, when the lift of a mode has failed
     read               once, when the trajectories have ended
@@ -33,6 +35,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
+
+import numpy as np
 
 from sweep.kernels.layout import Layout, Table
 from sweep.models.model import Array, Columns, Model
@@ -83,8 +87,9 @@ class Measurement:
     follows_ripple: ClassVar[bool] = False
     """It uses the ripple-free spin in each step."""
     follows_tangent: ClassVar[bool] = False
-    """It uses how fast a tangent grows (`sweep.kernels.tangent`), which needs a method that
-    `Method.follows_tangents`."""
+    """It uses how fast a tangent grows (`sweep.kernels.tangent`)."""
+    every_step: ClassVar[bool] = False
+    """It follows every step from t = 0 on, which needs a method that `Method.takes_every_step`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
@@ -95,6 +100,11 @@ class Measurement:
     def quantities(self) -> tuple[str, ...]:
         """Names of the quantities that it adds to an image.  They start at zero, except those that `start` sets."""
         return ()
+
+    @property
+    def shared(self) -> Array:
+        """Numbers that all trajectories share, for `make_compare`, of two dimensions.  One measurement has some."""
+        return np.empty((0, 0))
 
     @property
     def spec(self) -> str:
@@ -109,7 +119,7 @@ class Measurement:
     @property
     def in_kernel(self) -> bool:
         """True if a kernel with it differs from one without: it has a quantity, or a hook in the loop."""
-        hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_look")
+        hooks = ("make_step", "make_at_reversal", "make_note", "make_may_settle", "make_look", "make_compare")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
         return bool(self.quantities) or own or self.follows_work or self.follows_ripple or self.follows_tangent
 
@@ -149,6 +159,10 @@ class Measurement:
         """
         return None
 
+    def make_note(self, layout: Layout) -> Any:
+        """Inline (group, number) -> None, called when all lanes have taken the step of this number in their block."""
+        return None
+
     def make_may_settle(self, layout: Layout) -> Any:
         """Inline (group, lane, spin, at_rest) -> bool: whether what is measured is final if the rattle only decays.
 
@@ -167,6 +181,10 @@ class Measurement:
         J : moment of inertia of the spin
         total : energy above rest, rattle + J spin²/2
         """
+        return None
+
+    def make_compare(self, layout: Layout) -> Any:
+        """Inline (group, lane, shared) -> None, called after every look with the numbers `shared`."""
         return None
 
     def skip(self, table: Table, stretch: Stretch) -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from sweep.config import ConfigError
-from sweep.config.faults import Fault, brief, either
+from sweep.config.faults import ConfigError, Fault, brief, either
 from sweep.grid import Array
+from sweep.kernels.measures.misfit import Film
 
 MOST_ROWS = 20_000
 """Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
@@ -27,22 +26,6 @@ _NAMES = {
     "heading": (_ANGLES, ("heading", "angle", "theta")),
     "error": (_SPINS | _ANGLES, ("error", "sigma", "uncertainty")),
 }
-
-
-@dataclass(frozen=True)
-class Film:
-    """What was seen, from its first instant on; arrays of shape (instants,)."""
-
-    time: Array
-    """Since the first instant, in the unit of time of the configuration: s in SI."""
-    value: Array
-    """Spin, or heading without wraps, in radian."""
-    error: Array | None
-    """Standard error of each value, if the film tells."""
-    heading: bool
-    """Whether the values are headings."""
-    left_out: int
-    """Rows that hold no number, or that are too many."""
 
 
 def read(path: str | Path) -> Film:

@@ -1,0 +1,147 @@
+"""The misfit to a film as a measurement: against trajectories by other code, and in runs of all kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import adaptive, columns
+from support.cli import invoke
+from support.kernels import threads
+from support.runs import in_sittings, same_numbers
+
+import sweep
+from sweep.config import ConfigError
+from sweep.engine.cluster import connected
+from sweep.explore.setup import usable
+from sweep.explore.slices import Source
+from sweep.models.ladder import slip
+from sweep.models.model import take
+from sweep.results.store import StoreError
+
+Write = Callable[..., Path]
+
+TEXT = """\
+name: film
+friction: {mu: [40, 60, 80]}
+start: {n0: [0.03, 0.05]}
+measure: [reversals, {misfit: film.csv}]
+integrator: {step: 0.02, t_end: 150}
+"""
+
+
+def film(write: Write, times: np.ndarray, header: str = "time,spin,error", *, turned: float = 0.0) -> Path:
+    """A film of nothing in particular, with errors that differ."""
+    rows = np.stack([times, 0.05 * np.cos(times / 30 + turned), 0.01 + 1e-4 * times])
+    return write("\n".join([header, *(",".join(f"{x:.17g}" for x in row) for row in rows.T), ""]), "film.csv")
+
+
+def misfit(spins: np.ndarray, times: np.ndarray) -> Any:
+    return np.sum(((spins - 0.05 * np.cos(times / 30)) / (0.01 + 1e-4 * times)) ** 2, axis=-1)
+
+
+def spins(times: np.ndarray) -> np.ndarray:
+    """The standard case by another integrator."""
+    *states, _ = adaptive.motion(columns(), np.unique(times), rtol=1e-13, atol=1e-16)
+    found = slip.rhs(tuple(states), take(slip.Constants.of(columns()), 0))[1][0]
+    return np.asarray(found)[np.searchsorted(np.unique(times), times)]
+
+
+@pytest.fixture
+def config(write: Write) -> Path:
+    film(write, np.linspace(0, 150, 301))
+    return write(TEXT)
+
+
+def test_it_is_that_of_the_trajectories(config: Path) -> None:
+    found = sweep.run(config)
+    seen = sweep.trajectory(config, every=0.5, mu=[40, 60, 80], n0=[0.03, 0.05])
+    np.testing.assert_allclose(found.misfit.values.ravel(), misfit(seen.spin.values, seen.time.values), rtol=1e-10)
+    assert found.misfit.dims == found.reversals.dims
+    assert found.misfit.attrs["long_name"].startswith("sum of squares of (spin - film) / error")
+    np.testing.assert_array_equal(seen.misfit, found.misfit.values.ravel())
+
+
+@pytest.mark.parametrize("dense", [3, 3000])
+def test_instants_lie_anywhere_between_steps(write: Write, dense: int) -> None:
+    """Several in a step, or none in hundreds, close to both ends, and twice."""
+    random = np.random.default_rng(dense)
+    times = np.concatenate([[0, 1e-3, 1e-3, 0.013], np.sort(random.uniform(0.1, 39.9, dense)), [39.999, 40]])
+    film(write, times)
+    found = sweep.run(write(TEXT.replace("0.02", "0.005").replace("150", "40")), mu=60.0, n0=0.05)
+    assert found.misfit.item() == pytest.approx(misfit(spins(times), times), rel=1e-10)
+
+
+def test_a_run_of_fewer_steps_than_a_polynomial_has_points(write: Write) -> None:
+    times = np.linspace(0, 0.16, 9)
+    film(write, times)
+    found = sweep.run(write(TEXT.replace("150", "0.16")), mu=60.0, n0=0.05)
+    assert found.misfit.item() == pytest.approx(misfit(spins(times), times), rel=1e-6)
+
+
+def test_a_trajectory_is_followed_to_the_end_of_the_film(write: Write) -> None:
+    film(write, np.linspace(0, 1000, 50))
+    text = TEXT.replace("step: 0.02, t_end: 150", "t_end: 20000, method: dopri5")
+    found = sweep.run(write(text))
+    before = sweep.run(write(text), measure=["reversals"])
+    assert (before.t_stop < 1000).any()
+    assert np.isfinite(found.misfit).all()
+    assert ((found.t_stop >= 1000) & (found.t_stop < 20000)).all()
+
+
+def test_numbers_do_not_depend_on_threads_workers_or_interruptions(config: Path, tmp_path: Path) -> None:
+    with threads(1):
+        alone = sweep.run(config)
+    with threads(2):
+        same_numbers(sweep.run(config), alone)
+    again, interruptions, _ = in_sittings(1, config, tmp_path / "out")
+    assert interruptions
+    same_numbers(again, alone)
+    with connected(2, None) as cluster:
+        same_numbers(sweep.run(config, cluster=cluster), alone)
+
+
+def test_another_film_is_another_run(write: Write, config: Path, tmp_path: Path) -> None:
+    first = sweep.run(config, tmp_path / "out")
+    grown = sweep.run(config, tmp_path / "out", mu=[40, 60, 80, 100])
+    assert "6 of 8" in grown.attrs["taken_over"]
+    np.testing.assert_array_equal(grown.misfit.sel(mu=first.mu), first.misfit)
+    film(write, np.linspace(0, 150, 301), turned=0.1)
+    with pytest.raises(StoreError, match="or the film"):
+        sweep.run(config, tmp_path / "out", mu=[40, 60, 80, 100])
+    assert sweep.run(config).attrs["film_sha256"] != first.attrs["film_sha256"]
+
+
+def test_it_is_drawn_told_and_explored(config: Path, tmp_path: Path) -> None:
+    found = sweep.run(config, tmp_path)
+    assert invoke("plot", tmp_path / "film.nc", "--var", "misfit").exit_code == 0
+    said = invoke("info", tmp_path / "film.nc").stdout
+    at = found.misfit.isel(found.misfit.argmin(...))
+    assert f"misfit: {at.item():.6g} at least, of 301 instants, at mu = {at.mu.item():g}, n0 = {at.n0.item():g}" in said
+    assert usable(Source(found))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (TEXT.replace("t_end: 150", "t_end: 100"), "the film film.csv lasts 150, but trajectories 100; raise t_end"),
+        (TEXT.replace("step: 0.02", "method: adams"), "misfit cannot be measured with method: adams; choose dopri5"),
+        (TEXT.replace("{misfit: film.csv}", "misfit"), "misfit needs a film; write {misfit: film.csv}"),
+        (TEXT.replace("film.csv", "none.csv"), "none.csv: cannot be read: No such file"),
+    ],
+)
+@pytest.mark.usefixtures("config")
+def test_what_cannot_be_measured_is_refused_in_one_line(write: Write, text: str, words: str) -> None:
+    with pytest.raises(ConfigError) as refusal:
+        sweep.load_config(write(text))
+    assert words in str(refusal.value)
+    assert len(refusal.value.faults) == 1
+
+
+def test_a_film_of_headings_is_refused(write: Write) -> None:
+    film(write, np.linspace(0, 150, 301), "time,heading,error")
+    with pytest.raises(ConfigError, match="has headings, and a misfit is one of spins"):
+        sweep.load_config(write(TEXT))
