@@ -226,6 +226,7 @@ def fit(
     film: str | Path | Film,
     free: Sequence[str],
     *,
+    laws: Sequence[str] = (),
     progress: bool | None = None,
     reporter: Reporter | None = None,
     **overrides: Any,
@@ -243,12 +244,15 @@ def fit(
         with a column "error", intervals follow from that, and else from the residuals.  Or a
         `sweep.kernels.measures.misfit.Film`
     free : names of the parameters to find
+    laws : laws of friction to compare, such as ``["viscous", "coulomb-tanh"]``.  Each takes from `config` what that
+        says of its parameters, and finds those that `config` does not say as well; it does without what it has not
 
     Returns
     -------
     Dataset over (parameter): the `value` that fits best, and the ends of its intervals of 68 and 95 %.  Over (time):
         the film and the fit.  Over (rank): all minima that were found.  The attribute `undetermined` says what the film
-        does not tell, and `config` runs the fitted body.
+        does not tell, and `config` runs the fitted body.  With `laws`, dataset over (law, parameter) and (law, time);
+        over (law): `chi_square`, `number_free`, `akaike` and the `weight` of each.
 
     Raises
     ------
@@ -258,9 +262,11 @@ def fit(
     from sweep.config import load_config
     from sweep.progress import shown
     from sweep.studies.fit import fit
+    from sweep.studies.laws import compare
 
     with shown(progress, reporter) as told:
-        return fit(load_config(config, overrides, announce=told.note), film, free, told)
+        checked = load_config(config, overrides, announce=told.note)
+        return compare(checked, film, free, laws, told) if laws else fit(checked, film, free, told)
 
 
 def explore(dataset: xr.Dataset | str | Path, height: int = 950) -> Beside:

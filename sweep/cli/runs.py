@@ -214,17 +214,18 @@ def indices(config: Path, settings: tuple[str, ...], dry_run: bool, fresh: bool,
 @CONFIG
 @click.argument("film", type=PATH)
 @click.option("--free", required=True, metavar="NAME,NAME", help="The parameters to find, e.g. mu,sigma,n0,x0,y0.")
+@click.option("--laws", metavar="NAME,NAME", help="Laws of friction to fit and compare, e.g. viscous,coulomb.")
 @OUTPUT
 @SETTINGS
 @QUIET
 def fit(
-    config: Path, film: Path, free: str, output: Path | None, settings: tuple[str, ...], quiet: bool
-) -> None:  # fmt: skip
+    config: Path, film: Path, free: str, laws: str | None, output: Path | None, settings: tuple[str, ...], quiet: bool
+) -> None:
     """Find the parameters of the body in CONFIG that reproduce FILM.
 
     FILM is a table with a header: a time, and a spin or a heading, such as "Time (s), Gyroscope z (rad/s)".  A free
     parameter with several values in CONFIG is sought between the least and the largest.  Writes NAME_fit.nc and .png,
-    and NAME_fit.yaml, which runs the fitted body.
+    and NAME_fit.yaml, which runs the fitted body; with --laws, NAME_laws.nc, .png and .yaml, that of the best law.
     """
     checked = loaded(config, settings)
     from sweep.plots import fit as plots
@@ -232,11 +233,16 @@ def fit(
     from sweep.results.folder import RunFiles
     from sweep.results.summary import describe
     from sweep.studies.fit import fit as find
+    from sweep.studies.laws import compare
 
+    names = [name.strip() for name in free.split(",")]
     interrupt.raise_again()
     with Terminal(quiet) as terminal, of_option("--free", checked.table):
-        result = find(checked, film, [name.strip() for name in free.split(",")], terminal)
-    files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_fit")
+        result = (
+            compare(checked, film, names, [name.strip() for name in laws.split(",")], terminal)
+            if laws else find(checked, film, names, terminal)
+        )  # fmt: skip
+    files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_{'laws' if laws else 'fit'}")
     files.save_result(result, plots.draw(result))
     files.configuration.write_text(result.attrs["config"], encoding="utf-8")
     if not quiet:

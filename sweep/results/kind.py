@@ -36,7 +36,7 @@ def kind(dataset: xr.Dataset) -> str | None:
         return CRITICAL
     if {"level", "curve", "end_more"} <= set(dataset.variables):
         return BOUNDARIES
-    if {"seen", "fitted", "correlation"} <= set(dataset.variables):
+    if {"seen", "fitted"} <= set(dataset.variables):
         return FIT
     if {"first_order", "total_order"} <= set(dataset.variables):
         return INDICES

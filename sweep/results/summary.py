@@ -61,6 +61,9 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
 
 def _fit(dataset: xr.Dataset) -> Iterator[str]:
     """The values and their intervals, what the film does not determine, and how well the curve fits."""
+    if "law" in dataset.dims:
+        yield from _laws(dataset)
+        return
     yield f"{'':12} {'value':>12}   {'68 %':^25}   {'95 %':^25}"
     for name in dataset["parameter"].values:
         one = dataset.sel(parameter=name)
@@ -86,6 +89,19 @@ def _indices(dataset: xr.Dataset) -> Iterator[str]:
                 for order in ("first_order", "total_order")
             )
             yield f"  {quantity:18} {name:8} {alone}   {total}"
+
+
+def _laws(dataset: xr.Dataset) -> Iterator[str]:
+    """How well each law fits, the best first, its parameters, and what the film tells of the laws."""
+    yield f"{'':14} {'chi square':>12} {'free':>5} {'Akaike':>12} {'weight':>9}   value and interval of 68 %"
+    for law in dataset["law"].values[np.argsort(dataset["akaike"].values)]:
+        one = dataset.sel(law=law).dropna("parameter", subset=["value"])
+        head = f"{one['chi_square'].item():12.6g} {one['number_free'].item():5} {one['akaike'].item():12.6g}"
+        ends = zip(*(one[name].values for name in ("parameter", "value", "lower_68", "upper_68")), strict=True)
+        values = [f"{name} = {value:.4g} ({low:.4g} … {high:.4g})" for name, value, low, high in ends]
+        yield f"{law:14} {head} {one['weight'].item():9.2g}   {values[0] if values else ''}"
+        yield from (f"{'':57}{value}" for value in values[1:])
+    yield from filter(None, dataset.attrs["undetermined"].split("; "))
 
 
 def _trajectories(dataset: xr.Dataset) -> Iterator[str]:

@@ -26,7 +26,7 @@ from sweep.config.user_models import explained
 from sweep.engine.reporter import Reporter
 from sweep.grid import Array
 from sweep.interrupt import deferred
-from sweep.kernels.measures.misfit import Film
+from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.misfit import Minimum, Problem
@@ -268,4 +268,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
 def _with(config: Config, values: Mapping[str, float]) -> Config:
     """`config` with these values of its parameters."""
     fixed = {name: Values.one(value) for name, value in values.items()}
-    return replace(config, name=f"{config.name}_fit", parameters=config.parameters | fixed)
+    measure = tuple(spec for spec in config.measure if spec.partition("=")[0] != Misfit.name)  # its film lies elsewhere
+    return replace(
+        config, name=f"{config.name}_fit", parameters=config.parameters | fixed, measure=measure, film=None
+    )  # fmt: skip

@@ -16,8 +16,8 @@ from support.runs import in_sittings, same_numbers
 import sweep
 from sweep.config import ConfigError
 from sweep.engine.cluster import connected
-from sweep.explore.setup import usable
-from sweep.explore.slices import Source
+from sweep.explorer.setup import usable
+from sweep.explorer.slices import Source
 from sweep.models.ladder import slip
 from sweep.models.model import take
 from sweep.results.store import StoreError

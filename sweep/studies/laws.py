@@ -1,0 +1,142 @@
+"""Fits several laws of friction to one film, and tells which of them it supports, by Akaike's criterion.
+
+The weight of a law is its share in the evidence, exp(-Δ/2) over the sum of these, with Δ the excess of its criterion
+over the least (Burnham and Anderson 2002, sections 2.6 and 2.9).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep.config import Config, load_config
+from sweep.config.faults import brief, fault_of, suggestion
+from sweep.config.film import read
+from sweep.engine.reporter import Reporter
+from sweep.kernels.measures.misfit import Film
+from sweep.models.general.laws import LAWS, Law
+from sweep.parameters import SI
+from sweep.studies.fit import fit
+
+# Differences of the criterion up to which two laws cannot be told apart, and from which on one is ruled out.  A
+# parameter that is of no use makes a difference of two.
+_ALIKE, _RULED_OUT = 4.0, 10.0
+
+# Standard deviations by which chi square may exceed its mean before the film is said to be missed.
+_MISSED = 5.0
+
+_SHARED = ("seen", "other", "minimum", "misfit", "correlation")
+"""Variables of a fit that are those of the film, or have no place beside other laws."""
+
+
+def compare(
+    config: Config, film: str | Path | Film, free: Sequence[str], laws: Sequence[str], reporter: Reporter | None = None
+) -> xr.Dataset:
+    """As `sweep.api.fit` with `laws`; a film may have been read already."""
+    if config.origin or config.model != "slip":
+        raise fault_of("laws of friction are compared in the slip model; set model: slip")
+    film, note = film if isinstance(film, Film) else read(film), (reporter or Reporter()).note
+    found: dict[str, xr.Dataset] = {}
+    for name in dict.fromkeys(map(_full_name, laws)):
+        other, own = _with_law(config, LAWS[name])
+        theirs = [each for each in free if each in other.tier.parameters or each not in config.table]
+        dropped = [each for each in free if each not in theirs]
+        note(f"law {name}: free are {', '.join([*theirs, *own])}"
+             + (f"; it has no {', '.join(dropped)}" if dropped else ""))  # fmt: skip
+        found[name] = fit(other, film, list(dict.fromkeys([*theirs, *own])), reporter)
+    return _together(found, film)
+
+
+def _full_name(name: str) -> str:
+    """The name of a law, with the first regularisation if it has several and none is said."""
+    full = next((each for each in LAWS if each == name or each.startswith(f"{name}-")), None)
+    if full is None:
+        raise fault_of(f"{brief(name)} is no law of friction{suggestion(name, LAWS)}; choose from {', '.join(LAWS)}")
+    return full
+
+
+def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
+    """`config` with another law, and those parameters of the law that it does not say, which are free.
+
+    A coefficient of dry friction says nothing of a viscous one, and the other way round.
+    """
+    document, before = config.document(), LAWS[config.law]
+    kept = {key: document[key] for key in document if key not in ("integrator", "measure", "verify", "refine")}
+    owned = {name for each in LAWS.values() for name in each.parameters}
+    given = document.get("friction", {})
+    friction = {name: value for name, value in given.items() if name not in {*owned, "law", "regularisation"}}
+    kind, _, regularisation = law.name.partition("-")
+    friction |= {"law": kind} | ({"regularisation": regularisation} if regularisation else {})
+    said = [name for name in law.parameters if name in given and (name in law.pure) == (name in before.pure)]
+    friction |= {name: given[name] for name in said}
+    own = [name for name in law.parameters if name not in said and config.table[name].default is None]
+    friction |= {name: _usual(config, law)[name] for name in own}
+    return load_config({**kept, "friction": friction}), own
+
+
+def _usual(config: Config, law: Law) -> Mapping[str, list[float]]:
+    """The ranges in which parameters of friction are sought that the configuration does not say."""
+    length = config.parameters["c"].numbers[0] if config.units == SI else 1.0
+    velocity = sqrt(length * config.parameters["gravity"].numbers[0]) if config.units == SI else 1.0
+    return {
+        "mu": [0.02, 1.0] if "mu" in law.pure else [1 / velocity, 1e3 / velocity],
+        "mu_static": [0.02, 1.0],
+        "speed": [3e-3 * velocity, 0.3 * velocity],
+        "speed_stick": [1e-3 * velocity, 0.1 * velocity],
+        "radius_contact": [1e-3 * length, 0.3 * length],
+    }
+
+
+def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
+    """The fits of all laws, with what weighs them."""
+    fits, rows = list(found.values()), len(film.time)
+    number = np.array([each.sizes["parameter"] for each in fits])
+    squares = np.array([rows * each.attrs["root_mean_square"] ** 2 for each in fits])
+    # A film without errors takes them from the law that fits best, the same for all.
+    chi = np.array([each["misfit"].values[0] for each in fits]) if film.error is not None else (
+        squares / (squares / (rows - number)).min()
+    )  # fmt: skip
+    akaike = np.array([each.attrs["akaike"] for each in fits])
+    share = np.exp(-(akaike - akaike.min()) / 2)
+    names, best = list(found), int(np.argmin(akaike))
+    apart = [one.drop_vars(_SHARED) for one in fits]
+    result = xr.concat(apart, xr.Variable("law", names), join="outer", combine_attrs="drop", coords="minimal")
+    result = result.assign(
+        seen=fits[0]["seen"],
+        chi_square=("law", chi, {"long_name": "chi square"}),
+        number_free=("law", number, {"long_name": "number of free parameters"}),
+        akaike=("law", akaike, {"long_name": "Akaike's criterion"}),
+        weight=("law", share / share.sum(), {"long_name": "Akaike's weight"}),
+    )
+    words = [*_told_apart(names, akaike - akaike.min(), best)]
+    excess = chi[best] / (rows - number[best])
+    if film.error is not None and excess > 1 + _MISSED * sqrt(2 / (rows - number[best])):
+        words.append(f"even {names[best]} misses the film by more than its errors: {excess:.3g} chi square an instant")
+    words += [
+        f"{name}: {each}" for name, one in found.items() for each in one.attrs["undetermined"].split("; ") if each
+    ]
+    attributes: dict[str, Any] = dict(fits[best].attrs)
+    attributes["title"] = attributes["title"].replace(": fitted", ": laws of friction fitted")
+    attributes |= {"undetermined": "; ".join(words), "trajectories": sum(one.attrs["trajectories"] for one in fits)}
+    return result.assign_attrs(attributes)
+
+
+def _told_apart(names: Sequence[str], excess: np.ndarray, best: int) -> list[str]:
+    """What the film says of each law beside the best, in words."""
+    words = []
+    for i in np.argsort(excess):
+        by = f"Akaike's criteria differ by {excess[i]:.3g}"
+        if i == best:
+            continue
+        if excess[i] < _ALIKE:
+            words.append(f"{names[best]} and {names[i]} cannot be told apart by this film: {by}")
+        elif excess[i] < _RULED_OUT:
+            words.append(f"{names[i]} is less likely than {names[best]}: {by}")
+        else:
+            words.append(f"{names[i]} is ruled out beside {names[best]}: {by}")
+    return words
