@@ -2,8 +2,8 @@
 
     python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
-A PIECE is `kernel`, or what else runs need: `images`, `approach` or `endings`.  A MODEL that a user brings is
-"name@digest", and the record of its origin comes as a line of standard input.
+A PIECE is `kernel`, or what else runs need: `images`, `approach`, `endings`, or `path` for single trajectories.  A
+MODEL that a user brings is "name@digest", and the record of its origin comes as a line of standard input.
 
 Processes, because the code that Numba executes right after compiling is not the code that it caches: functions that a
 kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of sums differ (seen
@@ -29,6 +29,7 @@ from sweep.jit import compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compile_approach, compiled_approach
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
+from sweep.kernels.path import compile_path, compiled_path
 from sweep.models import find
 from sweep.models.model import MODES, Columns, Model
 from sweep.models.origin import Origin
@@ -40,15 +41,17 @@ from sweep.parameters import PAPER_PARAMETERS
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and where the model comes from."""
 
-_SECONDS = {"images": 4.0, "approach": 4.0, "endings": 3.0}
+_SECONDS = {"images": 4.0, "approach": 4.0, "endings": 3.0, "path": 4.0}
 """Time to compile a piece that is no kernel (`scripts/run_costs.py`)."""
 
 _POLL = 0.05
 """Time in seconds between two looks at the processes."""
 
 
-def build(kernels: Iterable[Kernel]) -> None:
+def build(kernels: Iterable[Kernel], paths: bool = False) -> None:
     """Compile what the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
+
+    With `paths` also what it lacks to follow how their bodies turn and travel.
 
     What is missing after that, because a process failed or there is no folder for a cache, is compiled where it is
     first used.
@@ -62,14 +65,14 @@ def build(kernels: Iterable[Kernel]) -> None:
     if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.is_compiled()]:
         with compiling():
             try_compiling(users[0])
-    if jobs := missing(kernels):
+    if jobs := missing(kernels, paths):
         with compiling():
             _compile(jobs)
 
 
-def missing(kernels: Sequence[Kernel]) -> list[Job]:
-    """List what the cache lacks to run `kernels`."""
-    return list(dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel)))
+def missing(kernels: Sequence[Kernel], paths: bool = False) -> list[Job]:
+    """List what the cache lacks to run `kernels`; `paths` as of `build`."""
+    return list(dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel, paths)))
 
 
 def compile_seconds(jobs: Sequence[Job]) -> float:
@@ -88,7 +91,7 @@ def try_compiling(model: Model) -> None:
             compiled(function).compile(tuple(map(numba.typeof, arguments)))
 
 
-def _missing(kernel: Kernel) -> Iterator[tuple[str, ...]]:
+def _missing(kernel: Kernel, paths: bool) -> Iterator[tuple[str, ...]]:
     """Name what the cache lacks to run `kernel`, by the arguments of this module, the longest first."""
     model = kernel.model.key
     if kernel.advancing.is_missing():
@@ -99,6 +102,8 @@ def _missing(kernel: Kernel) -> Iterator[tuple[str, ...]]:
         yield "approach", PLAIN, model
     if MODES in kernel.model.offers and compiled_following().is_missing():
         yield "endings", PLAIN, model
+    if paths and kernel.model.path and compiled_path(kernel.model).is_missing():
+        yield "path", PLAIN, model
 
 
 def _compile(jobs: list[Job]) -> None:
@@ -142,6 +147,8 @@ def main(piece: str, method: str, name: str, *measure: str) -> None:
         compile_approach(model)
     elif piece == "endings":
         compile_following()
+    elif piece == "path":
+        compile_path(model)
     else:
         kernel = make_kernel(method, model, measure)
         kernel.compile() if piece == "kernel" else kernel.images(_any_body(model), np.full(1, 0.1), 10.0)

@@ -31,19 +31,35 @@ def sampled(model: Model, columns: Columns, step: Array, interval: float, count:
     """
     if not len(step):
         return np.empty((0, count))
-    needed = np.ceil(interval / step).astype(np.int64)
+    rows = np.concatenate([stack(model.start(columns)), stack(tuple(model.constants.of(columns)))])
+    order, steps, lanes = in_lanes(rows, np.ceil(interval / step).astype(np.int64))
+    spins = np.empty((len(steps), count, LANES))
+    _compiled(model)(lanes, interval / steps, steps, spins)
+    found = np.empty((len(order), count))
+    found[order] = spins.transpose(0, 2, 1).reshape(-1, count)[: len(order)]
+    return found
+
+
+def in_lanes(rows: Array, needed: Array) -> tuple[Array, Array, Array]:
+    """Put cells that need about as many steps side by side.
+
+    Parameters
+    ----------
+    rows : quantities of the cells, shape (quantities, cells)
+    needed : steps that each cell needs, shape (cells,)
+
+    Returns
+    -------
+    The order of the cells; the most steps that one of a group needs, shape (groups,); and the groups, shape (groups,
+    quantities * LANES).
+    """
     order = np.argsort(needed, kind="stable")
     groups = -(-len(order) // LANES)
     # Idle lanes of the last group follow its last cell once more.
     filled = order[np.minimum(np.arange(groups * LANES), len(order) - 1)]
     steps = needed[filled].reshape(groups, LANES).max(axis=1)
-    rows = np.concatenate([stack(model.start(columns)), stack(tuple(model.constants.of(columns)))])[:, filled]
-    lanes = np.ascontiguousarray(rows.reshape(len(rows), groups, LANES).transpose(1, 0, 2)).reshape(groups, -1)
-    spins = np.empty((groups, count, LANES))
-    _compiled(model)(lanes, interval / steps, steps, spins)
-    found = np.empty((len(order), count))
-    found[order] = spins.transpose(0, 2, 1).reshape(-1, count)[: len(order)]
-    return found
+    lanes = rows[:, filled].reshape(len(rows), groups, LANES).transpose(1, 0, 2)
+    return order, steps, np.ascontiguousarray(lanes).reshape(groups, -1)
 
 
 @cache

@@ -206,6 +206,10 @@ class Shown:
     turned: Callable[[Columns], Array] = zeros
     """(columns) -> angle from the axes of the states to x and y, along which a trajectory shows vectors, of shape
     (cells,)."""
+    path: Callable[..., Any] | None = None
+    """Inline, (states, along, across, constants) -> (heading', along', across'), the rates at which a body turns about
+    the vertical and its contact point travels over the table (`sweep.models.attitude`); None for a model that has no
+    attitude.  The first two states are then u1 and u2."""
     spin_unit: Callable[[Columns], Array] = lambda columns: zeros(columns) + 1
     """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
     largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""

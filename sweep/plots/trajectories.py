@@ -39,6 +39,9 @@ _SHADES = (0.55, 1.0)
 _STILL = 0.01
 """Changes smaller than this share of a series' range are not worth a look."""
 
+_ENDLESS = ("heading", "table_x", "table_y")
+"""Series that go on where a body spins steadily."""
+
 _CRITICAL = {"n_c1": ":", "n_c2": "--"}
 """Styles of the critical spins, none of them that of a curve."""
 
@@ -165,11 +168,13 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
 def lively_until(dataset: xr.Dataset) -> float:
     """A quarter beyond the time of the last reversal, and of the last change of any series by a share of its range.
 
+    Heading and path, which no spin leaves alone, do not count.
+
     The end of the series if that is not much later.
     """
     at = dataset["time"].values
     last = float(dataset["t_last_reversal"].fillna(0.0).max()) if "t_last_reversal" in dataset else 0.0
-    for values in (v.values for v in dataset.data_vars.values() if "time" in v.dims):
+    for values in (v.values for name, v in dataset.data_vars.items() if "time" in v.dims and name not in _ENDLESS):
         if not (known := np.isfinite(values)).any():
             continue
         ends = np.take_along_axis(values, known.cumsum(axis=-1).argmax(axis=-1)[..., None], axis=-1)

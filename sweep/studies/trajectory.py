@@ -22,18 +22,21 @@ from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
 from sweep.engine.executor import STEP_SECONDS
-from sweep.engine.plan import plan
+from sweep.engine.plan import kernels, plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import threads
+from sweep.kernels import path
+from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.kernels.status import RUNNING, TIME_LIMIT
-from sweep.models.model import Columns, Model
+from sweep.models import attitude
+from sweep.models.model import Columns, Model, take
 from sweep.models.theory.linear import fastest_motion
 from sweep.results import dataset
 from sweep.results.provenance import provenance
@@ -67,6 +70,11 @@ SERIES: dict[str, tuple[str, str]] = {
     "ripple_free_spin": ("1", "spin without the ripple of the rattle, in sqrt(g/c)"),
     "contact_x": ("1", "contact point along x, in c"),
     "contact_y": ("1", "contact point along y, in c"),
+    "heading": ("radian", "angle by which the body has turned about the upward normal"),
+    "roll_angle": ("radian", "angle about the axis of a"),
+    "pitch_angle": ("radian", "angle about the axis of b, after roll"),
+    "table_x": ("1", "contact point on the table along x, where the heading is zero, in c"),
+    "table_y": ("1", "contact point on the table along y, to the left of x, in c"),
     "slip_1": ("1", "slip velocity v_p along the body's x, in sqrt(g c)"),
     "slip_2": ("1", "slip velocity v_p along the body's y, in sqrt(g c)"),
     "slip_rate_1": ("1", "time derivative of the slip velocity along x, in g"),
@@ -131,6 +139,7 @@ def trajectory(
 
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
     """`trajectory` of all cells of `chosen`."""
+    build(kernels(chosen), paths=True)
     job = plan(chosen)
     (part,), (grid,) = job.parts, job.grids
     kernel, images, columns = part.kernel, part.images, grid.columns()
@@ -292,6 +301,14 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Arr
     counts = np.diff(firsts, append=len(steps))
     stretches = np.array([marks[mark[i]][which[i]] for i in firsts])
     table, series = kernel.table(stretches), dict[str, Array]()
+    states = np.empty((len(kernel.model.states), len(which)))
+
+    def put(found: dict[str, Array], samples: Array) -> None:
+        for name, values in found.items():
+            if name not in series:
+                series[name] = np.full((len(ends), len(times)), np.nan)
+            series[name][which[samples], at[samples]] = values
+
     for i in range(counts.max()):
         active = np.flatnonzero(counts > i)
         samples = firsts[active] + i
@@ -299,11 +316,46 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Arr
         kernel.advance(stretches, active, _UNTIL_ALL_STOP, False)
         images = stretches[active]
         _go_on(kernel, images, times[at[samples]])
-        for name, values in _series(kernel, images, angles[which[samples]]).items():
-            if name not in series:
-                series[name] = np.full((len(ends), len(times)), np.nan)
-            series[name][which[samples], at[samples]] = values
+        states[:, samples] = kernel.states(images)
+        put(_series(kernel, images, angles[which[samples]]), samples)
+    if kernel.model.path:
+        put(_motion(kernel, ends, states, which, times[at], angles[which]), np.arange(len(which)))
     return series
+
+
+def _motion(kernel: Kernel, ends: Array, states: Array, which: Array, times: Array, angles: Array) -> dict[str, Array]:
+    """Attitude and path of all trajectories, at samples in the order of trajectories and of time.
+
+    Parameters
+    ----------
+    states : at the samples, shape (states, samples)
+    which, times, angles : trajectory and time of each sample, and that of `Model.turned`, each of shape (samples,)
+    """
+    before = np.flatnonzero(which[1:] == which[:-1])
+    constants, step = kernel.unpack(ends)[1], kernel.table(ends)["step"]
+    cells, gains = which[before], np.zeros((3, len(which)))
+    gains[:, before + 1] = path.stretches(
+        kernel.model, states[:, before], take(constants, cells), times[before + 1] - times[before], step[cells]
+    )
+    u1, u2 = states[:2]
+    first = np.flatnonzero(np.diff(which, prepend=-1))
+    lead = attitude.lead(u1, u2, angles)
+
+    def summed(gain: Array) -> Array:
+        total = np.cumsum(gain)
+        return np.asarray(total - total[first][which])
+
+    heading = summed(gains[0]) - lead[first][which]
+    cos, sin, (along, across) = np.cos(heading), np.sin(heading), gains[1:]
+    cos_t, sin_t = np.cos(angles), np.sin(angles)
+    roll, pitch = attitude.angles(u1 * cos_t + u2 * sin_t, u2 * cos_t - u1 * sin_t)
+    return {
+        "heading": heading + lead,
+        "roll_angle": roll,
+        "pitch_angle": pitch,
+        "table_x": summed(cos * along - sin * across),
+        "table_y": summed(sin * along + cos * across),
+    }
 
 
 def _go_on(kernel: Kernel, images: Array, times: Array) -> None:

@@ -39,13 +39,14 @@ def test_a_start_by_angles_has_no_spin_to_search(write: Write) -> None:
 
 def test_vectors_of_a_trajectory_are_along_the_same_axes_with_any_equations() -> None:
     """Those of the paper's model are along the axes of inertia; the general equations know those of the surface."""
-    turned = {"body": {"a": 10, "b": 3, "delta": 0.3}, "start": {"n0": 0.2, "x0": 0.3, "y0": -0.1}}
+    scene = {"body": {"a": 10, "b": 3, "delta": 0.3}, "start": {"n0": 0.2, "x0": 0.3, "y0": -0.1}}
     papers, general = (
-        sweep.trajectory(turned | {"friction": {"mu": 3} | couple}, t_end=20, every=0.5)
+        sweep.trajectory(scene | {"friction": {"mu": 3} | couple}, t_end=20, every=0.5)
         for couple in ({}, {"sigma": 1e-14})
     )
     assert float(general.contact_x[0, 0]) == pytest.approx(0.3)
-    for name in ("spin", "contact_x", "contact_y", "slip_1", "slip_2"):
+    turned = ("heading", "roll_angle", "pitch_angle", "table_x", "table_y")
+    for name in ("spin", "contact_x", "contact_y", "slip_1", "slip_2", *turned):
         assert np.abs(papers[name]).max() > 1e-3
         np.testing.assert_allclose(general[name], papers[name], rtol=0, atol=1e-8)
 

@@ -131,6 +131,34 @@ def follow(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) ->
     return np.asarray(solution.y)
 
 
+def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) -> Vector:
+    """Heading, roll and pitch, and the contact point on the table, shape (5, times).
+
+    By the matrix that turns the body and by its centre of mass: no angle is integrated, and no contact point.
+    """
+    n, (u, _) = len(y), _attitude(y, law)
+    across = _unit(np.cross(np.cross(u, [0, 1.0, 0]), u))
+    first = np.array([np.cross(u, across), -across, u])  # rows: X, Y and Z in the body's components
+
+    def slopes(_: float, z: Vector) -> Vector:
+        turn, (u, slip), omega = z[n:-3].reshape(3, 3), _attitude(z[:n], law), z[2:5]
+        velocity = turn @ (slip + np.cross(contact(u, p), omega))
+        return np.concatenate([derivative(z[:n], p, law)[0], (turn @ _cross(omega)).ravel(), velocity])
+
+    begin = np.concatenate([y, first.ravel(), -first @ contact(u, p)])
+    solution = solve_ivp(slopes, (0, times[-1]), begin, "DOP853", times, rtol=1e-13, atol=1e-15)
+    found = []
+    for z in solution.y.T:
+        turn = z[n:-3].reshape(3, 3)
+        place = z[-3:] + turn @ contact(_attitude(z[:n], law)[0], p)
+        assert abs(place[2]) < 1e-10
+        y_axis = turn[:, 1]
+        found.append(
+            [np.arctan2(y_axis[0], -y_axis[1]), -np.arcsin(y_axis[2]), np.arctan2(turn[2, 0], -turn[2, 2]), *place[:2]]
+        )
+    return np.vstack([np.unwrap([each[0] for each in found]), np.array(found).T[1:]])
+
+
 def inertia(p: Mapping[str, float]) -> Vector:
     if "Ixx" not in p:
         return np.diag([p["b"] ** 2 + p["c"] ** 2, p["a"] ** 2 + p["c"] ** 2, p["a"] ** 2 + p["b"] ** 2]) / 5

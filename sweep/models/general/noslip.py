@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any
 
 from sweep.jit import inline
+from sweep.models import attitude
 from sweep.models.general import rigid_body, starts
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay
@@ -73,4 +74,5 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         energy=energy,
         ripple=Ripple(ripples.NAMES, lambda columns: ripples.form(columns, surface), ripples.rolling),
         observe=partial(noslip.seen, contact, rhs),
+        path=attitude.of_rolling(contact),
     )  # fmt: skip

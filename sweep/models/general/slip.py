@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
+from sweep.models import attitude
 from sweep.models.general import rigid_body, starts
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
@@ -81,6 +82,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
         energy=rigid_body.energy_on(surface),
         ripple=Ripple(ripples.NAMES, lambda columns: ripples.form(columns, surface), ripples.slipping),
         observe=observe,
+        path=attitude.of_slipping(contact),
         faint="" if law.linear_to is None else "faint",
         extremes=(lambda columns: (columns,)) if law.linear_to is None else _with_and_without(law),
     )  # fmt: skip

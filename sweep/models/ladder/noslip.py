@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from sweep.jit import inline
-from sweep.models import ellipsoid
+from sweep.models import attitude, ellipsoid
 from sweep.models.ellipsoid import contact
 from sweep.models.model import COUNT, ENERGY, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple
 from sweep.models.theory.ripple import FORM, form, ripple
@@ -114,4 +114,5 @@ MODEL = Model(
     radians_a_step=0.022,
     ripple=Ripple((*FORM, "J1", "J2"), ripple_coefficients, _ripple),
     observe=partial(seen, contact, rhs),
+    path=attitude.of_rolling(contact),
 )

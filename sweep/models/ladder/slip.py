@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models import ellipsoid, model
+from sweep.models import attitude, ellipsoid, model
 from sweep.models.ellipsoid import contact
 from sweep.models.model import COUNT, ENERGY, FORMULAS, MODES, REVERSAL_TIME, SPIN, Array, Columns, Model, Ripple
 from sweep.models.theory.ripple import FORM, form, ripple
@@ -217,4 +217,5 @@ MODEL = Model(
     ripple=Ripple((*FORM, "J1", "J2", "c"), ripple_coefficients, _ripple),
     tilt=ellipsoid.tilt,
     observe=observe,
+    path=attitude.of_slipping(contact),
 )

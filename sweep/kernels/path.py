@@ -1,0 +1,86 @@
+"""Integrates how bodies turn and travel over the table, along trajectories that are known at some instants.
+
+From each state the motion goes on to the next instant in steps of dopri5 as long as those of the trajectory, with
+heading and path as further unknowns.  So both have the order of the trajectory, whose kernel knows nothing of them, and
+all stretches between two instants are stepped side by side.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import Cached, exactly_compiled, full_width, parallel
+from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.layout import LANES, Layout
+from sweep.kernels.runge_kutta import make_step
+from sweep.kernels.samples import in_lanes
+from sweep.kernels.tableau import DOPRI5
+from sweep.models.model import Array, Model
+
+_NAMES = ("heading", "along", "across")
+
+
+def stretches(model: Model, states: Array, constants: Any, interval: Array, step: Array) -> Array:
+    """What heading and path gain on stretches of trajectories of a model that has a `path`.
+
+    Parameters
+    ----------
+    states : at their beginnings, shape (states, stretches)
+    constants : of the model, each of shape (stretches,)
+    interval, step : their lengths, and the longest steps wanted, each of shape (stretches,)
+
+    Returns
+    -------
+    The angle turned, and the displacement of the contact point along the directions that X and Y get by the heading at
+    the end; shape (3, stretches).
+    """
+    rows = np.concatenate([states, np.zeros((len(_NAMES), len(interval))), [*constants], interval[None]])
+    order, steps, lanes = in_lanes(rows, np.ceil(interval / step).astype(np.int64))
+    compiled_path(model)(lanes, steps)
+    gained = lanes.reshape(len(steps), len(rows), LANES)[:, len(states) : len(states) + len(_NAMES)]
+    found = np.empty((len(_NAMES), len(order)))
+    found[:, order] = gained.transpose(1, 0, 2).reshape(len(_NAMES), -1)[:, : len(order)]
+    return found
+
+
+def compile_path(model: Model) -> None:
+    """Compile `stretches` for a model, or load it from disk."""
+    quantities = len(model.states) + len(_NAMES) + len(model.constants._fields) + 1
+    compiled_path(model)(np.empty((0, quantities * LANES)), np.empty(0, np.int64))
+
+
+@cache
+def compiled_path(model: Model) -> Cached:
+    """Compiled (lanes, steps) -> None: `stretches` for groups of lanes, in place."""
+    from numba import prange
+
+    n, moving = len(model.states), (*model.states, *_NAMES)
+    constants = tuple(f"constant.{name}" for name in model.constants._fields)
+    layout = Layout((*moving, *constants, "interval"))
+    load, load_constants = make_load(moving, layout), make_load(constants, layout, model.constants)
+    source = f"""def extended(z, p):
+    y = {tuple_of(f"z[{i}]" for i in range(n))}
+    slopes, extras = rhs(y, p)
+    turning, along, across = path(y, z[{n + 1}], z[{n + 2}], p)
+    return {tuple_of([*(f"slopes[{i}]" for i in range(n)), "turning", "along", "across"])}, extras"""
+    extended = compile_inline("extended", source, {"rhs": model.rhs, "path": model.path})
+    store, step = make_store(moving, layout), make_step(DOPRI5, extended, len(moving))
+    INTERVAL, wide, lanes = layout.at("interval"), full_width(), LANES
+
+    @exactly_compiled
+    def follow(group: Any, steps: int) -> None:
+        wide()
+        for _ in range(steps):
+            for lane in range(lanes):
+                z = load(group, lane)
+                new, _, _, _, _, _ = step(z, load_constants(group, lane), group[INTERVAL + lane] / steps)
+                store(group, lane, True, new, z)
+
+    def run(groups: Any, steps: Any) -> None:
+        for g in prange(len(groups)):
+            follow(groups[g], steps[g])
+
+    return parallel(run, f"path-{model.key}", *model.files)

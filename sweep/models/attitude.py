@@ -1,0 +1,70 @@
+"""How a body turns about the vertical and travels over the table.
+
+The axes of the table are X, Y and Z, upwards.  The body's own, x, y and z, downwards, come from (X, -Y, -Z) by turns of
+-heading about z, of roll about x and of pitch about y, each time about the axis where it is by then:
+
+    u = (cos(roll) sin(pitch), -sin(roll), -cos(roll) cos(pitch)).
+
+The heading, positive as the spin, is the one thing that u does not tell.  With h = sqrt(u1² + u3²) it obeys
+
+    heading' = (ω1 u1 + ω3 u3) / h²,
+
+from e_y' = ω × e_y for the body's y axis.  The contact point moves over the table at the velocity m = v_p + x_p',
+because it is at x_G + x_p and x_G' = v_p + x_p × ω.  Along the directions that X and Y get by the heading,
+
+    m_along = (u1 m3 - u3 m1) / h,   m_across = -m2 / h.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sweep.jit import inline
+from sweep.models.model import Array
+
+
+def of_rolling(contact: Any) -> Any:
+    """Make `Model.path` of the states (u1, u2, ω1, ω2, ω3) on a surface, of which `contact` tells the contact point."""
+
+    @inline
+    def path(y: Any, along: Any, across: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3 = y
+        (u3, _), _, _, moving = contact(u1, u2, w1, w2, w3, p)
+        return _rates(u1, u3, w1, w3, moving, along, across)
+
+    return path
+
+
+def of_slipping(contact: Any) -> Any:
+    """As `of_rolling`, of the states (u1, u2, ω1, ω2, ω3, v1, v2)."""
+
+    @inline
+    def path(y: Any, along: Any, across: Any, p: Any) -> Any:
+        u1, u2, w1, w2, w3, v1, v2 = y
+        (u3, inv_u3), _, _, (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
+        velocity = v1 + dx, v2 + dy, dz - (v1 * u1 + v2 * u2) * inv_u3
+        return _rates(u1, u3, w1, w3, velocity, along, across)
+
+    return path
+
+
+@inline
+def _rates(u1: Any, u3: Any, w1: Any, w3: Any, velocity: Any, along: Any, across: Any) -> Any:
+    m1, m2, m3 = velocity
+    square = u1 * u1 + u3 * u3
+    turning, h = (w1 * u1 + w3 * u3) / square, np.sqrt(square)
+    # The directions along and across turn with the heading.
+    return turning, (u1 * m3 - u3 * m1) / h + turning * across, -m2 / h - turning * along
+
+
+def angles(u1: Array, u2: Array) -> tuple[Array, Array]:
+    """Roll and pitch, shape as u1 and u2."""
+    return -np.arcsin(u2), np.arctan2(u1, np.sqrt(1 - u1**2 - u2**2))
+
+
+def lead(u1: Array, u2: Array, angle: Array) -> Array:
+    """The heading of axes that are turned by `angle` about z, less that of the axes of u1 and u2."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.asarray(-np.arctan2(sin * np.sqrt(1 - u1**2 - u2**2), cos * (1 - u2**2) + sin * u1 * u2))
