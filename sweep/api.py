@@ -21,19 +21,21 @@ if TYPE_CHECKING:
     from sweep.engine.reporter import Reporter
     from sweep.explorer.server import Beside
     from sweep.kernels.measures.misfit import Film
+    from sweep.plots.animation import animate
     from sweep.plots.picture import plot
     from sweep.results.store import StoreError
     from sweep.studies.predictions import predict
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "boundaries", "critical", "explore", "fit", "indices", "load_config", "open",
-    "plot", "predict", "run", "trajectory",
+    "Config", "ConfigError", "StoreError", "animate", "boundaries", "critical", "explore", "fit", "indices", "load_config",
+    "open", "plot", "predict", "run", "trajectory",
 ]  # fmt: skip
 
 _HOMES = {
     "Config": "sweep.config",
     "ConfigError": "sweep.config",
     "StoreError": "sweep.results.store",
+    "animate": "sweep.plots.animation",
     "load_config": "sweep.config",
     "plot": "sweep.plots.picture",
     "predict": "sweep.studies.predictions",

@@ -1,4 +1,4 @@
-"""The commands that simulate: `run`, `trajectory`, `boundaries`, `critical`, `indices` and `fit`."""
+"""The commands that simulate: `run`, `trajectory`, `animate`, `boundaries`, `critical`, `indices` and `fit`."""
 
 from __future__ import annotations
 
@@ -51,6 +51,10 @@ def _parameter_help() -> str:
 DRY_RUN = click.option(
     "--dry-run", is_flag=True, help="Print how much would be simulated, and about how long it takes; compute nothing."
 )
+AT = click.option(
+    "--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun_parameters,
+    help="A parameter of the cell, e.g. --at mu=60 --at b=3; given twice, it makes two runs.",
+)  # fmt: skip
 FRESH = click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")
 
 
@@ -94,8 +98,7 @@ def run(
 
 @click.command()
 @CONFIG
-@click.option("--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun_parameters,
-              help="A parameter of the cell, e.g. --at mu=60 --at b=3; given twice, it makes two runs.")  # fmt: skip
+@AT
 @click.option("--stop-when-settled", is_flag=True,
               help="End when neither spin nor count can change any more, as a sweep does, not at t_end.")  # fmt: skip
 @OUTPUT
@@ -136,6 +139,48 @@ def trajectory(
     files.save_result(result, plots.draw(result))
     if not quiet:
         say(f"wrote {files.dataset} and .png")
+
+
+@click.command()
+@CONFIG
+@AT
+@click.option("--from", "begin", type=float, default=0.0, show_default=True, help="Time at which the clip begins.")
+@click.option("--to", "end", type=float, help="Time at which it ends [default: some time after the first reversal].")
+@click.option("--speed", type=click.FloatRange(0, min_open=True),
+              help="Time shown in a second [default: such that the clip takes ten].")  # fmt: skip
+@click.option("--output", type=PATH, help="gif, mp4 or html to write [default: runs/NAME/NAME_trajectory.gif].")
+@SETTINGS
+@QUIET
+def animate(
+    config: Path, cells: tuple[str, ...], begin: float, end: float | None, speed: float | None, output: Path | None,
+    settings: tuple[str, ...], quiet: bool,
+) -> None:  # fmt: skip
+    """Show how single bodies of CONFIG turn, and their contact points' paths on the table.
+
+    Several stand side by side, in one clock, above their spins.  A page (html) opens without network; an mp4 needs
+    ffmpeg.
+    """
+    checked = loaded(config, settings)
+    at = cells_of(cells, checked.table)
+    from sweep.config import ConfigError
+    from sweep.plots import animation
+    from sweep.progress import Terminal
+    from sweep.studies.trajectory import trajectory as follow
+
+    target = output or Path("runs") / checked.name / f"{checked.name}_trajectory.gif"
+    interrupt.raise_again()
+    try:
+        animation.check(target)
+        with Terminal(quiet, _TIMES[checked.units]) as terminal, of_option("--at", checked.table):
+            result = follow(checked, reporter=terminal, **at)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        animation.animate(result, target, begin=begin, end=end, speed=speed)
+    except ValueError as error:
+        if isinstance(error, ConfigError):
+            raise
+        refuse("animate", str(error))
+    if not quiet:
+        say(f"wrote {target}")
 
 
 @click.command()

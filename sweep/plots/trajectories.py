@@ -70,7 +70,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
     figure = Picture(11, 4.2 + 1.9 * rows)
-    figure.head(dataset.attrs.get("title", ""), labels.constants(_constants_apart(dataset)))
+    figure.head(dataset.attrs.get("title", ""), labels.constants(constants_apart(dataset)))
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
@@ -121,9 +121,9 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
         one = dataset.isel(trajectory=i)
         for shade, name in zip(shades, names, strict=True):
             (line,) = axes.plot(one["time"], one[name], linewidth=0.8, color=f"C{i}", alpha=shade)
-            line.set(label=_label(dataset, i), gid=name, rasterized=one.sizes[one[name].dims[0]] > 5000)
+            line.set(label=label(dataset, i), gid=name, rasterized=one.sizes[one[name].dims[0]] > 5000)
         if i < _MOST_ENTRIES:
-            entries.append(Line2D([], [], color=f"C{i}", label=_label(dataset, i)))
+            entries.append(Line2D([], [], color=f"C{i}", label=label(dataset, i)))
     if (more := dataset.sizes["trajectory"] - _MOST_ENTRIES) > 0:
         entries.append(Line2D([], [], linestyle="none", label=f"and {more} more"))
     if len(names) > 1:
@@ -205,7 +205,7 @@ def reversal_times(one: xr.Dataset) -> Array:
     return np.asarray(ends[at] + tau * (0.5 + means[at] / (means[at] - means[at + 1])))
 
 
-def _label(dataset: xr.Dataset, i: int) -> str:
+def label(dataset: xr.Dataset, i: int) -> str:
     """The parameters that set this trajectory apart from the others, and its number of reversals."""
     varying = [name for name in parameters(dataset) if len(set(np.ravel(dataset[name].values))) > 1]
     names = varying or [name for name in ("n0", "omega3") if name in dataset]
@@ -217,7 +217,7 @@ def _with_unit(words: str, unit: str) -> str:
     return f"{words} ({unit})" if words and unit else words or unit
 
 
-def _constants_apart(dataset: xr.Dataset) -> xr.Dataset:
+def constants_apart(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the parameters that all trajectories share as scalar coordinates."""
     values = {name: set(np.ravel(dataset[name].values)) for name in parameters(dataset)}
     shared = {name: ((), found.pop(), dataset[name].attrs) for name, found in values.items() if len(found) == 1}

@@ -1,0 +1,88 @@
+"""Moving pictures of trajectories."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.animation import FFMpegWriter
+from PIL import Image
+from support.cli import invoke, refused
+
+from sweep.plots import animation
+
+
+def turning(bodies: int = 1, **given: float) -> xr.Dataset:
+    """Bodies that lean, turn and travel as `sweep.trajectory` tells it."""
+    time = np.linspace(0, 10, 101)
+    motion = {
+        "spin": 0.3 - 0.0601 * time, "ripple_free_spin": 0.3 - 0.0601 * time, "heading": 0.3 * time - 0.03 * time**2,
+        "roll_angle": 0.1 * np.cos(time), "pitch_angle": 0.2 * np.sin(time), "table_x": time, "table_y": -0.2 * time,
+    }  # fmt: skip
+    series = {name: (("trajectory", "time"), np.tile(values, (bodies, 1))) for name, values in motion.items()}
+    body = {"a": 4.0, "b": 2.0, "c": 1.0, "delta": 0.2, "n0": 0.3} | given
+    constants = {name: ("trajectory", np.full(bodies, value)) for name, value in body.items()}
+    return xr.Dataset(
+        {**series, **constants}, {"time": time}, {"surface": "paraboloid"} if "paraboloid" in given else {}
+    )
+
+
+@pytest.mark.parametrize("given", [{}, {"offset": 0.3}, {"paraboloid": 1, "a": 0.1, "b": 0.3}], ids=str)
+def test_the_lowest_point_of_the_body_is_where_it_touches_the_table(given: dict[str, float]) -> None:
+    scene = animation._Scene(turning(**given), np.array([0.0, 3.0, 7.0]))
+    (body,) = scene.bodies
+    for frame, time in enumerate(scene.times):
+        points = np.einsum("ij,jkl->ikl", body.turns[frame], body.points - body.contacts[frame][:, None, None])
+        assert -1e-12 < points[2].min() < 0.06  # the points are apart
+        at = points[:2].reshape(2, -1)[:, points[2].argmin()]
+        assert np.abs(at).max() < 1.0
+        assert body.path[:, frame] == pytest.approx([time, -0.2 * time])
+
+
+def test_a_body_turns_by_its_heading() -> None:
+    upright = animation._rotation(0.5, 0, 0)
+    np.testing.assert_allclose(upright[:, 0], [np.cos(0.5), np.sin(0.5), 0], atol=1e-15)
+    np.testing.assert_allclose(upright[:, 2], [0, 0, -1], atol=1e-15)
+    up = [np.cos(0.1) * np.sin(0.2), -np.sin(0.1), -np.cos(0.1) * np.cos(0.2)]
+    np.testing.assert_allclose(animation._rotation(0.5, 0.1, 0.2)[2], up)
+
+
+def test_a_clip_lasts_as_asked_and_moves(tmp_path: Path) -> None:
+    animation.animate(turning(2), tmp_path / "clip.gif", begin=2, end=4, speed=10)
+    with Image.open(tmp_path / "clip.gif") as clip:
+        assert (clip.n_frames, clip.info["duration"]) == (5, 50)
+        frames = []
+        for i in range(5):
+            clip.seek(i)
+            frames.append(np.asarray(clip.convert("L"), float))
+    assert np.abs(frames[0] - frames[-1]).max() > 50
+
+
+def test_the_first_reversal_fills_the_clip() -> None:
+    """The spins vanish near t = 5."""
+    assert animation._until(turning(2).assign_attrs(model_brings="a model")) == pytest.approx(6.5, rel=3e-3)
+
+
+def test_a_page_asks_nothing_of_the_network(tmp_path: Path) -> None:
+    animation.animate(turning(), tmp_path / "clip.html", end=1, speed=10)
+    page = (tmp_path / "clip.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64") == 3
+    assert not re.search(r"https?://|fa-", page.split("data:image")[0])
+
+
+def test_what_cannot_be_shown_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="no attitude"):
+        animation.animate(turning().drop_vars("heading"))
+    with pytest.raises(ValueError, match="at most 6"):
+        animation.animate(turning(7))
+    with pytest.raises(ValueError, match="nothing lies between"):
+        animation.animate(turning(), begin=11)
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    with pytest.raises(ValueError, match="ffmpeg, which is not installed"):
+        animation.animate(turning(), tmp_path / "clip.mp4")
+    with pytest.raises(ValueError, match="unknown format"):
+        animation.animate(turning(), tmp_path / "clip.avi")
+    refused(invoke("animate", "configs/mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")
