@@ -10,9 +10,15 @@ from sweep.api import __all__ as __all__
 TYPE_CHECKING = False  # True for type checkers; `typing` is not imported before Ctrl-C is taken care of
 if TYPE_CHECKING:
     from sweep.api import *  # noqa: F403
+
+    __version__: str
 else:
 
     def __getattr__(name: str) -> object:
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("rattleback-sweep")
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         from sweep import api

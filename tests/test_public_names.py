@@ -6,7 +6,9 @@ import ast
 import importlib
 import inspect
 import re
+import tomllib
 import types
+from pathlib import Path
 
 import pytest
 
@@ -31,3 +33,8 @@ def test_every_public_name_is_documented_in_the_source(name: str) -> None:
     if isinstance(node, ast.FunctionDef):
         taken = [*node.args.args, *node.args.kwonlyargs, *filter(None, [node.args.kwarg])]
         assert [each.arg for each in taken if not re.search(rf"^(\w+, )*{each.arg}\b.* : ", said, re.MULTILINE)] == []
+
+
+def test_the_version_is_the_one_that_datasets_tell() -> None:
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert sweep.__version__ == project["version"]
