@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from sweep.studies.predictions import predict
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "animate", "boundaries", "critical", "explore", "fit", "indices", "load_config",
-    "open", "plot", "predict", "run", "trajectory",
+    "Config", "ConfigError", "StoreError", "animate", "boundaries", "critical", "explore", "fit", "indices",
+    "load_config", "open", "plot", "predict", "run", "trajectory",
 ]  # fmt: skip
 
 _HOMES = {

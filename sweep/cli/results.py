@@ -27,6 +27,9 @@ if TYPE_CHECKING:
               help="Draw only the cells nearest to this value of a parameter, e.g. n0=0.05 (repeatable).")  # fmt: skip
 @click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
 @click.option("--cmap", metavar="NAME", help="A colour map of matplotlib, such as viridis.")
+@click.option("--width", metavar="LENGTH",
+              help="Width of a figure for print, such as 85mm, with text of 6 points or more.")  # fmt: skip
+@click.option("--no-title", is_flag=True, help="Draw no title.")
 @click.option(
     "--output",
     type=PATH,
@@ -34,7 +37,7 @@ if TYPE_CHECKING:
 )
 def plot(
     files: tuple[Path, ...], variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...],
-    limits: str | None, cmap: str | None, output: Path | None,
+    limits: str | None, cmap: str | None, width: str | None, no_title: bool, output: Path | None,
 ) -> None:  # fmt: skip
     """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries.
 
@@ -50,7 +53,10 @@ def plot(
     if formats.suffix(target) == formats.PAGE:
         if len(files) > 1:
             refuse(f"--output {target}", f"a page shows one dataset; write a {formats.A_PICTURE} of several")
-        _plot_page(files[0], target, variable, x, y, sel, limits, cmap)
+        for option, value in (("--limits", limits), ("--cmap", cmap), ("--width", width)):
+            if value is not None:
+                refuse(option, f"not for a page; write a {formats.A_PICTURE}")
+        _plot_page(files[0], target, variable, x, y, sel)
         return
     if formats.suffix(target) not in formats.PICTURES:
         refuse(f"--output {target}", f"unknown format; write a {formats.ANY}")
@@ -60,7 +66,10 @@ def plot(
             for name, taken in panels.nearest(dataset, sel).items():
                 say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
     with about(files[0]):
-        picture.plot(datasets, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, output=target)
+        picture.plot(
+            datasets, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, width=width, title=not no_title,
+            output=target,
+        )  # fmt: skip
     say(f"wrote {target}")
 
 
@@ -100,15 +109,11 @@ def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -
 
 
 def _plot_page(
-    file: Path, target: Path, variable: str | None, x: str | None, y: str | None, sel: dict[str, float],
-    limits: str | None, cmap: str | None,
+    file: Path, target: Path, variable: str | None, x: str | None, y: str | None, sel: dict[str, float]
 ) -> None:  # fmt: skip
     """Draw a map as a page of its own."""
     with needs_bokeh("--output"):
         from sweep.explorer.page import save_html
-    for option, value in (("--limits", limits), ("--cmap", cmap)):
-        if value is not None:
-            refuse(option, f"not for a page; write a {formats.A_PICTURE}")
     with about(file):
         save_html(opened(file), target, variable, x, y, sel)
     say(f"wrote {target}")

@@ -127,7 +127,7 @@ def trajectory(
         with of_option("--at", checked.table):
             click.echo(estimate(checked, at))
         return
-    from sweep.plots import trajectories as plots
+    from sweep.plots import picture
     from sweep.progress import Terminal
     from sweep.results.folder import RunFiles
     from sweep.studies.trajectory import trajectory as follow
@@ -136,7 +136,7 @@ def trajectory(
     with Terminal(quiet, _TIMES[checked.units]) as terminal, of_option("--at", checked.table):
         result = follow(checked, stop_when_settled=stop_when_settled, reporter=terminal, **at)
     files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
-    files.save_result(result, plots.draw(result))
+    files.save_result(result, picture.plot(result))
     if not quiet:
         say(f"wrote {files.dataset} and .png")
 
@@ -273,7 +273,7 @@ def fit(
     and NAME_fit.yaml, which runs the fitted body; with --laws, NAME_laws.nc, .png and .yaml, that of the best law.
     """
     checked = loaded(config, settings)
-    from sweep.plots import fit as plots
+    from sweep.plots import picture
     from sweep.progress import Terminal
     from sweep.results.folder import RunFiles
     from sweep.results.summary import describe
@@ -288,7 +288,7 @@ def fit(
             if laws else find(checked, film, names, terminal)
         )  # fmt: skip
     files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_{'laws' if laws else 'fit'}")
-    files.save_result(result, plots.draw(result))
+    files.save_result(result, picture.plot(result))
     files.configuration.write_text(result.attrs["config"], encoding="utf-8")
     if not quiet:
         say(f"{describe(result)}\nwrote {files.dataset}, .png and .yaml")

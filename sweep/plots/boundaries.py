@@ -6,29 +6,29 @@ from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, lines, scales
-from sweep.plots.figure import RATIO, Picture, arrangement, set_scale
+from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
 from sweep.plots.panels import MAX_PANELS
 from sweep.plots.theory import Line
 from sweep.results.margins import OPEN, smoothed
 
 
-def draw(dataset: xr.Dataset) -> Figure:
+def draw(dataset: xr.Dataset) -> Picture:
     """The curves of a dataset of `sweep boundaries`, each with the count that begins on it, and their open points."""
     x, y = dataset.attrs["x"], dataset.attrs["y"]
     panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [("no count changes between the cells", dataset)]
     rows, columns = arrangement(len(panels), 1)
-    figure = Picture(5.2 * columns + 0.6, 1.2 + 5.2 * RATIO * rows)
+    width = panel_width(columns, 5.2, 0.6)
+    figure = Picture(width * columns + 0.6, 1.2 + width * RATIO * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     scale = scales.counts(dataset["level"].values if dataset.sizes["point"] else np.zeros(1, int), None, None)
     for k, (words, part) in enumerate(panels):
         axes = figure.add_subplot(rows, columns, k + 1)
-        axes.set_title(words, fontsize=9)
+        axes.set_title(words)
         set_scale(axes, "x", _axis(dataset, x).values)
         set_scale(axes, "y", _axis(dataset, y).values)
         drawn = list(curves(part, x, y))
@@ -38,7 +38,6 @@ def draw(dataset: xr.Dataset) -> Figure:
         lines.number(axes, each, _axis(dataset, x), _axis(dataset, y))
         open_ = part.isel(point=(part["outcome"] == OPEN).values)
         axes.plot(open_[x], open_[y], linestyle="none", marker="o", markersize=3, color="none", markeredgecolor="0.3")
-        axes.tick_params(labelsize=8)
         axes.set(xlabel=labels.label(dataset, x), ylabel=labels.label(dataset, y))
         axes.set(xlim=dataset[x].attrs["actual_range"], ylim=dataset[y].attrs["actual_range"])
     count = int((dataset["outcome"] == OPEN).sum())

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sweep.plots import labels, theory
 from sweep.plots.description import along
-from sweep.plots.figure import framed, set_scale
+from sweep.plots.figure import Picture, framed, set_scale
 from sweep.plots.lines import in_maths
 from sweep.plots.panels import MAX_PANELS, indices
 
@@ -26,7 +25,7 @@ _SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
 """Where a critical spin comes from, and how that is drawn."""
 
 
-def draw(dataset: xr.Dataset) -> Figure:
+def draw(dataset: xr.Dataset) -> Picture:
     """Critical spins by formula, eigenvalues and simulation, over the longest axis."""
     dims = sorted(map(str, dataset["critical_reason"].dims), key=lambda d: -dataset.sizes[d])
     x = dims[0] if dims else ""
@@ -42,7 +41,7 @@ def draw(dataset: xr.Dataset) -> Figure:
         for variable in filter(chosen.__contains__, styles):
             axes.plot(at, np.atleast_1d(chosen[variable].values), gid=variable, **styles[variable])
         axes.axhline(0, color="black", linewidth=0.5)
-        axes.set_ylabel(f"spin n ({labels.unit(dataset, 'n_c2_plus_simulated')})", fontsize=9)
+        axes.set_ylabel(f"spin n ({labels.unit(dataset, 'n_c2_plus_simulated')})")
     names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()}
     sources = [drawn for suffix, drawn in _SOURCES.items() if {f"n_c1_plus{suffix}", f"n_c2_plus{suffix}"} & {*dataset}]
     figure.explain([

@@ -8,14 +8,13 @@ import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
 from sweep.plots import labels, lines, theory
 from sweep.plots.description import describe
-from sweep.plots.figure import framed, set_scale
+from sweep.plots.figure import BESIDE, Picture, framed, set_scale
 from sweep.plots.marks import BLANK, legend
 from sweep.plots.panels import Panels
 from sweep.plots.quantities import COMPARISONS, PREDICTIONS
@@ -35,24 +34,36 @@ _STYLES: dict[str, dict[str, Any]] = {
 """Markers of variables, and of the kinds of cell, drawn around those of the first variable."""
 
 
-def draw(panels: Panels, limits: Limits | None = None) -> Figure:
+def draw(panels: Panels, limits: Limits | None = None) -> Picture:
     """The variables over the one long axis, in a panel for each value of the others."""
-    dataset, names = panels.dataset, [name for name in panels.names if name not in COMPARISONS] or panels.names
-    names = names[:1] + [name for name in names[1:] if dataset[name].notnull().any()]
-    x = panels.across[0] if panels.across else ""
+    dataset, x = panels.dataset, panels.across[0] if panels.across else ""
     figure, frames = framed(dataset, panels.each, x, 7.0, 1.9, 2.6)
+    figure.explain(_curves(panels, frames, limits))
+    return figure
+
+
+def draw_in(axes: Axes, panels: Panels, limits: Limits | None = None) -> None:
+    """Draw the same into these axes."""
+    _curves(panels, [(axes, panels.dataset.isel(panels.each[0]))], limits)
+    axes.set_xlabel(labels.label(panels.dataset, panels.across[0]) if panels.across else "")
+
+
+def _curves(panels: Panels, frames: list[tuple[Axes, xr.Dataset]], limits: Limits | None) -> list[Artist]:
+    """Draw each panel into its axes; returns the entries for the legend."""
+    dataset, x = panels.dataset, panels.across[0] if panels.across else ""
+    names = [name for name in panels.names if name not in COMPARISONS] or panels.names
+    names = names[:1] + [name for name in names[1:] if dataset[name].notnull().any()]
     entries: dict[str, Artist] = {}
     for axes, chosen in frames:
         entries |= _panel(axes, chosen, names, x)
         counts = len(names) > 1 and names[0] == "reversals"
-        axes.set_ylabel("spin reversals" if counts else labels.label(dataset, names[0]), fontsize=9)
+        axes.set_ylabel("spin reversals" if counts else labels.label(dataset, names[0]))
         if limits:
             axes.set_ylim(limits)
     words = legend(dataset, names[0])
     for name, entry in entries.items():
         entry.set_label(words.get(name, entry.get_label()))
-    figure.explain(list(entries.values()))
-    return figure
+    return list(entries.values())
 
 
 def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str) -> dict[str, Artist]:
@@ -90,11 +101,12 @@ def _points(axes: Axes, at: Array, values: Array, style: dict[str, Any], label: 
 
 def _form_factor(axes: Axes, chosen: xr.Dataset) -> Line2D:
     twin = axes.twinx()
+    twin.set_label(BESIDE)
     (line,) = twin.plot(
         chosen["b"], chosen["form_factor"], color="0.5", linewidth=1, label="form factor L(f), right axis"
     )
-    twin.set_ylabel("L(f)", color="0.4", fontsize=9)
-    twin.tick_params(labelsize=8, colors="0.4")
+    twin.set_ylabel("L(f)", color="0.4")
+    twin.tick_params(colors="0.4")
     twin.set_ylim(bottom=0)
     axes.set_ylim(bottom=0)
     return line

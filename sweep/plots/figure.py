@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from io import BytesIO
 from math import log
-from typing import Literal
+from string import ascii_lowercase
+from textwrap import fill
+from typing import Any, Literal
 
+import matplotlib as mpl
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -18,25 +22,74 @@ from sweep.grid import Array
 from sweep.plots import labels
 from sweep.plots.panels import Panel, in_lines, title
 
-PAGE = 14.0
-"""Inches of a page across."""
+TEXT = 9.0
+"""Points of the text beside which the inches here are told: with smaller text all of a figure is smaller."""
 
 RATIO = 0.78
 """Height of a map relative to its width."""
 
-_LETTER, _HANDLE = 0.062, 0.75
-"""Inches that a letter, and the rest of an entry, take in a legend."""
+_WIDE, _HIGH = 15.2, 7.6
+"""Inches of a page that no user has asked for, across and upwards."""
+
+BESIDE = "beside"
+"""Label of axes that are no panel: bars, and second axes of a panel."""
+
+_STYLE: dict[Any, Any] = {
+    "font.size": TEXT, "axes.titlesize": "medium", "xtick.labelsize": "small", "ytick.labelsize": "small",
+    "legend.fontsize": "small", "legend.title_fontsize": "small", "hatch.linewidth": 0.7,
+    "figure.dpi": 110, "pdf.fonttype": 42, "ps.fonttype": 42, "svg.hashsalt": "sweep",
+}  # fmt: skip
+"""Settings of matplotlib, where the user has none of his own."""
+
+_PRINT: dict[Any, Any] = {"font.size": 7.5, "figure.dpi": 300}
+"""What figures for print have in their place: no text is smaller than 6 points."""
+
+_LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.75, 0.17, 4
+"""Inches that a letter, the rest of an entry and a line take in a legend, and lines for which figures have room."""
+
+_OF_TITLE = 0.09
+"""Inches of a letter of a title, at most."""
+
+_LEAST = 2.1
+"""Inches of a map across, at least."""
+
+
+def style(width: float | None = None) -> dict[Any, Any]:
+    """The settings of matplotlib for a figure: ours, except where the user has changed matplotlib's.
+
+    Parameters
+    ----------
+    width : inches of a figure for print; by default as the user has set it, or of a screen
+    """
+    ours = _STYLE | (_PRINT if width else {})
+    found = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
+    return found | ({"figure.figsize": [width, width / 2]} if width else {})
 
 
 class Picture(Figure):
     """A figure that is shown as the value of a notebook's cell, also where pyplot has drawn nothing yet.
 
-    Before that, IPython has no way to show a figure of matplotlib, and prints its name.
+    Before that, IPython has no way to show a figure of matplotlib, and prints its name.  It keeps the style in which it
+    was made: matplotlib makes ticks and looks up fonts only when it draws.
+
+    Parameters
+    ----------
+    width, height : in inches beside a text of `TEXT` points
     """
 
     def __init__(self, width: float, height: float) -> None:
-        super().__init__((width, height), dpi=110, layout="constrained")
-        self._constants = ""
+        scale = mpl.rcParams["font.size"] / TEXT
+        super().__init__((width * scale, height * scale), layout="constrained")
+        self._constants, self._width, self._height = "", width, height
+        self._style: dict[Any, Any] = {name: mpl.rcParams[name] for name in _STYLE}
+
+    def draw(self, renderer: RendererBase) -> None:
+        with mpl.rc_context(self._style):
+            super().draw(renderer)
+
+    def savefig(self, *args: Any, **kwargs: Any) -> None:
+        with mpl.rc_context(self._style):
+            super().savefig(*args, **kwargs)
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()
@@ -45,20 +98,57 @@ class Picture(Figure):
 
     def head(self, title: str, constants: str) -> None:
         """A title, and the constant parameters, which stand over the legend."""
-        self._constants = in_lines(constants, self.get_figwidth())
+        self._constants = in_lines(constants, self._width)
         if title:
-            self.suptitle(title, fontsize=10)
+            self.suptitle(fill(title, int(self._width / _OF_TITLE)))
 
     def explain(self, handles: Sequence[Artist]) -> None:
         """A legend below the figure, never over its data, in as many columns as fit; over it the constants."""
         if not handles and not self._constants:
             return
-        longest = max((len(str(handle.get_label())) for handle in handles), default=0)
-        columns = max(1, int(self.get_figwidth() / (longest * _LETTER + _HANDLE)))
+        room = int((self._width - _HANDLE) / _LETTER)
+        words = [fill(str(handle.get_label()), room, break_long_words=False) for handle in handles]
+        longest = max((len(line) for each in words for line in each.split("\n")), default=0)
+        columns = min(max(1, int(self._width / (longest * _LETTER + _HANDLE))), max(len(words), 1))
         self.legend(
-            handles=list(handles), loc="outside lower center", fontsize=8, frameon=False, handlelength=3,
-            ncols=min(columns, max(len(handles), 1)), title=self._constants or None, title_fontsize=8,
+            list(handles), words, loc="outside lower center", frameon=False, handlelength=3,
+            ncols=columns, title=self._constants or None,
         )  # fmt: skip
+        lines = sum(each.count("\n") + 1 for each in words) / columns + self._constants.count("\n") + 1
+        more = max(0, lines - _LINES) * _LINE
+        self.set_figheight(self.get_figheight() * (1 + more / self._height))
+
+    def letter(self) -> None:
+        """Letters a, b, c at the panels, if there are several."""
+        panels = [axes for axes in self.axes if axes.get_label() != BESIDE]
+        for letter, axes in zip(ascii_lowercase, panels if len(panels) > 1 else [], strict=False):
+            axes.annotate(letter, (0, 1), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points",
+                          ha="right", va="bottom", weight="bold")  # fmt: skip
+
+
+def page() -> float:
+    """Inches of a page across, beside a text of `TEXT` points: as the user wants it, or of a screen."""
+    return float(mpl.rcParams["figure.figsize"][0] * TEXT / mpl.rcParams["font.size"]) if _is_asked() else _WIDE
+
+
+def _is_asked() -> bool:
+    return bool(mpl.rcParams["figure.figsize"] != mpl.rcParamsDefault["figure.figsize"])
+
+
+def fits(maps: int) -> bool:
+    """Tell whether so many maps can stand side by side."""
+    return page() >= maps * _LEAST
+
+
+def panel_width(columns: int, widest: float, around: float) -> float:
+    """Inches of each of so many panels side by side: they fill a page that is asked for, and else are not too wide.
+
+    Parameters
+    ----------
+    around : inches across of what stands around the panels
+    """
+    width = (page() - around) / columns
+    return width if _is_asked() else min(width, widest)
 
 
 def framed(
@@ -72,27 +162,30 @@ def framed(
     above : inches for what stands around the panels
     """
     rows, columns = arrangement(len(panels), 2)
-    figure = Picture(min(width * columns, PAGE), above + height * rows)
+    figure = Picture(panel_width(columns, width, 0) * columns, above + height * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
         lowest = k + columns >= len(panels)
-        axes.set_title(title(dataset, panel), fontsize=9)
-        axes.tick_params(labelsize=8, labelbottom=lowest)
+        axes.set_title(title(dataset, panel))
+        axes.tick_params(labelbottom=lowest)
         if lowest and x:
-            axes.set_xlabel(labels.label(dataset, x), fontsize=9)
+            axes.set_xlabel(labels.label(dataset, x))
     for axes in grid[len(panels) :]:
         axes.remove()
     return figure, [(axes, dataset.isel(panel)) for axes, panel in zip(grid, panels, strict=False)]
 
 
 def arrangement(panels: int, maps: int) -> tuple[int, int]:
-    """Rows of the page, and panels side by side in each, for so many panels of so many maps: shaped as a screen."""
+    """Rows of the page, and panels side by side in each, for so many panels of so many maps.
+
+    The page is shaped as a screen; a narrow one is as high.
+    """
 
     def misshapen(groups: int) -> float:
-        return abs(log(groups * maps / (-(-panels // groups) * RATIO) / 2))
+        return abs(log(groups * maps / (-(-panels // groups) * RATIO) / (page() / _HIGH)))
 
-    groups = min(range(1, panels + 1), key=misshapen)
+    groups = min((n for n in range(1, panels + 1) if n == 1 or fits(n * maps)), key=misshapen)
     return -(-panels // groups), groups
 
 

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import xarray as xr
-from matplotlib.figure import Figure
 
 from sweep.plots import labels
-from sweep.plots.figure import Picture
+from sweep.plots.figure import Picture, page, panel_width
+
+_VALUES = 3.2
+"""Inches that the values take across."""
 
 
-def draw(dataset: xr.Dataset) -> Figure:
+def draw(dataset: xr.Dataset) -> Picture:
     """The film and the fit, or those of several laws, over time; below the residuals, beside the values or weights."""
-    figure = Picture(11, 6)
-    figure.suptitle(dataset.attrs["title"], fontsize=10)
+    figure = Picture(panel_width(1, 11, 0), 6)
+    figure.head(dataset.attrs["title"], "")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     time, seen = dataset["time"].values, dataset["seen"].values
     above.plot(time, seen, ".", color="0.6", markersize=3, label="film", gid="seen")
@@ -22,15 +26,14 @@ def draw(dataset: xr.Dataset) -> Figure:
         above.plot(time, fitted, color=f"C{i}", linewidth=1, label=name, gid=f"fitted {name}")
         below.plot(time, seen - fitted, ".", color=colour, markersize=2, gid=f"residuals {name}")
     above.axhline(0, color="black", linewidth=0.5)
-    above.set_ylabel(labels.label(dataset, "seen"), fontsize=9)
+    above.set_ylabel(labels.label(dataset, "seen"))
     below.axhline(0, color="black", linewidth=0.5)
-    below.set_ylabel("film - fit", fontsize=9)
-    below.set_xlabel(labels.label(dataset, "time"), fontsize=9)
-    for axes in (above, below):
-        axes.tick_params(labelsize=8)
+    below.set_ylabel("film - fit")
+    below.set_xlabel(labels.label(dataset, "time"))
     words = [_of_law(name, one) for name, one in laws] or _values(dataset)
-    above.legend(title="\n".join(words), fontsize=8, title_fontsize=8, loc="center left",
-                 bbox_to_anchor=(1.01, 0.5), frameon=False, alignment="left")  # fmt: skip
+    where: Any = "outside right center" if page() > 2 * _VALUES else "outside lower center"
+    figure.legend(handles=above.get_lines()[: 1 + max(len(laws), 1)], title="\n".join(words), loc=where, frameon=False,
+                  alignment="left")  # fmt: skip
     return figure
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-PICTURES = ("png", "pdf", "svg")
+PICTURES = ("png", "pdf", "svg", "eps")
 PAGE = "html"
 """A map as a page of its own, from the command alone; the explorer writes it."""
 
-A_PICTURE, ANY = "png, pdf or svg", "png, pdf, svg or html"
+A_PICTURE, ANY = "png, pdf, svg or eps", "png, pdf, svg, eps or html"
 """The same in words."""
 
 

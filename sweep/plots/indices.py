@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from sweep.plots import labels
-from sweep.plots.figure import Picture
+from sweep.plots.figure import Picture, arrangement, page, panel_width
 
 _ORDERS = {"first_order": "the parameter alone", "total_order": "with all that it shares with others"}
 
 
-def draw(dataset: xr.Dataset) -> Figure:
+def draw(dataset: xr.Dataset) -> Picture:
     """A panel for each quantity: how much of its variance comes from each parameter."""
     quantities = dataset["quantity"].values
-    figure = Picture(3.2 * len(quantities) + 1, 3.6)
+    rows, columns = arrangement(len(quantities), 1) if page() < 3.2 * len(quantities) else (1, len(quantities))
+    figure = Picture(panel_width(columns, 3.2, 1) * columns + 1, 1 + 2.6 * rows)
     figure.head(dataset.attrs["title"], "")
-    grid = figure.subplots(1, len(quantities), squeeze=False, sharey=True).ravel()
+    grid = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    for axes in grid[len(quantities) :]:
+        axes.remove()
     places = np.arange(dataset.sizes["parameter"])
-    for axes, quantity in zip(grid, quantities, strict=True):
+    for axes, quantity in zip(grid, quantities, strict=False):
         one = dataset.sel(quantity=quantity)
         for k, (order, words) in enumerate(_ORDERS.items()):
             index, low, high = (one[f"{order}{end}"].values for end in ("", "_low", "_high"))
@@ -28,9 +30,8 @@ def draw(dataset: xr.Dataset) -> Figure:
                 yerr=np.maximum([index - low, high - index], 0), error_kw={"elinewidth": 1, "capsize": 3},
             )  # fmt: skip
         axes.set_xticks(places, [labels.symbol(name) for name in one["parameter"].values])
-        axes.set_title(labels.short(quantity), fontsize=9)
-        axes.tick_params(labelsize=8)
+        axes.set_title(labels.short(quantity))
         axes.grid(axis="y", alpha=0.3)
-    grid[0].set_ylabel("share of the variance", fontsize=9)
+    grid[0].set_ylabel("share of the variance")
     figure.explain(grid[0].get_legend_handles_labels()[0])
     return figure

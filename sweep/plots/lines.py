@@ -49,7 +49,7 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
 def number(axes: Axes, drawn: Iterable[Line], x: Axis, y: Axis) -> None:
     """Write the counts that begin on boundaries into the lines themselves."""
     for at_x, at_y, count in levels.numbers(drawn, x, y):
-        axes.annotate(count, (at_x, at_y), fontsize=7, ha="center", va="center", path_effects=_halo(2))
+        axes.annotate(count, (at_x, at_y), size="small", ha="center", va="center", path_effects=_halo(2))
 
 
 def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
@@ -96,4 +96,4 @@ def _label(axes: Axes, shown: Map, line: Line) -> None:
         if shown.x.name != "n0":
             outwards = 1 if place_on_map.transform(at)[0] < 0.5 else -1
         place = {"xytext": (4 * outwards, 0), "ha": "left" if outwards > 0 else "right", "va": "center"}
-    axes.annotate(in_maths(line.symbol), at, textcoords="offset points", fontsize=9, path_effects=_halo(2), **place)
+    axes.annotate(in_maths(line.symbol), at, textcoords="offset points", path_effects=_halo(2), **place)

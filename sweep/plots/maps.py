@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colorbar import Colorbar
-from matplotlib.figure import Figure
+from matplotlib.colorbar import Colorbar, make_axes
 from matplotlib.patches import Patch
 
 from sweep.axis import Axis
 from sweep.plots import hatches, labels, lines
 from sweep.plots.description import Map, common_scale, describe
-from sweep.plots.figure import PAGE, RATIO, Picture, arrangement, set_scale
+from sweep.plots.figure import BESIDE, RATIO, Picture, arrangement, fits, panel_width, set_scale
 from sweep.plots.marks import legend, of_all
 from sweep.plots.panels import MAX_PANELS, Panel, Panels, title
 from sweep.plots.quantities import COMPARISONS
@@ -32,8 +32,11 @@ _WIDEST = 4.4
 _BAR = 0.05
 """Width of a bar relative to a map."""
 
-_SMALL = 4
-"""Maps beside each other beyond which they are too small for symbols at lines."""
+_SMALL = 2.5
+"""Inches of a map across below which it is too small for symbols at lines."""
+
+_AROUND = 1.2
+"""Inches across of what stands around maps."""
 
 _OF_DIFFERENCES = ("failed", "not_run", "impossible", "time_limit")
 """Kinds of cell marked on maps of differences too; the map of the simulated counts beside it has all."""
@@ -49,37 +52,52 @@ _TITLES = {
 """What a map beside others is called, and a small one."""
 
 
-def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Figure:
+def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Picture:
     """A map of each variable over two axes, side by side, and such a row for each value of the other axes."""
     dataset, names = panels.dataset, panels.names
-    rows, groups = arrangement(len(panels.each), len(names))
-    columns = groups * len(names)
-    width, small = min(PAGE / columns, _WIDEST), columns > _SMALL
-    figure = Picture(width * columns + 1.2, 1.6 + width * RATIO * rows)
+    together = [names] if fits(len(names)) else [[name] for name in names]
+    groups = list(product(range(len(panels.each)), together))
+    rows, across = arrangement(len(groups), len(together[0]))
+    columns = across * len(together[0])
+    width = panel_width(columns, _WIDEST, _AROUND)
+    small = width < _SMALL
+    figure = Picture(width * columns + _AROUND, 1.6 + width * RATIO * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     maps = _maps(panels, names)
-    kinds = _columns(maps[0])
-    grid = figure.add_gridspec(rows, groups * len(kinds), width_ratios=groups * [1 if name else _BAR for name in kinds])
+    each_scales = [_scales(maps, k, limits, cmap) for k in range(len(maps))]
     entries: dict[str, Artist] = {}
-    first: Axes | None = None
-    for k, (panel, shown) in enumerate(zip(panels.each, maps, strict=True)):
-        row, group = divmod(k, groups)
-        scales = _scales(maps, k, limits, cmap)
+    grid, first = None, None
+    for place, (k, group) in enumerate(groups):
+        kinds, scales = _columns({name: maps[k][name] for name in group}), each_scales[k]
+        grid = grid or figure.add_gridspec(
+            rows, across * len(kinds), width_ratios=across * [1 if name else _BAR for name in kinds]
+        )
+        row, column = divmod(place, across)
         for i, name in enumerate(kinds):
-            place = grid[row, group * len(kinds) + i]
+            at = grid[row, column * len(kinds) + i]
             if not name:
-                _bar(figure.add_subplot(place), dataset, kinds[i - 1], scales[kinds[i - 1]])
+                _bar(figure.add_subplot(at, label=BESIDE), dataset, kinds[i - 1], scales[kinds[i - 1]])
                 continue
-            axes = figure.add_subplot(place, sharex=first, sharey=first)
+            axes = figure.add_subplot(at, sharex=first, sharey=first)
             first = first or axes
-            entries |= _map(axes, shown[name], scales[name], alone=len(names) == 1, labelled=not small)
-            axes.set_title(_title(panels, name, panel, small=small), fontsize=9)
-            _label_axes(axes, dataset, shown[name], left=i == 0, lowest=k + groups >= len(panels.each))
-    figure.explain([*_meanings([panels], [maps], scales), *entries.values()])
+            entries |= _map(axes, maps[k][name], scales[name], alone=len(names) == 1, labelled=not small)
+            axes.set_title(_title(panels, name, panels.each[k], small=small and len(group) > 1))
+            _label_axes(axes, dataset, maps[k][name], left=i == 0, lowest=place + across >= len(groups))
+    figure.explain([*_meanings([panels], [maps], each_scales[0]), *entries.values()])
     return figure
 
 
-def draw_beside(each: list[Panels], limits: Limits | None = None, cmap: str | None = None) -> Figure:
+def draw_in(axes: Axes, panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> None:
+    """Draw the map of the first variable into these axes, with its bar beside them."""
+    name = panels.names[0]
+    shown = _maps(panels, [name])[0][name]
+    scale = common_scale([shown], limits, cmap)
+    _map(axes, shown, scale, alone=True, labelled=True)
+    _label_axes(axes, panels.dataset, shown)
+    _bar(make_axes(axes)[0], panels.dataset, name, scale)
+
+
+def draw_beside(each: list[Panels], limits: Limits | None = None, cmap: str | None = None) -> Picture:
     """A map of the first variable for each panel of each dataset, on axes of its own, with one scale.
 
     Raises
@@ -94,7 +112,8 @@ def draw_beside(each: list[Panels], limits: Limits | None = None, cmap: str | No
     if short := [_name(panels.dataset) for panels in each if len(panels.across) < 2]:
         raise ValueError(f"{', '.join(short)} has no two axes; only maps are drawn side by side")
     rows, columns = arrangement(count, 1)
-    figure = Picture(_WIDEST * columns + 1.2, 1.8 + _WIDEST * RATIO * rows)
+    width = panel_width(columns, _WIDEST, _AROUND)
+    figure = Picture(width * columns + _AROUND, 1.8 + width * RATIO * rows)
     figure.head(labels.words(each[0].dataset, name), _constants([panels.dataset for panels in each]))
     maps = [_maps(panels, [name]) for panels in each]
     scale = common_scale([shown[name] for of_one in maps for shown in of_one], limits, cmap)
@@ -107,10 +126,10 @@ def draw_beside(each: list[Panels], limits: Limits | None = None, cmap: str | No
             axes = figure.add_subplot(grid[next(places)])
             entries |= _map(axes, shown[name], scale, alone=True, labelled=False)
             words = [_name(panels.dataset), title(panels.dataset, panel)]
-            axes.set_title(", ".join(filter(None, words)), fontsize=9)
+            axes.set_title(", ".join(filter(None, words)))
             _label_axes(axes, panels.dataset, shown[name])
     if bar:
-        _bar(figure.add_subplot(grid[:, -1]), each[0].dataset, name, scale)
+        _bar(figure.add_subplot(grid[:, -1], label=BESIDE), each[0].dataset, name, scale)
     figure.explain([*_meanings(each, maps, {name: scale}), *entries.values()])
     return figure
 
@@ -181,19 +200,18 @@ def _title(panels: Panels, name: str, panel: Panel, *, small: bool) -> str:
 
 def _label_axes(axes: Axes, dataset: xr.Dataset, shown: Map, *, left: bool = True, lowest: bool = True) -> None:
     """Write what the axes of a map show, on the left and below."""
-    axes.tick_params(labelsize=8, labelleft=left, labelbottom=lowest)
+    axes.tick_params(labelleft=left, labelbottom=lowest)
     if left:
-        axes.set_ylabel(labels.label(dataset, shown.y.name), fontsize=9)
+        axes.set_ylabel(labels.label(dataset, shown.y.name))
     if lowest:
-        axes.set_xlabel(labels.label(dataset, shown.x.name), fontsize=9)
+        axes.set_xlabel(labels.label(dataset, shown.x.name))
 
 
 def _bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
     """Draw the bar of a scale, with what it shows."""
     bar = Colorbar(axes, ScalarMappable(scale.norm, scale.colours), extend=scale.arrows)
     words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name.removesuffix("_predicted"))
-    bar.set_label(f"{words}\n", fontsize=8)  # an empty line, or it would seem to belong to the next map
-    axes.tick_params(labelsize=7)
+    bar.set_label(f"{words}\n")  # an empty line, or it would seem to belong to the next map
     if scale.ticks:
         bar.set_ticks(list(scale.ticks), labels=list(scale.ticks.values()))
         bar.ax.minorticks_off()

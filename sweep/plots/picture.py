@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import matplotlib as mpl
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sweep.plots import boundaries, critical, curves, fit, indices, maps, panels, probabilities, scales, trajectories
+from sweep.plots.figure import Picture, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
-from sweep.plots.quantities import subject
+from sweep.plots.quantities import DERIVED, subject
 from sweep.plots.scales import Limits
+from sweep.results.dataset import VARIABLES
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
-_NO_DATE: dict[str, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
-_DPI = 110
+_NO_DATE: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
+_LENGTH = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-z]+)")
+"""A number and its unit."""
+
+_NARROWEST, _WIDEST = 50.0, 1000.0
+"""Millimetres of a figure across."""
 
 _OWN = {BOUNDARIES: boundaries.draw, FIT: fit.draw, INDICES: indices.draw}
 """Kinds of dataset that have one picture each."""
 
-Source = xr.Dataset | str | Path
-"""A dataset, or the path of its file."""
+Source = xr.Dataset | xr.DataArray | str | Path
+"""A dataset, the path of its file, or a variable of it."""
 
 
 def plot(
@@ -38,14 +46,18 @@ def plot(
     sel: Mapping[str, float] | None = None,
     limits: Limits | None = None,
     cmap: str | None = None,
+    width: str | None = None,
+    figsize: tuple[float, float] | None = None,
+    title: bool = True,
+    ax: Axes | None = None,
     output: str | Path | None = None,
 ) -> Figure:
     """Draw a dataset of a sweep, of single trajectories, of critical spins, of boundaries or of a fit.
 
     Parameters
     ----------
-    dataset : a dataset, or the path of its file.  Of several, maps of one variable are drawn side by side, with one
-        scale
+    dataset : a dataset, the path of its file, or one of its variables, whose cells have no marks, since the dataset
+        knows of them.  Of several, maps of one variable are drawn side by side, with one scale
     variable : of the dataset, or one of `sweep.plots.quantities.DERIVED`; by default what the run's `measure` names
         first, or else the reversals.  Beside these and beside `t_first_reversal` stand their prediction and how the
         two compare: the `difference` or the `ratio`
@@ -54,7 +66,12 @@ def plot(
     sel : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
     limits : lowest and highest value of the scale
     cmap : name of a colour map of matplotlib
-    output : file to write; its suffix names the format: png, pdf or svg
+    width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, and panels have
+        letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if that was changed
+    figsize : width and height in inches, by default as high as the panels need
+    title : whether the figure has one
+    ax : axes to draw one map or curve into, without title and legend.  A map is of `variable` alone, with a bar
+    output : file to write; its suffix names the format: png, pdf, svg or eps
 
     Returns
     -------
@@ -64,7 +81,8 @@ def plot(
     Raises
     ------
     ValueError
-        if the dataset has no such variable or axis, would need too many panels, or there is no such format.
+        if the dataset has no such variable or axis, would need too many panels, or there is no such format or width.
+        With `ax`, if there are several panels.
     StoreError
         if the file is not a dataset, or `output` cannot be written.
     """
@@ -74,15 +92,37 @@ def plot(
         raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; give a lower and a higher number")
     if cmap is not None:
         scales.colour_map(cmap)  # raises if there is none
-    several = [dataset] if isinstance(dataset, Source) else dataset
-    opened = [each if isinstance(each, xr.Dataset) else open_dataset(Path(each)) for each in several]
-    figure = _drawn(opened, variable, {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap})
+    opened = [_opened(each) for each in ([dataset] if isinstance(dataset, Source) else dataset)]
+    if variable is None and isinstance(dataset, xr.DataArray):
+        variable = str(dataset.name)
+    axes, colours = {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap}
+    if ax is not None:
+        figure = _draw_in(ax, opened, variable, axes, colours)
+    else:
+        across = inches(width) if width is not None else None
+        with mpl.rc_context(style(across) | ({"figure.figsize": figsize} if figsize else {})):
+            figure = _drawn(opened, variable, axes, colours)
+            if across:
+                figure.letter()
+        if figsize:
+            figure.set_size_inches(figsize)
+        if not title:
+            figure.suptitle("")
     if output is not None:
         save(figure, Path(output))
     return figure
 
 
-def _drawn(datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], colours: dict[str, Any]) -> Figure:
+def _opened(source: Source) -> xr.Dataset:
+    """A dataset, wherever it is.  A variable of one brings its coordinates along."""
+    if isinstance(source, xr.DataArray):
+        if source.name not in {*VARIABLES, *DERIVED}:
+            raise ValueError(f"{source.name or 'an array without a name'} is no variable of a run; give the dataset")
+        return source.to_dataset()
+    return source if isinstance(source, xr.Dataset) else open_dataset(Path(source))
+
+
+def _drawn(datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], colours: dict[str, Any]) -> Picture:
     """The figure of datasets, of whatever kind they are."""
     kinds = {kind(each) for each in datasets}
     if len(datasets) != 1:
@@ -105,9 +145,42 @@ def _drawn(datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any
     return maps.draw(chosen, **colours) if len(chosen.across) == 2 else curves.draw(chosen, colours["limits"])
 
 
+def _draw_in(
+    ax: Axes, datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], colours: dict[str, Any]
+) -> Figure:
+    """Draw one map or curve into axes of the user; returns their figure."""
+    if {kind(each) for each in datasets} != {RUN} or len(datasets) > 1:
+        raise ValueError("ax: only a map or a curve of one run is drawn into given axes")
+    chosen = panels.choose(datasets[0], variable, **axes)
+    if len(chosen.each) > 1 or "probability" in chosen.names:
+        raise ValueError(f"ax: {chosen.names[0]} needs more than one panel; select a value of each other axis")
+    if len(chosen.across) == 2:
+        maps.draw_in(ax, chosen, **colours)
+    else:
+        curves.draw_in(ax, chosen, colours["limits"])
+    return cast(Figure, ax.get_figure(root=True))
+
+
+def inches(width: str) -> float:
+    """A length such as "85mm" in inches; `ValueError` if it is none, or none for a figure."""
+    import pint  # which takes as long to import as matplotlib
+
+    found = _LENGTH.fullmatch(width.strip())
+    try:
+        length = pint.Quantity(float(found[1]), found[2]).m_as("mm") if found else 0.0
+    except pint.PintError:
+        length = 0.0
+    if not _NARROWEST <= length <= _WIDEST:
+        span = f"between {_NARROWEST:g} and {_WIDEST:g} mm"
+        raise ValueError(f"width: {width}; give a length {span} with its unit, such as 85mm, 8.5cm or 3.3in")
+    return float(length / 25.4)
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a figure in the format that the suffix names; the same figure gives the same bytes."""
     form = suffix(path)
-    with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": "sweep"}):
-        dpi = _DPI if form == "png" else 2 * _DPI
-        figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE[form])
+    with replacing(path) as temporary:
+        dpi = figure.dpi * (1 if form == "png" else 2)
+        figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE.get(form))
+        if form == "eps":
+            temporary.write_bytes(re.sub(rb"%%CreationDate: .*\n", b"", temporary.read_bytes()))

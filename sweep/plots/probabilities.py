@@ -8,11 +8,10 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
-from sweep.plots.figure import framed, set_scale
+from sweep.plots.figure import Picture, framed, set_scale
 from sweep.plots.panels import Panels, title
 from sweep.results.probabilities import interval, sound
 
@@ -20,7 +19,7 @@ _COLOURS = 0.85
 """Part of the colour map that curves take: its last colours are too light for lines."""
 
 
-def draw(panels: Panels) -> Figure:
+def draw(panels: Panels) -> Picture:
     """Draw the probabilities over the one long axis, or those of each panel, if there is none."""
     dataset, x = panels.dataset, panels.across[0] if panels.across else ""
     figure, frames = framed(dataset, panels.each, x, 7.0, 1.9, 2.6)
@@ -46,7 +45,7 @@ def _curves(axes: Axes, chosen: xr.Dataset, x: str) -> None:
         axes.fill_between(
             one[x], one["probability_low"], one["probability_high"], color=colour, alpha=0.25, linewidth=0
         )
-    axes.set_ylabel("probability, with its interval of 95 %", fontsize=9)
+    axes.set_ylabel("probability, with its interval of 95 %")
 
 
 def _bars(axes: Axes, chosen: xr.Dataset) -> None:
@@ -60,5 +59,5 @@ def _bars(axes: Axes, chosen: xr.Dataset) -> None:
         fmt="none", ecolor="black", elinewidth=1, capsize=3, label="interval of 95 %", zorder=3,
     )  # fmt: skip
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("spin reversals", fontsize=9)
-    axes.set_ylabel("probability", fontsize=9)
+    axes.set_xlabel("spin reversals")
+    axes.set_ylabel("probability")

@@ -60,7 +60,7 @@ def colour_map(name: str) -> Colormap:
 
 
 def counts(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
-    """A colour for each count; where there are many, the higher ones share colours in ranges that widen steadily.
+    """A colour for each count; where there are many, the higher ones share colours, in ranges of round numbers.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def counts(values: Array, limits: Limits | None = None, name: str | None = None)
 def differences(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
     """A diverging scale of integers, the same on both sides of zero, which has a colour of its own."""
     top = max(round(max(map(abs, limits))) if limits else int(np.abs(values).max(initial=0)), 1)
-    side = 1 + _steps(top - 1, _MAX_DIFFERENCES)
+    side = _steps(top, _MAX_DIFFERENCES + 1)[1:]
     return _stepped(np.concatenate([1 - side[::-1], side]), values, name or DIVERGING)
 
 
@@ -124,14 +124,24 @@ def _arrows(values: Array, low: float, high: float) -> Arrows:
 
 
 def _steps(top: int, most: int) -> Array:
-    """Where the ranges of the counts 0 to `top` begin, and the last one ends: at most `most` ranges, wider upwards."""
+    """Where the ranges of the counts 0 to `top` begin, and the last one ends: at most `most` ranges.
+
+    Each ends at a multiple of its width, which is 1, 2, 5, 10, 20 and so on, and no less than that of the range below.
+    """
     for percent in range(200):
         steps = [0]
         while steps[-1] <= top:
-            steps.append(steps[-1] + max(1, steps[-1] * percent // 100))
+            width = _round(steps[-1] * percent // 100)
+            steps.append((steps[-1] // width + 1) * width)
         if len(steps) - 1 <= most:
             break
     return np.array(steps)
+
+
+def _round(number: int) -> int:
+    """The largest of 1, 2, 5, 10, 20 and so on that is no larger than a number, or 1."""
+    first, others = int(str(number)[0]), len(str(number)) - 1
+    return max(n for n in (1, 2, 5) if n <= max(first, 1)) * int(10**others)
 
 
 def _stepped(steps: Array, values: Array, name: str) -> Scale:
@@ -139,13 +149,8 @@ def _stepped(steps: Array, values: Array, name: str) -> Scale:
     arrows = _arrows(values, steps[0], steps[-1] - 1)
     number = len(steps) - 1 + {"both": 2, "neither": 0}.get(arrows, 1)
     norm = BoundaryNorm(steps - 0.5, number, extend=arrows)
-    ticks = {(first + last - 1) / 2: _integers(first, last - 1) for first, last in pairwise(steps.tolist())}
+    nearest_zero = (min(first, last - 1, key=abs) for first, last in pairwise(steps.tolist()))
+    ticks = {float(count): f"{count}".replace("-", "−") for count in nearest_zero}
     every = -(-len(ticks) // _MAX_TICKS)
     start = list(ticks).index(0) % every if 0 in ticks else 0  # of differences, zero is always labelled
     return Scale(colour_map(name).resampled(number), norm, dict(list(ticks.items())[start::every]), arrows)
-
-
-def _integers(first: int, last: int) -> str:
-    if first == last:
-        return f"{first}".replace("-", "−")
-    return f"{first}–{last}" if first >= 0 else f"{first} … {last}".replace("-", "−")

@@ -6,14 +6,13 @@ import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sweep.grid import Array
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, lines, theory
-from sweep.plots.figure import Picture
+from sweep.plots.figure import Picture, page, panel_width
 from sweep.results.kind import is_of_own_body, parameters
 
 # Title and the series drawn together; two panels stand beside each other.
@@ -42,11 +41,14 @@ _STILL = 0.01
 _ENDLESS = ("heading", "table_x", "table_y")
 """Series that go on where a body spins steadily."""
 
+_NARROW = 6.0
+"""Inches of a page up to which panels stand below each other."""
+
 _CRITICAL = {"n_c1": ":", "n_c2": "--"}
 """Styles of the critical spins, none of them that of a curve."""
 
 
-def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
+def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     """The spin with its reversals and critical values over time, and below it whatever else the dataset has.
 
     Where the bodies come to rest early, the time axis ends there, and says so.
@@ -68,36 +70,38 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Figure:
     if is_of_own_body(dataset) and variable is None:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
-    rows = -(-len(panels) // 2)
-    figure = Picture(11, 4.2 + 1.9 * rows)
+    columns = 2 if page() > _NARROW else 1
+    rows = -(-len(panels) // columns)
+    figure = Picture(panel_width(1, 11, 0), 4.2 + 1.9 * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(constants_apart(dataset)))
-    grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
+    grid = figure.add_gridspec(1 + rows, columns, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
     entries = _series(first, dataset, only) if only else _spin(first, dataset)
     time, until, last = labels.label(dataset, "time"), lively_until(dataset), float(dataset["time"].max())
     if until < last:
         first.set_xlim(0, until)
-        time = f"{time}; nothing changes by more than {_STILL:.0%} from here to {last:g}"
+        apart = " " if columns > 1 else "\n"
+        time = f"{time};{apart}nothing changes by more than {_STILL:.0%} from here to {last:g}"
     axes = first
     for k, (title, names) in enumerate(panels):
-        axes = figure.add_subplot(grid[1 + k // 2, k % 2], sharex=first)
+        axes = figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first)
         _series(axes, dataset, names)
         per_mass = " per unit mass" if "per unit mass" in dataset[next(iter(names))].attrs.get("long_name", "") else ""
-        axes.set_title(f"{title}{per_mass}", fontsize=9, loc="left")
-        axes.tick_params(labelbottom=k >= len(panels) - 2)
-        if k >= len(panels) - 2:
-            axes.set_xlabel(time, fontsize=9)
+        axes.set_title(f"{title}{per_mass}", loc="left", pad=16 if columns == 1 < len(names) else None)
+        axes.tick_params(labelbottom=k >= len(panels) - columns)
+        if k >= len(panels) - columns:
+            axes.set_xlabel(time)
     if not panels:
-        first.set_xlabel(time, fontsize=9)
+        first.set_xlabel(time)
     figure.explain(entries)
     return figure
 
 
 def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
     """n(t) of each trajectory with its reversals as dots, and the critical spins of each body as lines."""
-    axes.legend(handles=_spin(axes, dataset, critical), fontsize=7)
-    axes.set_xlabel(labels.label(dataset, "time"), fontsize=9)
+    axes.legend(handles=_spin(axes, dataset, critical), fontsize="x-small")
+    axes.set_xlabel(labels.label(dataset, "time"))
 
 
 def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist]:
@@ -130,12 +134,11 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
         named = zip(shades, names.values(), strict=True)
         styles = [Line2D([], [], color="black", alpha=shade, label=words) for shade, words in named]
         axes.legend(
-            handles=styles, fontsize=7, ncols=2, frameon=False, loc="lower right", bbox_to_anchor=(1, 0.98),
+            handles=styles, ncols=2, frameon=False, loc="lower right", bbox_to_anchor=(1, 0.98),
             borderaxespad=0.2,
         )  # fmt: skip
     first = next(iter(names))
-    axes.set_ylabel(_with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)), fontsize=9)
-    axes.tick_params(labelsize=8)
+    axes.set_ylabel(_with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
     return entries
 
 
@@ -159,7 +162,7 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
             if all(abs(at - other) > 0.04 * (high - low) for other in written):
                 axes.annotate(
                     lines.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
-                    textcoords="offset points", fontsize=8, va="center", color=colour,
+                    textcoords="offset points", va="center", color=colour,
                 )  # fmt: skip
                 written.append(at)
     return list(entries.values())

@@ -236,6 +236,6 @@ def _levelled(distance: Array) -> Array:
 
 
 def _draw(result: xr.Dataset) -> Figure:
-    from sweep.plots import boundaries as plots  # matplotlib takes a third of the time of `import sweep`
+    from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
 
-    return plots.draw(result)
+    return picture.plot(result)

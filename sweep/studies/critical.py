@@ -91,9 +91,9 @@ def searchable(config: Config) -> Config:
 
 
 def _draw(result: xr.Dataset) -> Figure:
-    from sweep.plots import critical as plots  # matplotlib takes a third of the time of `import sweep`
+    from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
 
-    return plots.draw(result)
+    return picture.plot(result)
 
 
 class Answer(NamedTuple):

@@ -132,6 +132,6 @@ def with_intervals(values: Array, seed: int) -> dict[str, Array]:
 
 
 def _draw(result: xr.Dataset) -> Figure:
-    from sweep.plots import indices as plots  # matplotlib takes a third of the time of `import sweep`
+    from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
 
-    return plots.draw(result)
+    return picture.plot(result)

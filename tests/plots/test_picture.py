@@ -12,45 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, to_rgb
 from matplotlib.figure import Figure
 from support.cli import invoke, refused
-from support.figures import constants, entries
+from support.figures import constants, entries, made
 
 import sweep
-from sweep.kernels.status import DIVERGED, SETTLED, TIME_LIMIT
+from sweep.kernels.status import DIVERGED, TIME_LIMIT
 from sweep.plots import picture, scales
 from sweep.plots.hatches import outline
 from sweep.results.dataset import VARIABLES, described
 from sweep.results.netcdf import write
-
-
-def made(**axes: Any) -> xr.Dataset:
-    """A run over these axes: counts rise with mu, the critical spins fall with it, and one cell is a lower bound."""
-    mu = np.asarray(axes.get("mu", np.linspace(20, 200, 10)), float)
-    b = np.asarray(axes.get("b", np.linspace(2, 9, 8)), float)
-    n0 = np.asarray(axes.get("n0", [0.05]), float)
-    shape = (len(mu), len(b), len(n0))
-    count = np.broadcast_to((mu // 20)[:, None, None], shape)
-    status = np.full(shape, SETTLED)
-    status[2, 3, 0] = TIME_LIMIT
-    n_c1 = np.broadcast_to(1.0 / mu[:, None], shape[:2])
-    values = {
-        "reversals": count,
-        "reversals_predicted": count + 2,
-        "status": status,
-        "spin_final": np.broadcast_to(np.linspace(-0.1, 0.02, len(mu))[:, None, None], shape),
-        "noise_limited": np.zeros(shape),
-        "n_c1_plus_linear": n_c1,
-        "n_c1_minus_linear": -n_c1,
-        "n_c1_plus": 3 * n_c1,
-        "n_c2_plus": 2 * n_c1,
-        "n_c2_minus": -2 * n_c1,
-    }
-    dims = ("mu", "b", "n0")
-    variables = {
-        name: xr.Variable(dims[: v.ndim], v.astype(VARIABLES[name].dtype), described(VARIABLES[name]))
-        for name, v in values.items()
-    }
-    constants = {"a": 10.0, "c": 1.0, "delta": 0.03}
-    return xr.Dataset(variables, {"mu": mu, "b": b, "n0": n0, **constants}, {"title": "made"})
 
 
 def maps(figure: Figure) -> list[Axes]:
@@ -283,7 +252,7 @@ def test_axes_in_any_order_of_values() -> None:
         ({"cmap": "q"}, "no colour map q; choose"),
         ({"limits": (2, 1)}, r"limits: 2..1; give"),
         ({"variable": "q"}, "no variable q; choose reversals"),
-        ({"output": "x.jpg"}, "x.jpg: unknown format; write a png, pdf or svg"),
+        ({"output": "x.jpg"}, "x.jpg: unknown format; write a png, pdf, svg or eps"),
     ],
 )
 def test_wrong_choices_are_refused(wrong: dict[str, Any], said: str) -> None:
@@ -301,7 +270,7 @@ def test_curves_tell_lower_bounds_and_crossings() -> None:
     assert bound.get_xdata().tolist() == [60]
 
 
-MAGIC = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
+MAGIC = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml", "eps": b"%!PS"}
 
 
 @pytest.mark.parametrize("suffix", MAGIC)
@@ -324,7 +293,7 @@ def test_help_names_every_format() -> None:
 def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     write(tmp_path / "made.nc", made())
     for options, said in (
-        (("--output", tmp_path / "x.jpg"), "x.jpg: unknown format; write a png, pdf, svg or html"),
+        (("--output", tmp_path / "x.jpg"), "x.jpg: unknown format; write a png, pdf, svg, eps or html"),
         (("--limits", "3"), "--limits 3: must be LOW..HIGH"),
         (("--limits", "3..1"), "--limits 3..1: must be LOW..HIGH"),
         (("--sel", "n0"), "--sel n0: must be NAME=NUMBER"),

@@ -12,7 +12,7 @@ import xarray as xr
 from support.cli import invoke, refused
 from support.figures import constants, entries
 
-from sweep.plots import picture, trajectories
+from sweep.plots import picture
 from sweep.plots.panels import in_lines
 from sweep.results.dataset import VARIABLES
 
@@ -38,7 +38,7 @@ def made(mu: list[float], **given: Any) -> xr.Dataset:
 
 
 def test_every_curve_is_in_a_legend() -> None:
-    figure = trajectories.draw(made([60, 100]))
+    figure = picture.plot(made([60, 100]))
     assert entries(figure)[:2] == ["μ = 60: 3 reversals", "μ = 100: 3 reversals"]
     colours = {handle.get_label(): handle.get_color() for handle in figure.legends[0].legend_handles}
     for axes in figure.axes:
@@ -54,7 +54,7 @@ def test_every_curve_is_in_a_legend() -> None:
 
 @pytest.mark.parametrize(("mu", "sets"), [([60], 1), ([60, 60], 1), ([60, 100], 2)])
 def test_a_set_of_critical_lines_for_each_body(mu: list[float], sets: int) -> None:
-    axes = trajectories.draw(made(mu)).axes[0]
+    axes = picture.plot(made(mu)).axes[0]
     lines = [line for line in axes.lines if line.get_gid() in ("n_c1", "n_c2")]
     assert sorted(line.get_ydata()[0] for line in lines) == sorted(s / m for m in set(mu) for s in (-2, -1, 1, 2))
     assert len({line.get_color() for line in lines}) == sets
@@ -64,7 +64,7 @@ def test_a_set_of_critical_lines_for_each_body(mu: list[float], sets: int) -> No
 
 
 def test_axes_have_plain_names() -> None:
-    figure = trajectories.draw(made([60]))
+    figure = picture.plot(made([60]))
     assert figure.axes[0].get_ylabel() == "spin n (√(g/c))"
     assert figure.axes[-1].get_xlabel() == "time t (√(c/g))"
     assert "b = 3" in constants(figure)
@@ -75,7 +75,7 @@ def test_a_body_in_si_has_its_units_everywhere() -> None:
     for name, units in (("a", "m"), ("n0", "radian s-1"), ("spin", "radian s-1"), ("energy", "m2 s-2")):
         dataset[name].attrs = {"units": units, "long_name": f"{name} per unit mass" if name == "energy" else name}
     dataset["reversals"][:] = [1, 2]
-    figure = trajectories.draw(dataset)
+    figure = picture.plot(dataset)
     assert constants(figure).startswith("a = 0.2 m,")
     assert entries(figure)[:2] == ["n₀ = −1 rad/s: 1 reversal", "n₀ = 2 rad/s: 2 reversals"]
     assert figure.axes[0].get_ylabel() == "spin n (rad/s)"
@@ -105,7 +105,7 @@ def test_one_series_is_drawn_alone() -> None:
 
 
 def test_a_page_of_all_series_fits_a_screen() -> None:
-    assert trajectories.draw(made([60])).get_size_inches()[1] * 110 < 1200
+    assert picture.plot(made([60])).get_size_inches()[1] * 110 < 1200
 
 
 def told_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:

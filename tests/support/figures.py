@@ -1,8 +1,15 @@
-"""What can be read in a figure."""
+"""What can be read in a figure, and a run to draw."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
+
+from sweep.kernels.status import SETTLED, TIME_LIMIT
+from sweep.results.dataset import VARIABLES, described
 
 
 def entries(figure: Figure) -> list[str]:
@@ -13,3 +20,34 @@ def entries(figure: Figure) -> list[str]:
 def constants(figure: Figure) -> str:
     """The words over the legend."""
     return figure.legends[0].get_title().get_text()
+
+
+def made(**axes: Any) -> xr.Dataset:
+    """A run over these axes: counts rise with mu, the critical spins fall with it, and one cell is a lower bound."""
+    mu = np.asarray(axes.get("mu", np.linspace(20, 200, 10)), float)
+    b = np.asarray(axes.get("b", np.linspace(2, 9, 8)), float)
+    n0 = np.asarray(axes.get("n0", [0.05]), float)
+    shape = (len(mu), len(b), len(n0))
+    count = np.broadcast_to((mu // 20)[:, None, None], shape)
+    status = np.full(shape, SETTLED)
+    status[2, 3, 0] = TIME_LIMIT
+    n_c1 = np.broadcast_to(1.0 / mu[:, None], shape[:2])
+    values = {
+        "reversals": count,
+        "reversals_predicted": count + 2,
+        "status": status,
+        "spin_final": np.broadcast_to(np.linspace(-0.1, 0.02, len(mu))[:, None, None], shape),
+        "noise_limited": np.zeros(shape),
+        "n_c1_plus_linear": n_c1,
+        "n_c1_minus_linear": -n_c1,
+        "n_c1_plus": 3 * n_c1,
+        "n_c2_plus": 2 * n_c1,
+        "n_c2_minus": -2 * n_c1,
+    }
+    dims = ("mu", "b", "n0")
+    variables = {
+        name: xr.Variable(dims[: v.ndim], v.astype(VARIABLES[name].dtype), described(VARIABLES[name]))
+        for name, v in values.items()
+    }
+    constants = {"a": 10.0, "c": 1.0, "delta": 0.03}
+    return xr.Dataset(variables, {"mu": mu, "b": b, "n0": n0, **constants}, {"title": "made"})

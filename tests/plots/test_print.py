@@ -1,0 +1,154 @@
+"""Figures for print, in a style of the user's own, and in axes of the user's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from support.cli import invoke, refused
+from support.figures import entries, made
+
+from sweep.plots import picture
+from sweep.results.netcdf import open_dataset, write
+
+KINDS: dict[str, dict[str, Any]] = {
+    "maps": {},
+    "a map": {"variable": "reversals", "sel": {"n0": 0.05}},
+    "a status": {"variable": "status"},
+    "curves": {"x": "b", "sel": {"mu": 60.0}},
+}
+
+
+def texts(figure: Figure) -> list[Text]:
+    """All that is written, after the ticks are made."""
+    figure.draw_without_rendering()
+    return [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+
+
+def letters(figure: Figure) -> str:
+    return "".join(text.get_text() for text in texts(figure) if text.get_weight() == "bold")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("width", ["60mm", "85mm", "18cm"])
+def test_a_figure_for_print_is_as_wide_as_asked_and_can_be_read(kind: str, width: str) -> None:
+    figure = picture.plot(made(n0=[0.02, 0.05]), **KINDS[kind], width=width)
+    figure.draw_without_rendering()
+    inches = {"60mm": 60, "85mm": 85, "18cm": 180}[width] / 25.4
+    assert figure.get_figwidth() == pytest.approx(inches)
+    assert min(text.get_fontsize() for text in texts(figure)) >= 6
+    around = figure.get_tightbbox()
+    assert around.x0 >= -0.01
+    assert around.x1 <= inches + 0.01
+    panels = [axes for axes in figure.axes if axes.get_label() == ""]
+    assert letters(figure) == ("abcdefghijkl"[: len(panels)] if len(panels) > 1 else "")
+    assert all(axes.get_window_extent().width > 0.3 * figure.bbox.width / 3 for axes in panels)
+
+
+def test_maps_that_do_not_fit_side_by_side_stand_below_each_other() -> None:
+    one = made()
+    for width, columns in (("85mm", 1), ("180mm", 3)):
+        panels = [axes for axes in picture.plot(one, width=width).axes if axes.get_label() == ""]
+        assert len({axes.get_subplotspec().colspan.start for axes in panels}) == columns
+        assert len(panels) == 3
+
+
+@pytest.mark.parametrize("suffix", ["pdf", "eps"])
+def test_fonts_can_be_edited(small: xr.Dataset, tmp_path: Path, suffix: str) -> None:
+    picture.plot(small, output=tmp_path / f"a.{suffix}")
+    picture.plot(small, width="85mm").savefig(tmp_path / f"b.{suffix}")
+    for name in "ab":
+        written = (tmp_path / f"{name}.{suffix}").read_bytes()
+        assert b"/FontType 42" in written if suffix == "eps" else b"/CIDFontType2" in written
+        assert b"/Type3" not in written
+        assert b"/FontType 3" not in written
+
+
+@pytest.mark.parametrize("width", ["85", "85 apples", "3 kg", "-85mm", "1mm", "5m", "", "8**9mm"])
+def test_a_width_is_a_length(width: str, small: xr.Dataset, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="give a length between 50 and 1000 mm with its unit"):
+        picture.plot(small, width=width)
+    write(tmp_path / "small.nc", small)
+    refused(invoke("plot", tmp_path / "small.nc", "--width", width), "such as 85mm")
+    refused(invoke("plot", tmp_path / "small.nc", "--width", "85mm", "--output", "x.html"), "not for a page")
+
+
+def test_the_command_draws_for_print_without_a_title(small: xr.Dataset, tmp_path: Path) -> None:
+    write(tmp_path / "small.nc", small)
+    target = tmp_path / "small.svg"
+    result = invoke("plot", tmp_path / "small.nc", "--width", "3.5 in", "--no-title", "--output", target)
+    assert result.exit_code == 0, result.output
+    assert 'width="252pt"' in target.read_text(encoding="utf-8")
+    title = str(open_dataset(tmp_path / "small.nc").attrs["title"])
+    assert title in {text.get_text() for text in texts(picture.plot(small))}
+    assert title not in {text.get_text() for text in texts(picture.plot(small, title=False))}
+
+
+def test_settings_of_the_user_are_obeyed() -> None:
+    with mpl.rc_context({"font.size": 12, "axes.titlesize": 17, "xtick.labelsize": 11, "figure.figsize": (7, 4)}):
+        figure = picture.plot(made(), "reversals")
+    (axes,) = [axes for axes in figure.axes if axes.get_label() == ""]
+    figure.draw_without_rendering()
+    assert axes.title.get_fontsize() == 17
+    assert axes.xaxis.label.get_fontsize() == 12
+    assert {tick.get_fontsize() for tick in axes.get_xticklabels()} == {11}
+    assert figure.get_figwidth() == pytest.approx(7)
+    assert mpl.rcParams["font.size"] == mpl.rcParamsDefault["font.size"]
+
+
+def test_a_figure_has_the_size_that_is_asked_for(small: xr.Dataset) -> None:
+    np.testing.assert_allclose(picture.plot(small, figsize=(6, 9)).get_size_inches(), (6, 9))
+
+
+@pytest.mark.parametrize(
+    ("selection", "variable", "said"),
+    [({}, None, "spin reversals"), ({}, "status", "how the trajectory ended"), ({"mu": 0}, None, "L(f)")],
+)
+def test_a_picture_in_given_axes(selection: dict[str, int], variable: str | None, said: str) -> None:
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    one = made().assign(form_factor=made().b / 10).isel(selection)
+    assert picture.plot(one, variable, ax=right) is figure
+    assert right.get_xlabel() == "short semi-axis b (c)"
+    assert right.get_ylabel()
+    assert right.has_data()
+    assert not left.has_data()
+    (beside,) = figure.axes[2:]
+    assert beside.get_ylabel().strip() == said
+
+
+def test_given_axes_take_one_panel_of_one_run(small: xr.Dataset) -> None:
+    axes = Figure().subplots()
+    with pytest.raises(ValueError, match="needs more than one panel; select"):
+        picture.plot(small, ax=axes)
+    with pytest.raises(ValueError, match="only a map or a curve of one run"):
+        picture.plot([small, small], "reversals", ax=axes)
+    assert not axes.has_data()
+
+
+def test_a_variable_is_drawn_without_its_dataset() -> None:
+    assert any("time limit" in text for text in entries(picture.plot(made(), "reversals")))
+    figure = picture.plot(made().reversals)
+    assert len([axes for axes in figure.axes if axes.get_label() == ""]) == 1
+    assert not [text for text in entries(figure) if "time limit" in text]
+    with pytest.raises(ValueError, match="an array without a name is no variable of a run; give the dataset"):
+        picture.plot(made().reversals - made().reversals_predicted)
+
+
+def test_a_map_with_bars_of_high_counts_has_round_steps() -> None:
+    from sweep.plots import scales
+
+    for top in (30, 60, 207, 3000):
+        scale = scales.counts(np.arange(top + 1))
+        assert all(words == f"{round(at)}" for at, words in (scale.ticks or {}).items())
+        first = np.asarray(scale.norm.boundaries[:-1] + 0.5)  # type: ignore[attr-defined]
+        widths = np.diff(scale.norm.boundaries)  # type: ignore[attr-defined]
+        wide = widths > 1
+        assert (np.diff(widths) >= 0).all()
+        assert (first[wide] % np.gcd(widths[wide].astype(int), 10) == 0).all()
