@@ -183,4 +183,4 @@ def save(figure: Figure, path: Path) -> None:
         dpi = figure.dpi * (1 if form == "png" else 2)
         figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE.get(form))
         if form == "eps":
-            temporary.write_bytes(re.sub(rb"%%CreationDate: .*\n", b"", temporary.read_bytes()))
+            temporary.write_bytes(re.sub(rb"%%(CreationDate|Title): .*\n", b"", temporary.read_bytes()))
