@@ -81,6 +81,12 @@ def run(
     ------
     ConfigError, StoreError
         if the configuration, or what `output` holds, cannot be used.
+
+    Examples
+    --------
+    >>> maps = sweep.run({"friction": {"mu": 60}}, n0=[0.02, 0.05, 0.1], t_end=1000)
+    >>> maps.reversals.values
+    array([1, 2, 5], dtype=int16)
     """
     from sweep.config import load_config
     from sweep.engine.run import run
@@ -125,6 +131,12 @@ def boundaries(
     ------
     ConfigError, StoreError
         as `run`; also if the model is a formula, or there are no two axes.
+
+    Examples
+    --------
+    >>> curves = sweep.boundaries({"friction": {"mu": [60, 80]}}, n0=[0.02, 0.06], t_end=1000, width=0.1)
+    >>> curves.attrs["x"], curves.attrs["y"]
+    ('n0', 'mu')
     """
     from sweep.config import load_config
     from sweep.progress import shown
@@ -167,6 +179,12 @@ def critical(
     ------
     ConfigError, StoreError
         as `run`; also if the model is a formula, or the start point is an axis.
+
+    Examples
+    --------
+    >>> spins = sweep.critical({"friction": {"mu": 60}}, width=0.1)
+    >>> f"{float(spins.n_c2_plus_simulated):.3f}"
+    '0.005'
     """
     from sweep.config import load_config
     from sweep.progress import shown
@@ -211,6 +229,12 @@ def trajectory(
     ------
     ConfigError
         if the configuration cannot be used, the model is a formula, or a cell cannot be run.
+
+    Examples
+    --------
+    >>> two = sweep.trajectory({"friction": {"mu": 60}}, n0=[0.02, 0.05], t_end=100)
+    >>> two.spin.dims
+    ('trajectory', 'time')
     """
     from sweep.config import load_config, parameters_of
     from sweep.progress import shown
@@ -353,6 +377,12 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
     ------
     StoreError
         if the file is not such a dataset, or is larger than memory.
+
+    Examples
+    --------
+    >>> _ = sweep.run({"name": "spins", "friction": {"mu": 60}}, "runs", n0=[0.02, 0.05], t_end=100)
+    >>> sweep.open("runs/spins.nc").n0.values
+    array([0.02, 0.05])
     """
     from pathlib import Path
 

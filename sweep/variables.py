@@ -59,3 +59,8 @@ def in_si(units: str, long_name: str) -> tuple[str, str]:
         return units, long_name
     per_mass = " per unit mass" if words in ("in m g", "in m g c") else ""
     return _SI[words], f"{head}{per_mass}{mark}{after}"
+
+
+def with_unit(long_name: str, units: str) -> dict[str, str]:
+    """The CF attributes of what has this unit: a plain number has none, or xarray would write "[1]" at its axis."""
+    return {"long_name": long_name} | ({"units": units} if units != "1" else {})

@@ -248,3 +248,37 @@ def test_variables_of_the_same_cells_are_merged_without_loss() -> None:
     merged = xr.merge([counts, energy, sweep.predict(SAID)])
     same_numbers(merged[list(energy.variables)], energy)
     assert merged.reversals.dtype == np.int16
+
+
+def test_a_dataset_does_what_the_package_does_with_it(tmp_path: Path) -> None:
+    maps = sweep.run(SAID, tmp_path, mu=[40, 60, 80, 100, 120])
+    assert maps.sweep.plot("status", sel={"b": 3}, width="85mm").get_figwidth() == pytest.approx(85 / 25.4)
+    opened = sweep.open(tmp_path / "quick.nc")
+    xr.testing.assert_equal(opened.sweep.trajectory(mu=60, b=3), sweep.trajectory(SAID, mu=60, b=3))
+    xr.testing.assert_equal(opened.sweep.trajectory(t_end=20), sweep.trajectory(SAID, mu=40, b=2, t_end=20))
+
+
+def test_a_dataset_does_not_run_the_code_of_another(tmp_path: Path) -> None:
+    (tmp_path / "evil.py").write_text("raise SystemExit\n", encoding="utf-8")
+    dataset = sweep.predict(SAID)
+    with pytest.raises(ValueError, match="tells no configuration; call"):
+        dataset.drop_attrs().sweep.trajectory()
+    dataset.attrs["config"] = f"model: {tmp_path / 'evil.py'}"
+    with pytest.raises(ConfigError, match="is not run for a configuration that comes from a dataset"):
+        dataset.sweep.trajectory()
+
+
+def test_a_configuration_can_be_read() -> None:
+    config = load_config(SAID, {"b": [2, 3, 4]})
+    assert repr(config) == f"<Config quick>\n{config.to_yaml()}"
+    shown = config._repr_html_()
+    assert "<caption>quick: averaged</caption>" in shown
+    assert "<th>b<td>2 … 4<td>3 values<td>semi-axis" in shown
+    assert "<th>n0<td>" in shown
+
+
+def test_labels_of_xarray_name_no_unit_of_a_plain_number() -> None:
+    maps = sweep.run(SAID)
+    axes = maps.spin_final.isel(b=0, drop=True).plot()[0].axes  # type: ignore[operator]
+    assert axes.get_ylabel() == "spin at t_stop, in sqrt(g/c)"
+    assert axes.get_xlabel().split() == ["viscous", "friction", "coefficient,", "in", "1/sqrt(g", "c)"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import doctest
 import importlib
 import inspect
 import re
@@ -33,6 +34,14 @@ def test_every_public_name_is_documented_in_the_source(name: str) -> None:
     if isinstance(node, ast.FunctionDef):
         taken = [*node.args.args, *node.args.kwonlyargs, *filter(None, [node.args.kwarg])]
         assert [each.arg for each in taken if not re.search(rf"^(\w+, )*{each.arg}\b.* : ", said, re.MULTILINE)] == []
+
+
+@pytest.mark.parametrize("name", ["run", "boundaries", "critical", "trajectory", "open", "predict", "plot"])
+def test_examples_in_docstrings_hold(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (test,) = doctest.DocTestFinder(recurse=False).find(getattr(sweep, name), name, globs={"sweep": sweep})
+    assert test.examples
+    doctest.DebugRunner(verbose=False).run(test)
 
 
 def test_the_version_is_the_one_that_datasets_tell() -> None:

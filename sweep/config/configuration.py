@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from html import escape
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -26,7 +27,7 @@ from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.parameters import PAPER_UNITS, SI, Parameter, sections
-from sweep.variables import in_si
+from sweep.variables import in_si, with_unit
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
@@ -70,6 +71,19 @@ class Config:
     """Where the model comes from, if a user brings it."""
     source: Document | None = field(default=None, init=False, compare=False, repr=False)
     """What it was made from, so that single values can be replaced; a copy with other values has none."""
+
+    def __repr__(self) -> str:
+        return f"<Config {self.name}>\n{self.to_yaml()}"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the parameters, their values, meanings and units."""
+        rows = []
+        for name, value in self.parameters.items():
+            ends = " … ".join(f"{v:g}" for v in (value.numbers[0], value.numbers[-1])[: 1 + value.is_axis])
+            words = [ends, f"{len(value.numbers)} values" if value.is_axis else "", self.described(name)["long_name"],
+                     self.described(name).get("units", "")]  # fmt: skip
+            rows.append(f"<tr><th>{escape(name)}{''.join(f'<td>{escape(word)}' for word in words)}")
+        return f"<table><caption>{escape(self.name)}: {escape(self.model)}</caption>{''.join(rows)}</table>"
 
     def fault(self, path: Path, message: str) -> Fault:
         """A fault at the key `path`, with the place where the user can correct it if that is known."""
@@ -135,11 +149,11 @@ class Config:
         parameter, value = self.table[name], self.parameters.get(name)
         known = {"distribution": value.distribution.words} if value and value.distribution else {}
         if name in (self.own_law or laws.LAWS[self.law]).pure:
-            return {"long_name": "coefficient of friction", "units": "1", **known}
+            return {"long_name": "coefficient of friction", **known}
         units, long_name = parameter.units, SURFACES[self.surface].meanings.get(name, parameter.long_name)
         if self.units == SI:
             units, long_name = in_si(units, long_name)
-        return {"long_name": long_name, "units": units, **known}
+        return {**with_unit(long_name, units), **known}
 
     def document(self) -> dict[str, Any]:
         """The whole configuration, defaults included, as plain data."""

@@ -85,6 +85,12 @@ def plot(
         With `ax`, if there are several panels.
     StoreError
         if the file is not a dataset, or `output` cannot be written.
+
+    Examples
+    --------
+    >>> maps = sweep.predict({"friction": {"mu": [20, 60, 130, 160, 200]}})
+    >>> sweep.plot(maps, width="85mm", output="column.pdf").get_size_inches()[0] * 25.4
+    np.float64(85.0)
     """
     if output is not None and suffix(Path(output)) not in PICTURES:
         raise ValueError(f"output: {output}: unknown format; write a {A_PICTURE}")

@@ -45,6 +45,4 @@ def regimes(dataset: xr.Dataset) -> xr.DataArray:
     kinds = [SETTLES, FEW, REGULAR, WANDERS]
     found = np.select([condition.values for condition in conditions], kinds, UNDECIDED).astype("int8")
     words = {"flag_values": np.array(list(REGIMES), "int8"), "flag_meanings": " ".join(REGIMES.values())}
-    return xr.DataArray(
-        found, status.coords, status.dims, "regime", {"long_name": "regime of motion", "units": "1", **words}
-    )
+    return xr.DataArray(found, status.coords, status.dims, "regime", {"long_name": "regime of motion", **words})

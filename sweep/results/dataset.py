@@ -19,8 +19,9 @@ from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.parameters import PAPER_UNITS, SI
 from sweep.prediction import Prediction
+from sweep.results import accessor as accessor
 from sweep.results.probabilities import PROBABILITIES, probabilities
-from sweep.variables import Variable, in_si, without_unit
+from sweep.variables import Variable, in_si, with_unit, without_unit
 
 STATUSES = {
     0: "not_run",
@@ -168,13 +169,13 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     coordinates = {name: xr.Variable((name,), values, config.described(name)) for name, values in grid.axes.items()}
     for name, variable in variables.items():
         if along := VARIABLES[name].along:
-            words = {"long_name": f"number of the {along}", "units": "1"}
+            words = {"long_name": f"number of the {along}"}
             coordinates[along] = xr.Variable((along,), np.arange(1, variable.shape[-1] + 1), words)
     for name, column in (grid.table or {}).items():
         coordinates[name] = xr.Variable((grid.row,), column, config.described(name))
     if grid.rows is not None:
         index = np.arange(grid.rows, dtype="int64")
-        coordinates[grid.row] = xr.Variable((grid.row,), index, {"long_name": ROWS[grid.row], "units": "1"})
+        coordinates[grid.row] = xr.Variable((grid.row,), index, {"long_name": ROWS[grid.row]})
     for name, value in grid.constants.items():
         coordinates[name] = xr.Variable((), value, config.described(name))
     of = " of a rattleback" if config.of_rattlebacks else ""
@@ -189,7 +190,7 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
     axes = [dim for dim in dataset["status"].dims if dim != SAMPLE]
     found = probabilities(dataset)
     counts = np.arange(1, found["probability"].shape[-1] + 1)
-    coordinate = xr.Variable(("count",), counts, {"long_name": "number of reversals or more", "units": "1"})
+    coordinate = xr.Variable(("count",), counts, {"long_name": "number of reversals or more"})
     return dataset.assign_coords(count=coordinate).assign(
         {
             name: xr.Variable((*axes, "count"), found[name], described(spec, config.units))
@@ -259,7 +260,7 @@ def described(spec: Variable, system: str = PAPER_UNITS) -> dict[str, Any]:
     units, long_name = spec.units, spec.long_name
     if system != PAPER_UNITS:
         units, long_name = in_si(units, long_name) if system == SI else (units, without_unit(long_name))
-    words: dict[str, Any] = {"long_name": long_name, "units": units}
+    words: dict[str, Any] = with_unit(long_name, units)
     if spec.flags:
         words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
         words["flag_meanings"] = " ".join(spec.flags.values())

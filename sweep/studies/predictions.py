@@ -26,6 +26,11 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     ------
     ConfigError
         if the configuration cannot be used.
+
+    Examples
+    --------
+    >>> sweep.predict({"friction": {"mu": [60, 130]}}).reversals_predicted.values
+    array([3, 7], dtype=int16)
     """
     config = load_config(config, overrides)
     grid = Grid.of(config)

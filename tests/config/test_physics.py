@@ -30,7 +30,7 @@ def test_a_real_body(read: Read) -> None:
     columns = Grid.of(config).columns()
     assert columns["roll"] == pytest.approx(np.pi / 360)
     assert config.integrator.method == "dopri5"
-    assert config.described("mu") == {"long_name": "coefficient of friction", "units": "1"}
+    assert config.described("mu") == {"long_name": "coefficient of friction"}
     assert config.described("speed")["units"] == "m s-1"
     assert config.described("Ixy")["units"] == "kg m2"
 
@@ -39,7 +39,7 @@ def test_what_the_numbers_of_a_paraboloid_mean(read: Read) -> None:
     config = read(BOWL)
     assert config.equations.name == "slip+coulomb-tanh+sigma+paraboloid"
     assert config.described("a") == {
-        "long_name": "coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)", "units": "1"
+        "long_name": "coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)"
     }  # fmt: skip
     assert config.described("c")["units"] == config.described("offset")["units"] == "m"
     # A paraboloid has no outline: every contact point lies on it.

@@ -65,7 +65,7 @@ def test_the_pendulum_swings_as_scipy_says(few: xr.Dataset, folder: Path) -> Non
 def test_its_dataset_tells_the_file_its_hash_and_its_parameters(few: xr.Dataset, folder: Path) -> None:
     assert few.attrs["model_place"] == str(folder / "pendulum.py")
     assert few.attrs["model_sha256"] == load_config(folder / "pendulum.yaml").origin.digest
-    assert few["torque"].attrs == {"long_name": "torque of the drive, in m g length", "units": "1"}
+    assert few["torque"].attrs == {"long_name": "torque of the drive, in m g length"}
     assert not [name for name in few.data_vars if name.startswith("n_c") or name in ("form_factor", "energy_error")]
     assert "g/c" not in " ".join(str(v.attrs["long_name"]) for v in few.data_vars.values())
     assert few.attrs["title"] == "pendulum: reversals (pendulum.py model)"
@@ -81,7 +81,7 @@ def test_pictures_and_summaries_take_its_words(folder: Path) -> None:
     assert trajectories.draw(one).axes[0].get_lines()
     law = sweep.predict(folder / "fading.yaml")
     assert law["fading"].attrs == {"long_name": "slip velocity that halves friction", "units": "m s-1"}
-    assert law["mu"].attrs == {"long_name": "coefficient of friction", "units": "1"}
+    assert law["mu"].attrs == {"long_name": "coefficient of friction"}
     assert labels.words(law, "b") == "short semi-axis b"
 
 

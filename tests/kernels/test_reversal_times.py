@@ -56,7 +56,7 @@ def test_the_dataset_has_a_dimension_for_them(found: xr.Dataset) -> None:
     times = found.reversal_times
     assert times.dims == ("mu", "reversal")
     assert list(times.reversal) == [1, 2, 3]
-    assert times.attrs == {"long_name": "time of each spin reversal, in sqrt(c/g)", "units": "1"}
+    assert times.attrs == {"long_name": "time of each spin reversal, in sqrt(c/g)"}
 
 
 def test_on_disk_and_in_memory_are_the_same(found: xr.Dataset, write: Write) -> None:
