@@ -76,7 +76,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (step("tolerance: 5e-324"), 5, "integrator.tolerance", "must be a finite number >= 1e-14 and < 1, not 5e-324"),
     (step("stop_when_settled: no"), 5, "integrator.stop_when_settled", "must be true or false, not 'no'"),
     (SMALL + "measure: [colour]\n", 6, "measure[0]", "must be reversals, energy_error"),
-    (SMALL + "measure: [reversals, [reversals]]\n", 6, "measure[1]", "or lyapunov, not ['reversals']"),
+    (SMALL + "measure: [reversals, [reversals]]\n", 6, "measure[1]", "or misfit, not ['reversals']"),
     (SMALL + "measure: {a: 1}\n", 6, "measure", "must be a list of reversals"),
     (SMALL + "measure: [reversals, reversals]\n", 6, "measure", "a measurement twice; name each once"),
     (SMALL + "max_failed_fraction: 2\n", 6, "max_failed_fraction", "must be a finite number >= 0 and <= 1, not 2"),

@@ -39,6 +39,7 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
         "cycle_variation",
         "lyapunov",
         "lyapunov_error",
+        "misfit",
         "inferred",
         "reversal_times",
         "raw_reversals",
