@@ -70,7 +70,7 @@ class Beside:
 
 def serve_beside(source: Source, setup: Setup | None, height: int) -> Beside:
     """Serve until it is closed or this process ends, and return at once."""
-    sockets, port = _bind(None)
+    sockets, port = _bind(0)  # any that is free: a notebook shows the page, whatever its address
     ready = SimpleQueue[tuple[IOLoop, str]]()
 
     closed = asyncio.Event()
