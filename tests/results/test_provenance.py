@@ -50,7 +50,7 @@ def test_an_edit_changes_the_hash_where_a_run_imports_it(package: Path, monkeypa
 
     new = package / "kernels" / "new.py"
     edit(new)
-    assert not any(map(changed, ("explore/*.py", "plots/*.py", "cli/*.py", "*i.py", "__init__.py", "kernels/new.py")))
+    assert not any(map(changed, ("explorer/*.py", "plots/*.py", "cli/*.py", "*i.py", "__init__.py", "kernels/new.py")))
     assert all(map(changed, ("config/schema.py", "engine/local.py", "kernels/adams/step.py", "models/user/loading.py")))
     assert changed("kernels/layout.py", "def later() -> None:\n    from sweep.kernels import (\n        new,\n    )\n")
     assert changed("kernels/new.py")
