@@ -88,6 +88,7 @@ class Picture(Figure):
             super().draw(renderer)
 
     def savefig(self, *args: Any, **kwargs: Any) -> None:
+        """Save it as any figure of matplotlib, in the style in which it was drawn."""
         with mpl.rc_context(self._style):
             super().savefig(*args, **kwargs)
 
