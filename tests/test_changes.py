@@ -53,7 +53,7 @@ RK4 = """RK4 = Tableau(
 TABLEAUS = (DOPRI5, RK4)"""
 
 LAW = """        Law("square", ("mu", "speed", "fading"), _square, lambda columns: columns["mu"] / columns["speed"],
-            linear_to=_below_speed, pure=frozenset({"mu"})),
+            linear_to=lambda columns: np.asarray(_LINEAR * columns["speed"]), pure=frozenset({"mu"})),
         Law("none","""
 
 SQUARE = """@inline

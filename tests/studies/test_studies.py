@@ -77,7 +77,7 @@ def test_a_saved_trajectory_is_plotted_over_time(write: Write, tmp_path: Path) -
 
 def test_trajectory_shows_the_motion(write: Write) -> None:
     one = sweep.trajectory(write(STANDARD), mu=60).isel(trajectory=0)
-    assert all({"long_name", "units"} <= set(v.attrs) for v in one.variables.values())
+    assert all("long_name" in v.attrs for v in one.variables.values())
     assert float(one.contact_x[0]) == pytest.approx(0.01)
     assert float(one.contact_y[0]) == pytest.approx(0.01)
     # The slip's derivative, and the balance of energy and work, from the series themselves.
