@@ -307,7 +307,8 @@ def explore(dataset: xr.Dataset | str | Path, height: int = 950) -> Beside:
 
     Returns
     -------
-    The explorer, of which a notebook shows the page; its `url` opens in a browser too.  It lives as long as the kernel.
+    The explorer, of which a notebook shows the page; its `url` opens in a browser too.  It lives until its `close()` is
+    called, or as long as the kernel.
 
     Raises
     ------

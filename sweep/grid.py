@@ -86,6 +86,12 @@ class Grid:
         found = {name: values[at] for (name, values), at in zip(self.axes.items(), places, strict=False)}
         return found | {name: values[places[-1]] for name, values in (self.table or {}).items()}
 
+    def _over(self, places: Sequence[Any]) -> Grid:
+        """The grid over these places along each dimension."""
+        found = self._at(places)
+        table = None if self.table is None else {name: found[name] for name in self.table}
+        return replace(self, axes={name: found[name] for name in self.axes}, table=table)
+
     def tiles(self, cells: int) -> list[Tile]:
         """Tiles of about `cells` cells that cover the grid; each is contiguous in C order."""
         sides, inner = [1] * len(self.shape), self.size
@@ -103,9 +109,7 @@ class Grid:
 
     def part(self, tile: Tile) -> Grid:
         """The grid of the cells of a tile."""
-        found = self._at(tile)
-        table = None if self.table is None else {name: found[name] for name in self.table}
-        return replace(self, axes={name: found[name] for name in self.axes}, table=table)
+        return self._over(tile)
 
     def take(self, cells: Array) -> Grid:
         """The cells with these indices, as a list of cases."""
@@ -119,9 +123,7 @@ class Grid:
             return self
         each = max(2, int(cells ** (1 / sum(n > 1 for n in self.shape))))
         places = [np.unique(np.linspace(0, n - 1, min(each, n)).round().astype(int)) for n in self.shape]
-        found = self._at(places)
-        table = None if self.table is None else {name: found[name] for name in self.table}
-        return replace(self, axes={name: found[name] for name in self.axes}, table=table)
+        return self._over(places)
 
     def first_cell(self, tile: Tile) -> int:
         """Index of the first cell of a tile, in the C order of the grid."""

@@ -12,6 +12,7 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
+from sweep.config.distributions import Distribution
 from sweep.config.document import Document
 from sweep.config.faults import Fault, Path
 from sweep.config.schema import Integrator
@@ -95,11 +96,16 @@ class Config:
         return SAMPLE if self.samples else CASE
 
     @property
+    def distributions(self) -> dict[str, Distribution]:
+        """What is known of the parameters that are uncertain."""
+        return {name: value.distribution for name, value in self.parameters.items() if value.distribution}
+
+    @property
     def at_medians(self) -> Config:
         """The same with the median in place of each distribution."""
         if not self.samples:
             return self
-        medians = {name: Values.one(self.parameters[name].numbers[0]) for name in self.cases or ()}
+        medians = {name: Values.one(known.median) for name, known in self.distributions.items()}
         return replace(self, parameters=self.parameters | medians, cases=None, samples=None)
 
     @property
@@ -146,8 +152,8 @@ class Config:
 
     def described(self, name: str) -> dict[str, str]:
         """The CF attributes of a physical parameter, and its distribution if it has one."""
-        parameter, value = self.table[name], self.parameters.get(name)
-        known = {"distribution": value.distribution.words} if value and value.distribution else {}
+        parameter = self.table[name]
+        known = {"distribution": found.words} if (found := self.distributions.get(name)) else {}
         if name in (self.own_law or laws.LAWS[self.law]).pure:
             return {"long_name": "coefficient of friction", **known}
         units, long_name = parameter.units, SURFACES[self.surface].meanings.get(name, parameter.long_name)

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -29,9 +29,6 @@ from sweep.results.store import Store
 from sweep.studies.kept import kept
 from sweep.studies.roots import Root
 from sweep.studies.search import Search, measuring, require_certain, require_simulated
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 WIDTH = 1e-6
 """Relative distance of the two simulated cells between which a count changes."""
@@ -56,7 +53,7 @@ def boundaries(
         f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}",
     )
     return kept(
-        config, __name__, settings, lambda store: Boundaries(config, store, across, width), _draw, output,
+        config, __name__, settings, lambda store: Boundaries(config, store, across, width), output,
         fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
     )  # fmt: skip
 
@@ -233,9 +230,3 @@ def _levelled(distance: Array) -> Array:
     """Numbers of the same signs, so much alike that a contour passes through the middle part of each edge."""
     side = np.where(distance > 0, 1, -1)  # a cell may be on the boundary itself
     return np.asarray(side * (2 + np.tanh(np.abs(distance) / np.nanmax(np.abs(distance), initial=1e-300))))
-
-
-def _draw(result: xr.Dataset) -> Figure:
-    from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
-
-    return picture.plot(result)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -36,9 +36,6 @@ from sweep.studies.kept import kept
 from sweep.studies.roots import Root
 from sweep.studies.search import Search, measuring, require_certain, require_simulated
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 WIDTH = 1e-3
 """Relative width down to which simulation brackets n_c2."""
 
@@ -67,7 +64,7 @@ def critical(
     """As `sweep.api.critical`; what there is to tell goes to `reporter` alone."""
     config = searchable(config)
     return kept(
-        config, __name__, f"width of the brackets: {width!r}", lambda store: CriticalSpins(config, store, width), _draw,
+        config, __name__, f"width of the brackets: {width!r}", lambda store: CriticalSpins(config, store, width),
         output, fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
     )  # fmt: skip
 
@@ -88,12 +85,6 @@ def searchable(config: Config) -> Config:
     cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
     found = replace(measuring(config), parameters=parameters, cases=cases or None)
     return replace(found, integrator=found.integrator.patient)
-
-
-def _draw(result: xr.Dataset) -> Figure:
-    from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
-
-    return picture.plot(result)
 
 
 class Answer(NamedTuple):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -23,9 +22,6 @@ from sweep.results.dataset import described
 from sweep.studies.kept import kept
 from sweep.studies.search import Study, require_simulated
 from sweep.variables import Variable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 QUANTITIES = ("reversals", "t_first_reversal", "t_last_reversal", "spin_mean")
 """The results whose indices are found, as far as they are measured."""
@@ -58,7 +54,7 @@ def indices(
     """As `sweep.api.indices`; what there is to tell goes to `reporter` alone."""
     config = designed(config)
     return kept(
-        config, __name__, "Sobol indices", lambda store: Indices(config, store), _draw, output,
+        config, __name__, "Sobol indices", lambda store: Indices(config, store), output,
         fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
     )  # fmt: skip
 
@@ -76,7 +72,7 @@ def designed(config: Config) -> Config:
     if config.axes:
         name = next(iter(config.axes))
         raise ConfigError([config.fault(config.table[name].place, "cannot be an axis of indices; give one number")])
-    known = {name: v.distribution for name, v in config.parameters.items() if v.distribution}
+    known = config.distributions
     first, second = np.split(chances(2 * len(known), 1 << (config.samples - 1).bit_length(), config.seed), 2, axis=1)
     mixed = [np.where(np.arange(len(known)) == i, second, first) for i in range(len(known))]
     chance = np.concatenate([first, second, *mixed])
@@ -129,9 +125,3 @@ def with_intervals(values: Array, seed: int) -> dict[str, Array]:
         low, high = np.quantile([each[k] for each in again], (0.025, 0.975), axis=0)
         found |= {name: index, f"{name}_low": low, f"{name}_high": high}
     return found
-
-
-def _draw(result: xr.Dataset) -> Figure:
-    from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
-
-    return picture.plot(result)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import xarray as xr
 
@@ -22,16 +21,12 @@ from sweep.results.provenance import identify
 from sweep.results.store import Store
 from sweep.studies.search import Study
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 def kept(
     config: Config,
     maker: str,
     settings: str,
     make: Callable[[Store], Study],
-    draw: Callable[[xr.Dataset], Figure],
     output: str | Path | None,
     *,
     fresh: bool,
@@ -45,7 +40,6 @@ def kept(
     maker : module of the search, by which it is identified beside the configuration, and after which files are named
     settings : its own settings, in words
     make : makes the search, by its store
-    draw : draws the dataset
     """
     run = identify(config, maker)
     identity = replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
@@ -70,5 +64,7 @@ def kept(
         files.discard_checkpoint()
         result = netcdf.open_dataset(files.dataset)
         if not files.picture.exists():
-            files.save_picture(draw(result))
+            from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
+
+            files.save_picture(picture.plot(result))
     return result

@@ -39,10 +39,9 @@ def measuring(config: Config) -> Config:
 
 def require_certain(config: Config) -> None:
     """Raise a `ConfigError` if a parameter is a distribution."""
-    for name, value in config.parameters.items():
-        if value.distribution:
-            words = "is a distribution, of which run draws samples; here give a number or an axis"
-            raise ConfigError([config.fault(config.table[name].place, words)])
+    for name in config.distributions:
+        words = "is a distribution, of which run draws samples; here give a number or an axis"
+        raise ConfigError([config.fault(config.table[name].place, words)])
 
 
 def require_simulated(config: Config) -> None:
