@@ -51,7 +51,7 @@ def film(config: sweep.Config, law: str, omega3: float, random: np.random.Genera
     """A film of the one body of `config`, or None if it lifts off."""
     times = np.arange(0, random.uniform(4, 8), 1 / random.choice([30, 60, 120, 240]))
     true, noise = spins(config, law, times), abs(omega3) * random.uniform(0.01, 0.05)
-    return None if true is None else Film(times, true + random.normal(0, noise, len(times)), None, False, 0)
+    return None if true is None else Film(times, true + random.normal(0, noise, len(times)))
 
 
 def wooden() -> None:
@@ -60,7 +60,7 @@ def wooden() -> None:
     times = np.arange(0, 12, 1 / 60)
     true = spins(sweep.load_config("configs/wooden.yaml", body), "coulomb-sqrt", times)
     assert true is not None
-    print("Time (s),Gyroscope z (rad/s)")
+    print("Time (s),spin (rad/s)")
     for each, spin in zip(times, true + np.random.default_rng(2).normal(0, 0.05, len(times)), strict=True):
         print(f"{each:.4f},{spin:.4f}")
 

@@ -141,8 +141,8 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
         yield f"{name} cannot be measured with method: {method.name}; choose {able}"
     elif kind is misfit.Misfit and config.film:
         last, end = config.film.time[-1], config.integrator.patient.t_end
-        if config.film.heading:
-            yield f"the film {config.film_file} has headings, and a misfit is one of spins; fit it instead (sweep fit)"
+        if config.film.what != "spin":
+            yield f"the film {config.film_file} is of a {config.film.what}, and a misfit one of spins; use sweep fit"
         if last > end:
             yield f"the film {config.film_file} lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
     elif kind.follows_tangent and isinstance(model, Model) and (reason := undifferentiable(model)):

@@ -1,16 +1,17 @@
-"""A film of a body that spins: its spin, or the angle that it has turned, at instants, from a table of numbers."""
+"""A film of a body that spins, from a table of numbers: its spin, its heading, or what a gyroscope on it tells."""
 
 from __future__ import annotations
 
 import csv
 import re
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from sweep.config.faults import ConfigError, Fault, brief, either
 from sweep.grid import Array
-from sweep.kernels.measures.misfit import Film
+from sweep.kernels.measures.misfit import Film, Seen
 
 MOST_ROWS = 20_000
 """Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
@@ -22,7 +23,8 @@ _TIMES = {"s": 1.0, "": 1.0, "ms": 1e-3, "min": 60.0}
 # What trackers and phones (phyphox) call their columns, without the unit in parentheses.
 _NAMES = {
     "time": (_TIMES, ("time", "t")),
-    "spin": (_SPINS, ("spin", "n", "gyroscope z", "gyro z", "omega z", "angular velocity", "wz")),
+    "spin": (_SPINS, ("spin", "n", "angular velocity")),
+    "gyroscope": (_SPINS, ("gyroscope z", "gyro z", "omega z", "wz")),
     "heading": (_ANGLES, ("heading", "angle", "theta")),
     "error": (_SPINS | _ANGLES, ("error", "sigma", "uncertainty")),
 }
@@ -34,16 +36,16 @@ def read(path: str | Path) -> Film:
     Raises
     ------
     ConfigError
-        if there is no such file, or it has no time, neither spin nor heading, an unknown unit, a time that goes back,
-        or too few rows.
+        if there is no such file, or it has no time, nothing that is seen, an unknown unit, a time that goes back, or
+        too few rows.
     """
     path = Path(path)
     header, rows = _rows(path)
     found = _columns(path, header)
-    if "time" not in found or not {"spin", "heading"} & set(found):
-        names = either(f"'{name}'" for name in ("spin (rad/s)", "heading (deg)"))
+    what = next((each for each in get_args(Seen) if each in found), None)
+    if "time" not in found or not what:
+        names = either(f"'{name}'" for name in ("spin (rad/s)", "gyroscope z (rad/s)", "heading (deg)"))
         raise _fault(path, 1, f"needs a column 'time (s)' and one {names}; it has {brief(', '.join(header))}")
-    what = "spin" if "spin" in found else "heading"
     time, value = (rows[:, place] * factor for place, factor in (found["time"], found[what]))
     error = rows[:, found["error"][0]] * found[what][1] if "error" in found else None
     whole = np.isfinite(time) & np.isfinite(value)
@@ -58,7 +60,7 @@ def read(path: str | Path) -> Film:
         raise _fault(path, None, f"has {len(kept)} rows with a time and a {what}; a fit needs at least 8")
     value = np.unwrap(value[kept]) if what == "heading" else value[kept]
     error = None if error is None else error[kept]
-    return Film(time[kept] - time[kept[0]], value, error, what == "heading", len(rows) - len(kept))
+    return Film(time[kept] - time[kept[0]], value, error, what, len(rows) - len(kept))
 
 
 def _rows(path: Path) -> tuple[list[str], Array]:

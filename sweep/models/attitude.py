@@ -13,6 +13,9 @@ from e_y' = ω × e_y for the body's y axis.  The contact point moves over the t
 because it is at x_G + x_p and x_G' = v_p + x_p × ω.  Along the directions that X and Y get by the heading,
 
     m_along = (u1 m3 - u3 m1) / h,   m_across = -m2 / h.
+
+Seen from above, an axis e of the body turns, by e' = ω × e, at the rate (n - (e·u)(e·ω)) / (1 - (e·u)²), where n is the
+spin.
 """
 
 from __future__ import annotations
@@ -57,6 +60,20 @@ def _rates(u1: Any, u3: Any, w1: Any, w3: Any, velocity: Any, along: Any, across
     turning, h = (w1 * u1 + w3 * u3) / square, np.sqrt(square)
     # The directions along and across turn with the heading.
     return turning, (u1 * m3 - u3 * m1) / h + turning * across, -m2 / h - turning * along
+
+
+@inline
+def turning(y: Any, spin: Any, axis: Any) -> Any:
+    """The rate at which an axis of the body turns, seen from above, of states that begin with (u1, u2, ω1, ω2, ω3)."""
+    (u1, u2, w1, w2, w3), (e1, e2, e3) = y[:5], axis
+    upright = e1 * u1 + e2 * u2 - e3 * np.sqrt(1 - u1 * u1 - u2 * u2)
+    return (spin - upright * (e1 * w1 + e2 * w2 + e3 * w3)) / (1 - upright * upright)
+
+
+@inline
+def rate(y: Any, spin: Any, axis: Any) -> Any:  # noqa: ARG001
+    """The angular velocity about an axis of the body, as a gyroscope on it tells; the arguments are as of `turning`."""
+    return axis[0] * y[2] + axis[1] * y[3] + axis[2] * y[4]
 
 
 def angles(u1: Array, u2: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ within 1 or 3.84 of its least (profile likelihood: Raue et al. 2009, doi 10.1093
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -31,9 +31,15 @@ from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.misfit import Minimum, Problem
 from sweep.studies.search import require_certain, require_simulated
+from sweep.studies.sensor import UNKNOWNS, of_film
 from sweep.variables import Variable
 
 _TIME = Variable("float64", "1", "time since the film began, in sqrt(c/g)")
+_SEEN = {
+    "spin": Variable("float64", "1", "spin, in sqrt(g/c)"),
+    "gyroscope": Variable("float64", "1", "angular velocity about the sensor's axis, in sqrt(g/c)"),
+    "heading": Variable("float64", "radian", "heading"),
+}
 
 LEVELS = {68: 1.0, 95: 3.84}
 """Percent of an interval, and how far its ends raise the misfit: quantiles of chi square for one parameter."""
@@ -62,30 +68,34 @@ _TIED = 0.98
 @deferred()
 def fit(config: Config, film: str | Path | Film, free: Sequence[str], reporter: Reporter | None = None) -> xr.Dataset:
     """As `sweep.api.fit`; a film may have been read already."""
-    config = _one_body(config, free)
     film = film if isinstance(film, Film) else read(film)
+    theirs = of_film(film)
+    config = _one_body(config, free, theirs)
     note, began = (reporter or Reporter()).note, time.perf_counter()
     if film.left_out:
         note(f"{film.left_out} rows of the film are left out: they hold no number, or are more than a fit needs")
     with explained(config.origin):
-        problem = Problem(config, film, {name: _range(config, name) for name in free})
+        problem = Problem(config, film, {name: theirs.get(name) or _range(config, name) for name in free})
         minima = _search(problem, note)
         best, limits, rugged = _intervals(problem, minima[0], note)
     words = _blind(problem, best) + ([_RUGGED] if rugged else [])
     return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began)
 
 
-def _one_body(config: Config, free: Sequence[str]) -> Config:
-    """`config` if it describes one body, apart from the `free` parameters; `ConfigError` if not."""
+def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> Config:
+    """`config` if it describes one body, apart from the `free` parameters; `ConfigError` if not.
+
+    `of_film` are the names of what may be free of the film.
+    """
     require_simulated(config)
     require_certain(config)
-    known = config.tier.parameters
+    known = (*config.tier.parameters, *of_film)
     if not free:
         raise fault_of(f"name the free parameters, out of {', '.join(known)}")
     for name in free:
         if name not in known:
             message = f"{brief(name)} is no parameter of the {config.tier.name} model{suggestion(name, known)}"
-            raise fault_of(f"{message}; its parameters are {', '.join(known)}")
+            raise fault_of(f"{message}; free may be {', '.join(known)}")
     if config.cases is not None:
         raise ConfigError([config.fault(("cases",), "cannot be fitted; a fit is of one body")])
     if more := [name for name in config.axes if name not in free]:
@@ -123,7 +133,7 @@ def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
 def _horizons(film: Film) -> Iterator[int]:
     """Numbers of instants: up to each turn of the spin, once a tenth of the film is over, and the whole film."""
     rows = len(film.time)
-    spin = np.gradient(film.value) if film.heading else film.value
+    spin = np.gradient(film.value) if film.what == "heading" else film.value
     wide = max(rows // _SMOOTH, 1)
     smooth = np.convolve(spin, np.full(wide, 1 / wide), "valid")
     clear = np.flatnonzero(np.abs(smooth) > _TURN * np.abs(smooth).max())
@@ -234,8 +244,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
     covariance, variance = _covariance(problem, best), _variance(problem, best)
     deviation, rows = np.sqrt(np.diag(covariance)), len(film.time)
     fitted = film.value + problem.residuals(best.place[None], rows)[0] * problem.error
-    what = Variable("float64", "radian", "heading") if film.heading else Variable("float64", "1", "spin, in sqrt(g/c)")
-    told, clock = (dataset.described(each, problem.config.units) for each in (what, _TIME))
+    told, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
         f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})
         for k, level in enumerate(LEVELS)
@@ -267,7 +276,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
 
 def _with(config: Config, values: Mapping[str, float]) -> Config:
     """`config` with these values of its parameters."""
-    fixed = {name: Values.one(value) for name, value in values.items()}
+    fixed = {name: Values.one(value) for name, value in values.items() if name not in UNKNOWNS}
     measure = tuple(spec for spec in config.measure if spec.partition("=")[0] != Misfit.name)  # its film lies elsewhere
     return replace(
         config, name=f"{config.name}_fit", parameters=config.parameters | fixed, measure=measure, film=None

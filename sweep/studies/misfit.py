@@ -23,6 +23,7 @@ from sweep.kernels.methods import PLAIN, automatic_step
 from sweep.kernels.samples import sampled
 from sweep.models.model import Columns
 from sweep.models.theory.linear import fastest_motion
+from sweep.studies.sensor import UNKNOWNS, seen_by
 
 # Samples per radian of the fastest motion, so that splines through them are good to 1e-6 of a ripple.
 _SAMPLES = 8.0
@@ -61,7 +62,7 @@ class Problem:
     config: Config
     film: Film
     free: Mapping[str, tuple[float, float]]
-    """The free parameters, and the ends of the ranges in which they are sought."""
+    """The free parameters, those of `sweep.studies.sensor` too, and the ends of the ranges in which they are sought."""
     trajectories: int = 0
     """How many were computed."""
 
@@ -86,25 +87,30 @@ class Problem:
         return np.where(self.ratio, np.exp(np.where(self.ratio, found, 0)), found)
 
     def columns(self, places: Array) -> dict[str, Array]:
-        """All parameters at places of shape (cells, free)."""
-        values = self.values(places)
+        """All parameters of the bodies at places of shape (cells, free)."""
         fixed = {name: np.full(len(places), v.numbers[0]) for name, v in self.config.parameters.items()}
-        return fixed | {name: np.ascontiguousarray(values[:, i]) for i, name in enumerate(self.free)}
+        return fixed | {name: values for name, values in self._found(places).items() if name not in UNKNOWNS}
+
+    def _found(self, places: Array) -> dict[str, Array]:
+        """The free parameters at places of shape (cells, free), by name."""
+        return {name: np.ascontiguousarray(each) for name, each in zip(self.free, self.values(places).T, strict=True)}
 
     def curves(self, places: Array, times: Array) -> Array:
         """What a film would see of the trajectories at `places`, shape (cells, times); NaN if one is lost before."""
-        model, columns = self.config.equations, self.columns(places)
+        model, columns, found = self.config.equations, self.columns(places), self._found(places)
         self.trajectories += len(places)
-        count = int(np.ceil(times[-1] / self.interval)) + 4
+        count = int(np.ceil((times[-1] + self.free.get("film_delay", (0, 0))[1]) / self.interval)) + 4
         spins, possible = np.full((len(places), count), np.nan), np.flatnonzero(~model.impossible(columns))
-        columns = {name: values[possible] for name, values in columns.items()}
-        spins[possible] = sampled(model, columns, self._steps(places[possible], columns), self.interval, count)
-        lost = ~np.isfinite(spins).all(axis=1)
+        columns, theirs = ({name: v[possible] for name, v in each.items()} for each in (columns, found))
+        steps, seen = self._steps(places[possible], columns), seen_by(model, self.film, columns, theirs)
+        spins[possible] = sampled(model, columns, steps, self.interval, count, *seen)
         point()
-        spline = CubicSpline(np.arange(count) * self.interval, np.where(lost[:, None], 0.0, spins), axis=1)
-        seen = (spline.antiderivative() if self.film.heading else spline)(times)
-        seen[lost] = np.nan
-        return np.asarray(seen)
+        curves = np.full((len(places), len(times)), np.nan)
+        delay, bias = (found.get(name, np.zeros(len(places))) for name in ("film_delay", "film_bias"))
+        for i in np.flatnonzero(np.isfinite(spins).all(axis=1)):
+            spline = CubicSpline(np.arange(count) * self.interval, spins[i])
+            curves[i] = (spline.antiderivative() if self.film.what == "heading" else spline)(times + delay[i]) + bias[i]
+        return curves
 
     def _steps(self, places: Array, columns: Columns) -> Array:
         """The automatic steps, or near a place at which that is known its own: the bounds of a body take 40 ms."""
@@ -119,7 +125,7 @@ class Problem:
         """(computed - seen) / error at the first `instants` of the film, shape (cells, instants)."""
         seen, error = self.film.value[:instants], self.error[:instants]
         away = self.curves(places, self.film.time[:instants]) - seen
-        if self.film.heading:  # no film tells where a heading counts from
+        if self.film.what == "heading":  # no film tells where a heading counts from
             away -= np.average(away, axis=1, weights=error**-2.0)[:, None]
         return np.where(np.isnan(away), _LOST * np.abs(seen).max(), away) / error
 

@@ -37,13 +37,13 @@ def test_spins_come_in_their_units(write: Write, header: str, mark: str, unit: f
     np.testing.assert_allclose(found.time, TIMES, atol=1e-12)
     np.testing.assert_allclose(found.value, SPINS, rtol=1e-12)
     assert found.error is None
-    assert not found.heading
+    assert found.what == ("spin" if "spin" in header else "gyroscope")
 
 
 def test_a_heading_is_unwrapped(write: Write) -> None:
     turned = 300 * TIMES  # in degrees; a turn and two thirds
     found = film.read(write(table("time (s),angle (deg),error (deg)", TIMES, turned % 360, 1 + TIMES), "film.csv"))
-    assert found.heading
+    assert found.what == "heading"
     np.testing.assert_allclose(found.value, np.radians(turned), atol=1e-12)
     np.testing.assert_allclose(found.error, np.radians(1 + TIMES), rtol=1e-12)
 
@@ -67,7 +67,7 @@ def test_a_film_of_a_million_rows_is_thinned(write: Write) -> None:
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("time\n1\n2\n", ":1:", "needs a column 'time (s)' and one 'spin (rad/s)' or 'heading (deg)'; it has time"),
+        ("time\n1\n2\n", ":1:", "'spin (rad/s)', 'gyroscope z (rad/s)' or 'heading (deg)'; it has time"),
         ("spin (m/s),time\n1,2\n", ":1:", "spin is in 'm/s'; its unit must be 1/s, deg/s, rad/s, rpm or °/s"),
         (table("t,spin", TIMES[::-1], SPINS), ":3:", "the time goes back; sort the rows by time"),
         (table("t,spin,error", TIMES, SPINS, TIMES), ":2:", "the error must be a number > 0"),

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import adaptive, columns
+from scipy.integrate import solve_ivp
+from support import adaptive, columns, newton
 from support.cli import invoke
 
 import sweep
 from sweep.config import ConfigError
 from sweep.explorer.slices import Source
-from sweep.kernels.measures.misfit import Film
+from sweep.grid import Grid
+from sweep.kernels.measures.misfit import Film, Seen
 from sweep.kernels.samples import sampled
 from sweep.models import MODELS
 from sweep.models.ladder import slip
-from sweep.models.model import take
+from sweep.models.model import stack, take
 from sweep.results.store import StoreError
 from sweep.studies.misfit import Problem
 
@@ -32,6 +35,7 @@ friction: {law: coulomb, regularisation: sqrt, mu: [0.1, 0.9], speed: [0.2, 1.5]
 start: {n0: 5, x0: 2.0e-3, y0: 2.0e-4}
 integrator: {t_end: 2}
 """
+ROCKED = {"n0": -5.0, "x0": 0.01, "y0": 1e-3}
 TRUTH = {"mu": 55.0, "n0": 0.052}
 NOISE = 0.001
 
@@ -42,12 +46,18 @@ def noisy(values: np.ndarray, noise: float = NOISE) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def seen() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, spins and headings by SciPy's DOP853, with noise, of a body that reverses within them."""
+    """Times, spins and headings, by SciPy's DOP853 and another derivation, with noise, of a body that reverses."""
     times = np.arange(0, 150, 0.5)
     body = columns(**TRUTH)
-    *states, heading = adaptive.motion(body, times, rtol=1e-10, atol=1e-13)
+    *states, _ = adaptive.motion(body, times, rtol=1e-10, atol=1e-13)
     spin = slip.rhs(tuple(states), take(slip.Constants.of(body), 0))[1][0]
-    return times, noisy(spin), noisy(heading, 0.02)
+    return times, noisy(spin), noisy(heading(body, "viscous", np.array(states)[:, 0], times), 0.02)
+
+
+def heading(body: Mapping[str, np.ndarray], law: str, start: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """How far the x axis of a body has turned, seen from above, by Newton and Euler."""
+    turned, roll, pitch, *_ = newton.pose(start, {name: float(value[0]) for name, value in body.items()}, law, times)
+    return np.asarray(turned - np.arctan(np.sin(roll) * np.tan(pitch)))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +65,7 @@ def found(seen: tuple[np.ndarray, ...], tmp_path_factory: pytest.TempPathFactory
     path = tmp_path_factory.mktemp("film") / "scene.yaml"
     path.write_text(SCENE, encoding="utf-8")
     times, spins, _ = seen
-    return sweep.fit(path, Film(times, spins, None, False, 0), ["mu", "n0"])
+    return sweep.fit(path, Film(times, spins), ["mu", "n0"])
 
 
 def test_samples_are_those_of_a_trajectory() -> None:
@@ -90,7 +100,7 @@ def test_the_truth_is_found_and_lies_in_the_intervals(found: xr.Dataset, seen: t
 def test_an_interval_ends_where_the_misfit_has_risen_by_a_quantile(write: Write, seen: tuple[np.ndarray, ...]) -> None:
     """Of one parameter alone the profile is the misfit itself, which a scan of trajectories tells."""
     times, spins, _ = seen
-    film = Film(times, spins, np.full(len(times), NOISE), False, 0)
+    film = Film(times, spins, np.full(len(times), NOISE))
     found = sweep.fit(write(SCENE), film, ["mu"], n0=TRUTH["n0"])
     problem = Problem(sweep.load_config(write(SCENE), {"n0": TRUTH["n0"]}), film, {"mu": (40.0, 70.0)})
 
@@ -106,18 +116,59 @@ def test_an_interval_ends_where_the_misfit_has_risen_by_a_quantile(write: Write,
 
 def test_a_heading_tells_the_same(write: Write, seen: tuple[np.ndarray, ...]) -> None:
     """Wherever it counts from, and with its wraps."""
-    times, _, heading = seen
-    rows = "".join(f"{time},{value % 360}\n" for time, value in zip(times, np.degrees(heading + 2), strict=True))
+    times, _, turned = seen
+    rows = "".join(f"{time},{value % 360}\n" for time, value in zip(times, np.degrees(turned + 2), strict=True))
     found = sweep.fit(write(SCENE), write("time,heading (deg)\n" + rows, "film.csv"), ["mu", "n0"])
     true = np.array(list(TRUTH.values()))
     assert np.all((found.lower_95 < true) & (true < found.upper_95))
     assert found.seen.attrs["units"] == "radian"
 
 
+@pytest.mark.parametrize("what", get_args(Seen))
+def test_a_film_of_the_true_body_is_reproduced(write: Write, what: Seen) -> None:
+    """By another derivation and integrator, with delay, bias and a sensor that leans."""
+    cell = Grid.of(config := sweep.load_config(write(STONE), {"mu": 0.3, "speed": 0.5, **ROCKED})).columns()
+    start, true = stack(config.equations.start(cell))[:, 0], {"film_delay": 0.05, "film_bias": 0.3}
+    lean = np.array([0.1, -0.05]) * (what == "gyroscope")
+    if what == "gyroscope":
+        true |= {"film_lean_x": lean[0], "film_lean_y": lean[1]}
+    times = np.arange(0, 1, 1 / 60)
+    body, law = {name: float(value[0]) for name, value in cell.items()}, "coulomb-sqrt"
+    late = np.append(0, times + true["film_delay"])
+    slopes = lambda _, y: newton.derivative(y, body, law)[0]  # noqa: E731
+    y = solve_ivp(slopes, (0, late[-1]), start, "DOP853", late, rtol=1e-12, atol=1e-14).y
+    if what == "heading":
+        del true["film_bias"]
+        value = heading(cell, law, start, late)[1:]
+    else:
+        up = np.array([*np.sin(lean), -np.sqrt(1 - np.sum(np.sin(lean) ** 2))])[:, None]
+        u = np.vstack([y[:2], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
+        value = np.sum(y[2:5] * (u if what == "spin" else up), axis=0)[1:] + true["film_bias"]
+    problem = Problem(config, Film(times, value, what=what), {name: (each, each) for name, each in true.items()})
+    away = problem.residuals(np.zeros((1, len(true))), len(times))
+    np.testing.assert_allclose(away, 0, atol=1e-6)
+    assert np.ptp(value) > 0.1
+
+
+def test_the_film_itself_is_fitted_too(write: Write) -> None:
+    """A phone that was started late, whose gyroscope has a bias, and that changes the body's inertia."""
+    scene = write(STONE)
+    known = {"mu": 0.3, "speed": 0.5, **ROCKED}
+    true = {"Izz": 1.75e-3, "film_delay": 0.03, "film_bias": 0.1, "film_lean_x": 0.05}
+    config = sweep.load_config(scene, {**known, "Izz": [1.6e-3, 1.8e-3]})
+    times = np.arange(0, 2, 1 / 100)
+    problem = Problem(config, Film(times, 0 * times, what="gyroscope"), {n: (v, v) for n, v in true.items()})
+    value = problem.curves(np.zeros((1, len(true))), times)[0]
+    found = sweep.fit(config, Film(times, noisy(value, 0.02), what="gyroscope"), list(true))
+    assert np.all((found.lower_95 < list(true.values())) & (list(true.values()) < found.upper_95))
+    assert "film_bias" not in found.attrs["config"]
+    assert found.seen.attrs["long_name"] == "angular velocity about the sensor's axis"
+
+
 def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
     """A body that spins upright has no friction, and one that hardly rattles none that could be seen."""
     times = np.arange(0, 50, 0.5)
-    film = Film(times, noisy(np.full(len(times), 0.05)), None, False, 0)
+    film = Film(times, noisy(np.full(len(times), 0.05)))
     found = sweep.fit(write(SCENE), film, ["mu", "n0"], x0=0.0, y0=0.0)
     assert found.attrs["undetermined"].startswith("the film hardly determines mu: the interval")
     assert [found[f"{side}_95"].values[0] for side in ("lower", "upper")] == pytest.approx([30, 100])
@@ -128,7 +179,7 @@ def test_friction_that_hardly_slips_is_known_by_its_slope_alone(write: Write) ->
     """With a speed far above that of the slip only the ratio of the two counts."""
     scene = write(STONE)
     one = sweep.trajectory(scene, mu=0.3, speed=0.5, every=1 / 60).isel(trajectory=0)
-    film = Film(one.time.values, noisy(one.spin.values, 0.02), None, False, 0)
+    film = Film(one.time.values, noisy(one.spin.values, 0.02))
     found = sweep.fit(scene, film, ["mu", "speed"])
     assert "speed and mu are known only together" in found.attrs["undetermined"]
     ratio = (found.value[0] / found.value[1]).item()
@@ -140,7 +191,7 @@ def test_the_command_writes_what_runs_the_fitted_body(
 ) -> None:
     times, spins, _ = seen
     rows = "".join(f"{time},{spin}\n" for time, spin in zip(times, spins, strict=True))
-    film = write("Time (s),Gyroscope z (rad/s)\n" + rows, "film.csv")
+    film = write("Time (s),spin (rad/s)\n" + rows, "film.csv")
     said = invoke("fit", write(SCENE), film, "--free", "mu,n0", "--output", tmp_path / "out")
     assert said.exit_code == 0, said.output
     assert "95 %" in said.stdout
@@ -158,17 +209,18 @@ def test_the_command_writes_what_runs_the_fitted_body(
 @pytest.mark.parametrize(
     ("free", "overrides", "words"),
     [
-        (["muu"], {}, "muu is no parameter of the slip model (did you mean mu?); its parameters are a, b"),
+        (["muu"], {}, "muu is no parameter of the slip model (did you mean mu?); free may be a, b"),
         ([], {}, "name the free parameters"),
         (["n0"], {}, "has several values; free it, or give one"),
         (["mu", "n0", "x0"], {"x0": 0.0}, "give the ends of its range as two values"),
+        (["film_lean_x"], {}, "film_lean_x is no parameter of the slip model"),
         (["mu"], {"model": "analytic", "n0": 0.05}, "is a formula and cannot be simulated"),
     ],
 )
 def test_what_cannot_be_fitted_is_refused(
     write: Write, free: list[str], overrides: dict[str, object], words: str
 ) -> None:
-    film = Film(np.arange(9.0), np.ones(9), None, False, 0)
+    film = Film(np.arange(9.0), np.ones(9))
     with pytest.raises(ConfigError) as refusal:
         sweep.fit(write(SCENE), film, free, **overrides)
     assert words in str(refusal.value)

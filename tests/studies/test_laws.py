@@ -41,7 +41,7 @@ def film(config: Path, law: str, error: float | None = None) -> Film:
     y = solve_ivp(lambda _, y: newton.derivative(y, p, law)[0], (0, 2), start, "DOP853", times, rtol=1e-8, atol=1e-11).y
     spins = np.sum(y[2:5] * [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], axis=0)
     noisy = spins + np.random.default_rng(1).normal(0, NOISE, len(times))
-    return Film(times, noisy, None if error is None else np.full(len(times), error), False, 0)
+    return Film(times, noisy, None if error is None else np.full(len(times), error))
 
 
 @pytest.fixture(scope="module")
@@ -109,5 +109,5 @@ def test_the_command_writes_table_picture_and_the_best_body(write: Write, tmp_pa
 )
 def test_what_cannot_be_compared_is_refused(write: Write, laws: list[str], free: list[str], words: str) -> None:
     with pytest.raises(ConfigError) as refusal:
-        compare(sweep.load_config(write(STONE)), Film(np.arange(9.0), np.ones(9), None, False, 0), free, laws)
+        compare(sweep.load_config(write(STONE)), Film(np.arange(9.0), np.ones(9)), free, laws)
     assert words in str(refusal.value)

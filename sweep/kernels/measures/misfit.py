@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -36,6 +36,10 @@ _SLACK = 1e-9
 _WEIGHTS = np.array([[(-1.0) ** k * comb(max(n - 1, 0), k) for k in range(POINTS)] for n in range(POINTS + 1)])
 
 
+Seen = Literal["spin", "gyroscope", "heading"]
+"""What a film can be of."""
+
+
 @dataclass(frozen=True, eq=False)
 class Film:
     """What was seen, from its first instant on; arrays of shape (instants,)."""
@@ -43,18 +47,18 @@ class Film:
     time: Array
     """Since the first instant, in the unit of time of the configuration: s in SI."""
     value: Array
-    """Spin, or heading without wraps, in radian."""
-    error: Array | None
+    error: Array | None = None
     """Standard error of each value, if the film tells."""
-    heading: bool
-    """Whether the values are headings."""
-    left_out: int
+    what: Seen = "spin"
+    """What the values are: the spin; the angular velocity about an axis of the body that points upwards at rest; or the
+    angle in radian, without wraps, by which the body's x axis has turned, seen from above."""
+    left_out: int = 0
     """Rows that hold no number, or that are too many."""
 
     @cached_property
     def sha256(self) -> str:
         """Of all numbers that decide a misfit."""
-        return hashlib.sha256(self.rows.tobytes() + bytes([self.heading])).hexdigest()
+        return hashlib.sha256(self.rows.tobytes() + self.what.encode()).hexdigest()
 
     @property
     def rows(self) -> Array:
