@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from itertools import islice
-from math import ceil, sqrt
+from math import ceil, log2, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from sweep.config.document import plain_data
 from sweep.config.faults import ConfigError, Fault
 from sweep.config.messages import describe
 from sweep.config.schema import Integrator
-from sweep.config.values import Values
+from sweep.config.values import MAX_AXIS, Values
 from sweep.grid import Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
@@ -138,7 +138,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     _refuse(source, cross_checks.of_physics(values, physics, origin))
     model = model_of(values.model, origin, physics)
     uncertain = {n: v.distribution for n, v in given.items() if v.distribution and n in model.parameters}
-    samples = values.samples or (schema.SAMPLES if uncertain else None)
+    samples = values.samples or (_samples(values.until) if uncertain else None)
     if samples and uncertain and values.cases is None:
         columns = drawn(uncertain, samples, values.seed)
     parameters = _parameters(model, given, columns or {}, known, physics)
@@ -156,6 +156,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         cases=columns,
         cases_file=values.cases,
         samples=samples,
+        until=values.until,
         seed=values.seed,
         film=_film(values.measure or (), source),
         units=physics.units,
@@ -170,6 +171,11 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     user_models.try_out(config)
     _refuse(source, islice(cross_checks.of_all_cells(config), 1))
     return config
+
+
+def _samples(until: float | None) -> int:
+    """How many samples are drawn unasked: at most as many as tell a probability of one half to ± `until`."""
+    return min(2 ** ceil(-2 * log2(until)), MAX_AXIS) if until else schema.SAMPLES
 
 
 def _refuse(source: document.Document, misfits: Iterable[cross_checks.Misfit]) -> None:

@@ -60,6 +60,8 @@ class Config:
     cases_file: str | None = None
     samples: int | None = None
     """How many samples are drawn of the parameters that are distributions, if there are such."""
+    until: float | None = None
+    """How closely every probability is to be known, if sampling ends when it is."""
     seed: int = 0
     film: Film | None = None
     """What the misfit is measured against."""
@@ -106,7 +108,7 @@ class Config:
         if not self.samples:
             return self
         medians = {name: Values.one(known.median) for name, known in self.distributions.items()}
-        return replace(self, parameters=self.parameters | medians, cases=None, samples=None)
+        return replace(self, parameters=self.parameters | medians, cases=None, samples=None, until=None)
 
     @property
     def axes(self) -> dict[str, tuple[float, ...]]:
@@ -183,6 +185,7 @@ class Config:
             **top,
             **({"cases": self.cases_file} if self.cases_file else {}),
             **({"samples": self.samples, "seed": self.seed} if self.samples else {}),
+            **({"until": self.until} if self.until else {}),
             **{section: values for section, values in found.items() if values},
             "integrator": self.integrator.model_dump(),
             "measure": [

@@ -94,6 +94,10 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
             yield path, f"must be > 0 for the {model.name} model, not 0"
     if config.samples and not columns:
         yield ("samples",), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
+    if config.until and not columns:
+        yield ("until",), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
+    if config.until and "reversals" not in config.measure:
+        yield ("measure",), "must have reversals, on which until depends; add them, or leave out until"
     for name, column in () if config.samples else columns.items():
         if name not in model.parameters:
             yield ("cases",), f"column {name}: the {model.name} model has no {name}; remove it"

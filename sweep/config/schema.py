@@ -208,6 +208,11 @@ class _Top(Strict):
         description="how many samples to draw of the parameters that are given as distributions; by default "
         f"{SAMPLES} if there is one",
     )  # fmt: skip
+    until: Annotated[float | None, Allowed("a number >= 0.001 and < 0.5")] = Field(
+        default=None, ge=0.001, lt=0.5,
+        description="stop sampling when every probability is known to so much on either side, with 95 % confidence; "
+        "`samples` is then the most, by default as many as it can take",
+    )  # fmt: skip
     seed: Whole = Field(default=0, ge=0, lt=2**32, description="seed of the samples; the same gives the same")
     refine: Whole = Field(
         default=0, ge=0, le=MAX_CELLS_IN_MEMORY.bit_length() - 1,

@@ -13,7 +13,7 @@ from sweep.config import Config
 from sweep.config.document import parse_value
 from sweep.engine.checks import verify
 from sweep.engine.plan import choose
-from sweep.engine.whole import Some
+from sweep.engine.whole import Apart, Some
 from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.kernels.kernel import steps_to
@@ -32,7 +32,7 @@ RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
 """Names of the cells that a run can be asked to compute again, with their statuses."""
 
 # What may differ between a run and the one that it enlarges; one that computes cells again may change the integrator.
-_FREE = {"name", "max_failed_fraction", "verify", "measure", "samples", "seed", "integrator.t_end"}
+_FREE = {"name", "max_failed_fraction", "verify", "measure", "samples", "seed", "until", "integrator.t_end"}
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,11 @@ class Earlier:
 
     def taken(self) -> tuple[Array, dict[str, Array]]:
         """The cells of this run that are taken over, and the earlier variables of these, by name."""
-        cells, grid = np.flatnonzero(self.cells >= 0), _grid(self.dataset)
+        cells, arrays = np.flatnonzero(self.cells >= 0), dict[str, Array]()
+        if not len(cells):
+            return cells, arrays
+        grid = _grid(self.dataset)
         _, body = grid.bodies()
-        arrays = {}
         for name, (_, spec) in dataset.layout(grid, set(map(str, self.dataset.data_vars))).items():
             tail = (self.dataset.sizes[spec.along],) if spec.along else ()
             at = self.cells[cells]
@@ -178,12 +180,24 @@ class Enlarged(Some):
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all cells, in memory."""
+        labelled = self.labelled()
+        if not self.config.verify:
+            return labelled
+        arrays, _ = self._arrays()
+        return dataset.beside(self.config, labelled, verify(self.config, np.arange(self.grid.size), arrays, Work()))
+
+    def labelled(self) -> xr.Dataset:
+        """Label all cells, without a check of some of them."""
+        arrays, apart = self._arrays()
+        words = self._attributes(len(self.cells), apart)
+        if (self.earlier.cells >= 0).any():
+            words["taken_over"] = self.earlier.words
+        words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash
+        return dataset.label(self.config, self.grid, arrays, words)
+
+    def _arrays(self) -> tuple[dict[str, Array], list[Apart]]:
+        """Arrays over all cells or bodies, and what the tiles hold apart from them."""
         arrays, (found, apart) = dict[str, Array](), self._gather()
         self._place(*self.earlier.taken(), arrays)
         self._place(self.cells, found, arrays)
-        words = self._attributes(len(self.cells), apart) | {"taken_over": self.earlier.words}
-        words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash
-        labelled = dataset.label(self.config, self.grid, arrays, words)
-        if not self.config.verify:
-            return labelled
-        return dataset.beside(self.config, labelled, verify(self.config, np.arange(self.grid.size), arrays, Work()))
+        return arrays, apart

@@ -23,6 +23,7 @@ from sweep.engine.cluster import Cluster
 from sweep.engine.enlarged import RERUN, Earlier, Enlarged, reason_against, taken_over
 from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
+from sweep.engine.sampled import Sampled
 from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
 from sweep.interrupt import deferred, point
@@ -114,7 +115,10 @@ def _compute(
 ) -> Whole:
     if earlier:
         reporter.note(earlier.words)
-        result: Whole = Enlarged(config, store, earlier)
+    if config.until:
+        result: Whole = Sampled(config, store, earlier)
+    elif earlier:
+        result = Enlarged(config, store, earlier)
     else:
         # A single cell has no neighbours from which it could be inferred.
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)

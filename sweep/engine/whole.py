@@ -121,7 +121,7 @@ class Some(Whole):
         table = self.grid.take(self.cells)
         constants = {name: self.config.parameters[name] for name in table.constants}
         cases = {name: tuple(values.tolist()) for name, values in (table.table or {}).items()}
-        return replace(self.config, refine=0, verify=0.0, parameters=constants, cases=cases, samples=None)
+        return replace(self.config, refine=0, verify=0.0, parameters=constants, cases=cases, samples=None, until=None)
 
     def save(self, path: Path) -> None:
         """Write the labelled dataset, which has to fit into memory."""

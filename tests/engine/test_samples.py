@@ -122,6 +122,59 @@ def test_more_samples_take_over_the_fewer(write: Write, tmp_path: Path, monkeypa
     assert sweep.load_config(found_config(found)).samples == 48
 
 
+def widest(dataset: xr.Dataset) -> float:
+    """Half of the widest interval."""
+    return float((dataset["probability_high"] - dataset["probability_low"]).max() / 2)
+
+
+def test_sampling_stops_when_every_probability_is_known_so_closely(write: Write, tmp_path: Path) -> None:
+    sparing, reporter = write(SCENE.replace("samples: 32", "until: 0.1\nverify: 0.05")), Stop(10**6)
+    found = sweep.run(sparing, tmp_path, reporter=reporter)
+    assert found.sizes["sample"] == 128
+    assert widest(found) <= 0.1 < widest(sweep.run(sparing, until=None, samples=64))
+    whole = sweep.run(sparing, until=None, samples=128, verify=0.0)
+    same_numbers(found.drop_vars([name for name in found.variables if "verified" in str(name)]), whole)
+    b, sample = np.divmod(found["verified_cell"].values, 128)
+    np.testing.assert_array_equal(found["verified_reversals"], found["reversals"].values[b, sample])
+    closer = sweep.run(sparing, tmp_path, until=0.06, reporter=reporter)
+    assert reporter.notes[-1].startswith("256 of 1024 cells are taken over")
+    assert closer.sizes["sample"] == 256
+    assert widest(closer) <= 0.06
+    assert (
+        sweep.run(sparing, tmp_path, until=0.2, samples=512, reporter=reporter).sizes["sample"] == 256
+    )  # none is lost
+
+
+def test_samples_end_at_their_number_however_wide_the_intervals_are(write: Write) -> None:
+    found = sweep.run(write(SCENE + "until: 0.001\n"), samples=80)
+    assert found.sizes["sample"] == 80
+    same_numbers(found, sweep.run(write(SCENE), samples=80))
+
+
+def test_an_interrupted_round_goes_on(write: Write, tmp_path: Path) -> None:
+    sparing = write(SCENE.replace("samples: 32", "until: 0.1"))
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(sparing, tmp_path, reporter=Stop(3))
+    same_numbers(sweep.run(sparing, tmp_path), sweep.run(sparing))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "n0: {normal: [0.05, 0.01]}, x0: {uniform: [0, 0.02]}",
+            "n0: 0.05",
+            "until: needs a parameter that is a distr",
+        ),
+        ("integrator", "measure: [energy_error]\nintegrator", "must have reversals, on which until depends"),
+        ("until: 0.1", "until: 0.5", "a number >= 0.001 and < 0.5"),
+    ],
+)
+def test_until_is_refused_where_there_is_nothing_to_know(write: Write, old: str, new: str, words: str) -> None:
+    with pytest.raises(sweep.ConfigError, match=words):
+        sweep.load_config(write(SCENE.replace("samples: 32", "until: 0.1").replace(old, new)))
+
+
 def found_config(dataset: xr.Dataset) -> dict[str, object]:
     """What the configuration says that a dataset tells."""
     from ruamel.yaml import YAML
