@@ -1,7 +1,8 @@
 """Finds the body, friction and start that reproduce a film.
 
 The misfit has many minima: a trajectory that reverses once more is another one.  So the search starts from points all
-over the ranges (Sobol), and first asks for the film up to its first reversal, then up to the next, and so on.
+over the ranges (Sobol), and first asks for the film up to its first reversal, then up to the next, and so on; where
+these are far apart, also for halves of what lies between them.
 
 An interval holds the values of a parameter at which the other parameters can keep the misfit, in units of the variance,
 within 1 or 3.84 of its least (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).
@@ -10,7 +11,7 @@ within 1 or 3.84 of its least (profile likelihood: Raue et al. 2009, doi 10.1093
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -120,7 +121,7 @@ def _range(config: Config, name: str) -> tuple[float, float]:
 def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
     """The minima over the whole film, the lowest first."""
     sobol = qmc.Sobol(len(problem.free), rng=0).random(POPULATION)
-    horizons = list(_horizons(problem.film))
+    horizons = _horizons(problem.film)
     cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
     places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:KEPT]]]
     for number, instants in enumerate(horizons, start=1):
@@ -130,16 +131,20 @@ def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
     return minima
 
 
-def _horizons(film: Film) -> Iterator[int]:
-    """Numbers of instants: up to each turn of the spin, once a tenth of the film is over, and the whole film."""
+def _horizons(film: Film) -> list[int]:
+    """Numbers of instants, ascending: up to each turn of the spin, the whole film, and halves of what is far apart."""
     rows = len(film.time)
     spin = np.gradient(film.value) if film.what == "heading" else film.value
     wide = max(rows // _SMOOTH, 1)
     smooth = np.convolve(spin, np.full(wide, 1 / wide), "valid")
     clear = np.flatnonzero(np.abs(smooth) > _TURN * np.abs(smooth).max())
     turns = [int(later) + wide for before, later in pairwise(clear) if smooth[before] * smooth[later] < 0]
-    yield from (at for at in turns if rows / 10 < at < 0.9 * rows)
-    yield rows
+    found = [rows]
+    for turn in [*(at for at in reversed(turns) if rows / 10 < at < 0.9 * rows), rows // 10]:
+        while found[-1] > 2.5 * turn:
+            found.append(found[-1] // 2)
+        found.append(turn)
+    return found[-2::-1]
 
 
 def _different(minima: list[Minimum]) -> list[Minimum]:
