@@ -2,7 +2,7 @@
 
     python scripts/probabilities.py [MILLIONS]
 
-Both are of the same scene, whose start spin and contact point are uncertain; ten million starts take half an hour on two
+Both are of one scene, whose start spin and contact point are uncertain.  Ten million starts take half an hour on two
 cores.
 """
 

@@ -1,10 +1,11 @@
-"""Tables of cases, with a column per parameter and a row per trajectory: CSV files, or columns in the configuration."""
+"""Tables of cases, with a column per parameter and a row per trajectory: CSV or Parquet files, or lists by column."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from sweep.config.document import Document, number
@@ -32,6 +33,8 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns
     ConfigError
         if the file cannot be read, or with a `Fault` for each cell that is wrong.
     """
+    if name.endswith(".parquet"):
+        return _of_parquet(source, name, known)
     path, text = source.read_beside("cases", name)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
@@ -52,6 +55,23 @@ def of_columns(source: Document, table: Mapping[str, Any], known: Mapping[str, P
     if faults := list(_faults_of_columns(table, known)):
         raise ConfigError(source.fault(("cases", *path), words) for path, words in faults)
     return {name: tuple(map(float, column)) for name, column in table.items()}
+
+
+def _of_parquet(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns:
+    import pandas
+
+    path = Path(source.file).parent / name
+    try:
+        table: dict[str, Any] = pandas.read_parquet(path).to_dict("list")
+    except ImportError:
+        words = "cannot be read without pyarrow; install it (pip install 'rattleback-sweep[parquet]')"
+        raise ConfigError([source.fault(("cases",), f"{brief(str(path))}: {words}")]) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "not a readable Parquet file"
+        raise ConfigError([source.fault(("cases",), f"{brief(str(path))}: {reason}")]) from None
+    if faults := list(_faults_of_columns(table, known)):
+        raise ConfigError(Fault(str(path), None, None, place, words) for place, words in faults)
+    return {column: tuple(map(float, numbers)) for column, numbers in table.items()}
 
 
 def _faults_of_columns(
