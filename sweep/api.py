@@ -200,6 +200,7 @@ def trajectory(
     *,
     every: float | None = None,
     stop_when_settled: bool = False,
+    samples: int | None = None,
     progress: bool | None = None,
     reporter: Reporter | None = None,
     **values: Any,
@@ -215,6 +216,8 @@ def trajectory(
         per period of the fastest motion
     stop_when_settled : end a trajectory when neither spin nor count can change any more, as a sweep does, and not at
         t_end, whatever the configuration says; with `t_end: .inf`, it always ends there
+    samples : follow so many samples of the parameters that are distributions, those with which a run begins, and not
+        the medians alone; a picture then shows within which bands most of them are
     values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``, of which each combination is one trajectory;
         an axis of `config` that is not named takes its first value.  Anything else replaces a value of `config`, such
         as ``t_end=300``
@@ -244,7 +247,9 @@ def trajectory(
     cells = {name: value for name, value in values.items() if name in known}
     with shown(progress, reporter, "sqrt(c/g)") as told:
         checked = load_config(config, {n: v for n, v in values.items() if n not in known}, announce=told.note)
-        return trajectory(checked, every=every, stop_when_settled=stop_when_settled, reporter=told, **cells)
+        return trajectory(
+            checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
+        )
 
 
 def fit(

@@ -101,6 +101,8 @@ def run(
 @AT
 @click.option("--stop-when-settled", is_flag=True,
               help="End when neither spin nor count can change any more, as a sweep does, not at t_end.")  # fmt: skip
+@click.option("--samples", type=click.IntRange(1), metavar="N",
+              help="Follow N samples of the uncertain parameters, not their medians.")  # fmt: skip
 @OUTPUT
 @SETTINGS
 @DRY_RUN
@@ -109,6 +111,7 @@ def trajectory(
     config: Path,
     cells: tuple[str, ...],
     stop_when_settled: bool,
+    samples: int | None,
     output: Path | None,
     settings: tuple[str, ...],
     dry_run: bool,
@@ -117,7 +120,8 @@ def trajectory(
     """Follow single cells of CONFIG densely in time, up to its t_end.
 
     Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip,
-    normal force, energy and the work of friction.  Several trajectories are drawn over each other.
+    normal force, energy and the work of friction.  Several trajectories are drawn over each other; of samples,
+    the bands in which most of the spins lie.
     """
     checked = loaded(config, settings)
     at = cells_of(cells, checked.table)
@@ -125,7 +129,7 @@ def trajectory(
         from sweep.studies.trajectory import estimate
 
         with of_option("--at", checked.table):
-            click.echo(estimate(checked, at))
+            click.echo(estimate(checked, at, samples))
         return
     from sweep.plots import picture
     from sweep.progress import Terminal
@@ -134,7 +138,7 @@ def trajectory(
 
     interrupt.raise_again()
     with Terminal(quiet, _TIMES[checked.units]) as terminal, of_option("--at", checked.table):
-        result = follow(checked, stop_when_settled=stop_when_settled, reporter=terminal, **at)
+        result = follow(checked, stop_when_settled=stop_when_settled, samples=samples, reporter=terminal, **at)
     files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
     files.save_result(result, picture.plot(result))
     if not quiet:

@@ -62,7 +62,8 @@ def _of_parquet(source: Document, name: str, known: Mapping[str, Parameter]) -> 
 
     path = Path(source.file).parent / name
     try:
-        table: dict[str, Any] = pandas.read_parquet(path).to_dict("list")
+        with path.open("rb") as stream:
+            table: dict[str, Any] = pandas.read_parquet(stream).to_dict("list")
     except ImportError:
         words = "cannot be read without pyarrow; install it (pip install 'rattleback-sweep[parquet]')"
         raise ConfigError([source.fault(("cases",), f"{brief(str(path))}: {words}")]) from None

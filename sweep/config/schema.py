@@ -189,10 +189,10 @@ class _Top(Strict):
     units: Literal[PAPER_UNITS, SI] = Field(  # type: ignore[valid-type]
         default=PAPER_UNITS, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
     )
-    cases: Annotated[str | None, Allowed("the name of a CSV or Parquet file, or lists of numbers by parameter")] = Field(
+    cases: Annotated[str | None, Allowed("a CSV or Parquet file, or lists of numbers by parameter")] = Field(
         default=None,
-        description="table with a column for each parameter and a row for each trajectory, instead of axes: the name of "
-        "a CSV or Parquet file, or lists of numbers",
+        description="table with a column for each parameter and a row for each trajectory, instead of axes: the name "
+        "of a CSV or Parquet file, or lists of numbers",
     )  # fmt: skip
     integrator: Integrator = Integrator()
     measure: Annotated[list[str] | None, BeforeValidator(_measures), Allowed(f"a list of {', '.join(MEASURES)}")] = (

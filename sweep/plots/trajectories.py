@@ -8,10 +8,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from sweep.grid import Array
+from sweep.grid import SAMPLE, Array
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.plots import labels, lines, theory
+from sweep.plots import bands, labels, lines, theory
 from sweep.plots.figure import Picture, page, panel_width
 from sweep.results.kind import is_of_own_body, parameters
 
@@ -66,8 +66,9 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     series = [str(name) for name, v in dataset.data_vars.items() if over_time & set(v.dims)]
     if variable is not None and variable not in series:
         raise ValueError(f"there is no series {variable}; choose {', '.join(series)}")
-    panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and variable is None]
-    if is_of_own_body(dataset) and variable is None:
+    alone = variable is not None or SAMPLE in dataset.coords
+    panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and not alone]
+    if is_of_own_body(dataset) and not alone:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     columns = 2 if page() > _NARROW else 1
@@ -106,6 +107,9 @@ def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
 
 def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist]:
     """Draw the spins; returns the entries for the legend."""
+    if SAMPLE in dataset.coords:
+        axes.axhline(0, color="black", linewidth=0.5)
+        return _series(axes, dataset, {"spin": "spin n"})
     for i in range(dataset.sizes["trajectory"]):
         times = reversal_times(dataset.isel(trajectory=i))
         axes.plot(times, np.zeros(len(times)), "o", color=f"C{i}", markersize=4)
@@ -117,6 +121,10 @@ def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist
 
 def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Artist]:
     """Draw series of all trajectories, in their colours; returns the entries of the trajectories for the legend."""
+    first = next(iter(names))
+    axes.set_ylabel(_with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
+    if SAMPLE in dataset.coords:
+        return bands.draw(axes, dataset, first)
     entries: list[Artist] = []
     # Oscillations are so dense that an opaque curve would hide those below it.
     alone = dataset.sizes["trajectory"] == 1 or "spin" in names
@@ -137,8 +145,6 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
             handles=styles, ncols=2, frameon=False, loc="lower right", bbox_to_anchor=(1, 0.98),
             borderaxespad=0.2,
         )  # fmt: skip
-    first = next(iter(names))
-    axes.set_ylabel(_with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
     return entries
 
 

@@ -26,7 +26,7 @@ from sweep.engine.plan import kernels, plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.engine.work import Work
-from sweep.grid import Array, Grid
+from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import threads
 from sweep.kernels import path
@@ -99,6 +99,7 @@ def trajectory(
     *,
     every: float | None = None,
     stop_when_settled: bool = False,
+    samples: int | None = None,
     reporter: Reporter | None = None,
     **at: Any,
 ) -> xr.Dataset:
@@ -114,6 +115,8 @@ def trajectory(
         per period of the fastest motion
     stop_when_settled : as of a sweep: end a trajectory when neither spin nor count can change any more.  Otherwise it
         goes to t_end, whatever the configuration says; with `t_end: .inf`, it always ends there
+    samples : follow so many samples of the parameters that are distributions, those with which a run begins, and not
+        the medians alone
     reporter : receives progress, counted in time, and messages; by default there are none
     at : a number, or several as an axis of a configuration has them, by parameter; each combination is one
         trajectory.  An axis of `config` that is not named takes its first value
@@ -130,11 +133,15 @@ def trajectory(
     ConfigError
         if the model is a formula, or `at` picks cells that cannot be run.
     """
-    chosen = choose(config, at)
+    chosen = choose(config, at, samples)
     stops = stop_when_settled or chosen.integrator.t_end >= FOREVER
     chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_when_settled": stops}))
     with explained(chosen.origin):
-        return _followed(chosen, every, reporter or Reporter())
+        found = _followed(chosen, every, reporter or Reporter())
+    if not samples:
+        return found
+    numbers = np.arange(found.sizes["trajectory"]) % samples
+    return found.assign_coords({SAMPLE: ("trajectory", numbers, {"long_name": dataset.ROWS[SAMPLE]})})
 
 
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
@@ -176,9 +183,9 @@ def _described(times: Array, series: dict[str, Array], model: Model, system: str
     return xr.Dataset(found)
 
 
-def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
+def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> str:
     """Trajectories, steps, samples and time, a line each; parameters and errors as of `trajectory`."""
-    chosen = choose(config, at)
+    chosen = choose(config, at, samples)
     columns, integrator = Grid.of(chosen).columns(), chosen.integrator
     model, step = chosen.equations, integrator.step
     steps = np.full(Grid.of(chosen).size, integrator.t_end)
@@ -197,9 +204,12 @@ def estimate(config: ConfigLike, at: Mapping[str, Any]) -> str:
     )
 
 
-def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
-    """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run."""
-    config = load_config(config)
+def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> Config:
+    """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run.
+
+    What `at` does not name of the parameters that are distributions is at its median, or else at each of the `samples`.
+    """
+    config = load_config(config, {} if samples is None else {"samples": samples})
     require_simulated(config)
     config = replace(config, integrator=config.integrator.patient)
     method = METHODS.get(config.integrator.method)
@@ -209,7 +219,9 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
         config = replace(config, integrator=plain)
     dataset.check_names(config, SERIES)
     wanted = _numbers(config, at)
-    if (count := prod(map(len, wanted.values()))) > MAX_TRAJECTORIES:
+    table = {name: values for name, values in (config.cases or {}).items() if samples and name not in wanted}
+    drawn = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)] or [{}]
+    if (count := prod(map(len, wanted.values())) * len(drawn)) > MAX_TRAJECTORIES:
         raise ConfigError(
             [Fault("", None, None, (), f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")]
         )
@@ -217,7 +229,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any]) -> Config:
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
         constants |= {name: column[0] for name, column in config.cases.items()}
-    cells = [dict(zip(wanted, values, strict=True)) for values in product(*wanted.values())]
+    cells = [dict(zip(wanted, values, strict=True)) | row for values in product(*wanted.values()) for row in drawn]
     cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)
     if beyond := unfit(chosen) or misplaced(chosen):

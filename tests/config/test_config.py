@@ -123,7 +123,7 @@ def test_cases_of_a_parquet_file(write: Write, tmp_path: Path) -> None:
         (tmp_path / "cells.parquet").unlink()
         if wrong:
             (tmp_path / "cells.parquet").write_bytes(wrong)
-        with pytest.raises(ConfigError, match=rf"small.yaml:2:1: cases: .*cells.parquet: {words}"):
+        with pytest.raises(ConfigError, match=rf"small.yaml:2:8: cases: .*cells.parquet: {words}"):
             load_config(write(CASES.replace(".csv", ".parquet")))
 
 

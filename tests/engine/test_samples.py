@@ -175,6 +175,29 @@ def test_until_is_refused_where_there_is_nothing_to_know(write: Write, old: str,
         sweep.load_config(write(SCENE.replace("samples: 32", "until: 0.1").replace(old, new)))
 
 
+def test_trajectories_of_samples_are_those_of_the_run_and_drawn_as_bands(write: Write) -> None:
+    scene = write(SCENE)
+    found = sweep.run(scene, samples=5)
+    seen = sweep.trajectory(scene, samples=5, b=[2, 3], every=20.0)
+    assert seen["sample"].values.tolist() == [0, 1, 2, 3, 4] * 2
+    for name in ("reversals", "t_last_reversal"):
+        np.testing.assert_array_equal(seen[name], found[name].values.ravel())
+    figure = sweep.plot(seen)
+    (axes,) = figure.axes
+    lines = {line.get_gid(): line for line in axes.get_lines()[1:]}
+    np.testing.assert_array_equal(lines["spin"].get_ydata(), np.median(seen["spin"][5:], axis=0))
+    widest = axes.collections[0].get_datalim(axes.transData)
+    below, above = np.quantile(seen["spin"][:5], [0.025, 0.975], axis=0)
+    assert (widest.y0, widest.y1) == pytest.approx((below.min(), above.max()))
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "b = 2, median of 5 samples", "b = 3, median of 5 samples", "95% of them", "68% of them",
+    ]  # fmt: skip
+    assert sweep.trajectory(scene, samples=3, n0=0.05, t_end=10).n0.values.tolist() == [0.05] * 3
+    with pytest.raises(sweep.ConfigError, match="samples: needs a parameter that is a distribution"):
+        sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, samples=3)
+
+
 def found_config(dataset: xr.Dataset) -> dict[str, object]:
     """What the configuration says that a dataset tells."""
     from ruamel.yaml import YAML
