@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -65,10 +66,20 @@ def wooden() -> None:
         print(f"{each:.4f},{spin:.4f}")
 
 
-def main(films: int, seed: int = 1) -> None:
-    """Print a line for each film, and shares at the end."""
-    random, held, best, seconds, trajectories = np.random.default_rng(seed), [], [], [], []
-    while len(best) < films:
+class Case(NamedTuple):
+    """A film, and what is known and sought of its body."""
+
+    law: str
+    known: dict[str, Any]
+    film: Film
+    sought: dict[str, list[float]]
+    truth: dict[str, float]
+
+
+def cases(films: int, seed: int) -> Iterator[Case]:
+    """So many films of random bodies."""
+    random, left = np.random.default_rng(seed), films
+    while left:
         for body in bodies(int(random.integers(2**31)), tapped=False):
             law = random.choice(list(LAWS))
             friction = LAWS[law] | {"mu": LAWS[law]["mu"] * random.uniform(0.5, 2)}
@@ -82,18 +93,30 @@ def main(films: int, seed: int = 1) -> None:
                 "mu": [LAWS[law]["mu"] / 4, LAWS[law]["mu"] * 4], "roll": [5e-4, 0.04], "pitch": [5e-4, 0.04],
                 "omega3": sorted([0.7 * truth["omega3"], 1.2 * truth["omega3"]]),
             }  # fmt: skip
-            began = time.perf_counter()
-            found = sweep.fit(known, seen, FREE, **sought)
-            seconds.append(time.perf_counter() - began)
-            of_truth = np.sum((true_curve(known, seen) - seen.value) ** 2)
-            best.append(np.sum((found["fitted"] - found["seen"]) ** 2).item() <= of_truth)
-            trajectories.append(found.attrs["trajectories"])
-            true = np.array([truth[name] for name in FREE])
-            held.append([(found[f"lower_{n}"] <= true) & (true <= found[f"upper_{n}"]) for n in (68, 95)])
-            print(f"{law}: best {best[-1]}, held {np.array(held[-1]).astype(int).tolist()}, {seconds[-1]:.1f} s, "
-                  f"{trajectories[-1]} trajectories; {found.attrs['undetermined']}", flush=True)  # fmt: skip
-            if len(best) == films:
-                break
+            yield Case(law, known, seen, sought, truth)
+            if not (left := left - 1):
+                return
+
+
+def is_best(case: Case, fitted: np.ndarray) -> bool:
+    """Whether a curve misses the film by no more than that of the truth."""
+    seen = case.film.value
+    return bool(np.sum((fitted - seen) ** 2) <= np.sum((true_curve(case.known, case.film) - seen) ** 2))
+
+
+def main(films: int, seed: int = 1) -> None:
+    """Print a line for each film, and shares at the end."""
+    held, best, seconds, trajectories = [], [], [], []
+    for case in cases(films, seed):
+        began = time.perf_counter()
+        found = sweep.fit(case.known, case.film, FREE, **case.sought)
+        seconds.append(time.perf_counter() - began)
+        best.append(is_best(case, found["fitted"].values))
+        trajectories.append(found.attrs["trajectories"])
+        true = np.array([case.truth[name] for name in FREE])
+        held.append([(found[f"lower_{n}"] <= true) & (true <= found[f"upper_{n}"]) for n in (68, 95)])
+        print(f"{case.law}: best {best[-1]}, held {np.array(held[-1]).astype(int).tolist()}, {seconds[-1]:.1f} s, "
+              f"{trajectories[-1]} trajectories; {found.attrs['undetermined']}", flush=True)  # fmt: skip
     shares = np.array(held, float).mean(axis=0)
     for i, name in enumerate(FREE):
         print(f"{name}: {shares[0, i]:.1%} within 68 %, {shares[1, i]:.1%} within 95 %")
