@@ -167,17 +167,12 @@ def test_the_film_itself_is_fitted_too(write: Write) -> None:
     assert found.seen.attrs["long_name"] == "angular velocity about the sensor's axis"
 
 
-def test_a_film_is_learned_bit_by_bit_even_where_it_does_not_turn() -> None:
-    """From all over the ranges a film that turned in its first tenth alone was once fitted as a whole, and missed."""
-    times = np.linspace(0, 10, 400)
-    for spin in (np.cos(times), np.where(times < 0.5, 1 - 4 * times, -1), np.exp(-times)):
-        found = _horizons(Film(times, spin))
-        assert found[-1] == 400
-        assert found[0] <= 100
-        assert all(before < after <= 2.5 * before + 1 for before, after in pairwise(found))
-    turns = [time for k in range(3) if 1 < (time := np.pi * (k + 0.5)) < 9]
-    near = times[np.array(_horizons(Film(times, np.cos(times)))) - 1]
-    assert all(np.min(np.abs(near - turn)) < 0.5 for turn in turns)
+@pytest.mark.parametrize("rows", [8, 100, 20_000])
+def test_a_film_is_learned_bit_by_bit(rows: int) -> None:
+    found = _horizons(rows)
+    assert found[-1] == rows
+    assert found[0] <= max(rows / 10, 2)
+    assert all(before <= after <= 1.5 * before + 1 for before, after in pairwise(found))
 
 
 def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
