@@ -50,8 +50,8 @@ POPULATION, KEPT = 256, 8
 # Minima whose parameters differ by less than this share of their ranges are one.
 _SAME = 0.01
 
-# The search sees so much more of the film each time, and begins with its first twelfth.  Of three films of turning bodies
-# that were fitted from one reversal to the next, all were missed; doubling missed two, and 1.3 was no better than 1.5.
+# The search sees so much more of the film each time, and begins with its first twelfth.  Three films of turning bodies
+# that were fitted from one reversal to the next were missed; doubling missed two, and 1.3 was no better than 1.5.
 _LONGER, _HORIZONS = 1.5, 7
 
 # A direction is not determined if its 95 % interval is longer than this share of the ranges.
