@@ -88,7 +88,7 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str) -> dict[str
         axes.set_yticks(present, labels=[first.flags.get(value, str(value)) for value in present])
     axes.grid(alpha=0.3)
     if first.name in theory.REVERSALS:
-        entries |= lines.draw_vertical(axes, theory.crossings(chosen, x))
+        entries |= lines.draw_vertical(axes, theory.crossings(chosen, first.x))
         if x == "b" and "form_factor" in chosen:
             entries["form_factor"] = _form_factor(axes, chosen)
     return entries

@@ -80,20 +80,16 @@ def _label(axes: Axes, shown: Map, line: Line) -> None:
     x, y = max(line.parts, key=lambda part: len(part[0]))
     inside = (shown.x.edges[0] <= x) & (x <= shown.x.edges[-1]) & (shown.y.edges[0] <= y) & (y <= shown.y.edges[-1])
     points = np.stack([x, y], axis=1)[inside]
-    place_on_map = axes.transData + axes.transAxes.inverted()
-    last = len(points) - 1
-    if line.name == "n_c1":  # the lines are farthest apart near the ends that are closer to the middle
-        at = min(
-            points[[last // 8, last - last // 8]],
-            key=lambda point: float(np.hypot(*(place_on_map.transform(point) - 0.5))),
-        )
-    else:
-        at = points[int(0.6 * last)]
+    path = (axes.transData + axes.transAxes.inverted()).transform(points)
+    length = np.cumsum(np.hypot(*np.diff(path, axis=0, prepend=path[:1]).T))
+    # The lines of n_c1 and n_c2 are farthest apart near the ends that are closer to the middle.
+    shares = np.searchsorted(length, length[-1] * np.array([0.125, 0.875] if line.name == "n_c1" else [0.6]))
+    k = min(shares, key=lambda share: float(np.hypot(*(path[share] - 0.5))))
     outwards = 1 if "⁺" in line.symbol else -1
     if shown.y.name == "n0":
         place: dict[str, Any] = {"xytext": (0, 4 * outwards), "ha": "center", "va": "bottom" if outwards > 0 else "top"}
     else:
         if shown.x.name != "n0":
-            outwards = 1 if place_on_map.transform(at)[0] < 0.5 else -1
+            outwards = 1 if path[k, 0] < 0.5 else -1
         place = {"xytext": (4 * outwards, 0), "ha": "left" if outwards > 0 else "right", "va": "center"}
-    axes.annotate(in_maths(line.symbol), at, textcoords="offset points", path_effects=_halo(2), **place)
+    axes.annotate(in_maths(line.symbol), points[k], textcoords="offset points", path_effects=_halo(2), **place)

@@ -14,6 +14,7 @@ import xarray as xr
 from sweep.axis import Axis, contours
 from sweep.grid import Array
 from sweep.models.ladder.analytic import best_b
+from sweep.plots import fine
 
 REVERSALS = ("reversals", "reversals_predicted", "difference", "raw_reversals", "reversals_low", "reversals_high")
 """The variables that theory explains."""
@@ -69,7 +70,7 @@ def words(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> str:
 def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
     """The lines over a map with these axes, for which all other axes of the dataset are fixed."""
     across, found = {x.name, y.name}, list[Line]()
-    for name, sign, values, source in _explaining(dataset, across):
+    for name, sign, values, source in _explaining(dataset, x, y):
         parts = _over_spins(values, x, y) if "n0" in across else _contours(values, float(dataset["n0"]), x, y)
         if parts:
             found.append(Line(name, words(name, source, over_n0="n0" in across), parts, sign))
@@ -80,29 +81,36 @@ def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
     return found
 
 
-def crossings(dataset: xr.Dataset, x: str) -> list[Line]:
+def crossings(dataset: xr.Dataset, x: Axis) -> list[Line]:
     """Where along the one axis `x` of curves the start spin passes a critical spin, and where L(f) is largest."""
     found = list[Line]()
-    for name, sign, values, source in _explaining(dataset, {x}) if x else ():
-        at = dataset[x].values
-        beyond = np.broadcast_to(dataset["n0"].values - values.values, at.shape) * (1 if "⁺" in sign else -1)
+    for name, sign, values, source in _explaining(dataset, x) if x.name else ():
+        at = (x if x.name == "n0" else _axis(values, x)).values
+        start = at if x.name == "n0" else dataset["n0"].values
+        beyond = np.broadcast_to(start - values.values, at.shape) * (1 if "⁺" in sign else -1)
         known = np.isfinite(beyond)
         k = np.flatnonzero(((beyond[1:] < 0) != (beyond[:-1] < 0)) & known[1:] & known[:-1])
         if len(k):
             passed = at[k] + (at[k + 1] - at[k]) * beyond[k] / (beyond[k] - beyond[k + 1])
-            found.append(Line(name, words(name, source, over_n0=x == "n0"), [(passed, np.array([]))], sign))
-    if x == "b" and (b := best_shape(dataset)):
+            found.append(Line(name, words(name, source, over_n0=x.name == "n0"), [(passed, np.array([]))], sign))
+    if x.name == "b" and (b := best_shape(dataset)):
         found.append(Line("best", _best_words(b), [(np.array([b]), np.array([]))]))
     return found
 
 
-def _explaining(dataset: xr.Dataset, across: set[str]) -> Iterator[tuple[str, str, xr.DataArray, str]]:
-    """The name, symbol, values and source of the critical spins that vary over no other axes, beside a start spin."""
-    if "n0" in dataset.coords and set(dataset["n0"].dims) <= across & {"n0"}:
-        for name in ("n_c1", "n_c2"):
-            for sign, values, source in critical_spins(dataset, name):
-                if set(values.dims) <= across:
-                    yield name, sign, values, source
+def _explaining(dataset: xr.Dataset, *axes: Axis) -> Iterator[tuple[str, str, xr.DataArray, str]]:
+    """The name, symbol, values and source of the critical spins that vary over no other axes, beside a start spin.
+
+    The values are those between the cells, as far as they can be had.
+    """
+    across = {axis.name for axis in axes}
+    if "n0" not in dataset.coords or not set(dataset["n0"].dims) <= across & {"n0"}:
+        return
+    between = fine.critical_spins(dataset, *axes)
+    for name in ("n_c1", "n_c2"):
+        for sign, values, source in critical_spins(dataset, name):
+            if set(values.dims) <= across:
+                yield name, sign, between.get(str(values.name), values), source
 
 
 def best_shape(dataset: xr.Dataset) -> float | None:
@@ -118,19 +126,25 @@ def _best_words(b: float) -> str:
 
 
 def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
-    """A critical spin over the other axis than n0, right across the map if it does not depend on that axis."""
+    """A critical spin over the other axis than n0."""
     spin, other = (x, y) if x.name == "n0" else (y, x)
-    spins = np.broadcast_to(values.values, len(other.values)).astype(float)
+    along = _axis(values, other).values
+    spins = np.broadcast_to(values.values, along.shape).astype(float)
     if not ((spin.values[0] <= spins) & (spins <= spin.values[-1])).any():
         return []
-    along = other.values.astype(float)
-    if values.ndim == 0:
-        along[[0, -1]] = other.edges[[0, -1]]
     return [(spins, along) if spin is x else (along, spins)]
 
 
 def _contours(values: xr.DataArray, n0: float, x: Axis, y: Axis) -> list[Points]:
     """Where a critical spin equals the start spin of the map."""
-    template = xr.DataArray(np.zeros((len(y.values), len(x.values))), dims=(y.name, x.name))
+    across, up = _axis(values, x), _axis(values, y)
+    template = xr.DataArray(np.zeros((len(up.values), len(across.values))), dims=(y.name, x.name))
     field = values.drop_vars(values.coords).broadcast_like(template).transpose(y.name, x.name).values
-    return list(contours(field, x, y, n0))
+    return list(contours(1 / field, across, up, 1 / n0)) if n0 else []  # n_c is infinite for a round body
+
+
+def _axis(values: xr.DataArray, axis: Axis) -> Axis:
+    """The axis of a map with the places of these values, or with both its edges where they do not vary along it."""
+    if axis.name in values.coords:
+        return Axis(axis.name, values[axis.name].values)
+    return axis if axis.name in values.dims else Axis(axis.name, axis.edges[[0, -1]])

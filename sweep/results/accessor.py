@@ -11,7 +11,7 @@ from typing import Any
 import xarray as xr
 from ruamel.yaml import YAML
 
-from sweep.config import load_config
+from sweep.config import Config, load_config
 
 
 @xr.register_dataset_accessor("sweep")  # type: ignore[no-untyped-call]
@@ -42,5 +42,9 @@ class Accessor:
         """
         if "config" not in self._dataset.attrs:
             raise ValueError("the dataset tells no configuration; call sweep.trajectory with one")
-        document = YAML(typ="safe", pure=True).load(self._dataset.attrs["config"])
-        return import_module("sweep.api").trajectory(load_config(document, announce=None), **values)
+        return import_module("sweep.api").trajectory(configuration(self._dataset.attrs["config"]), **values)
+
+
+def configuration(text: str) -> Config:
+    """The configuration that a dataset tells in `config`; `ConfigError` if its model is code of a user."""
+    return load_config(YAML(typ="safe", pure=True).load(text) or {}, announce=None)

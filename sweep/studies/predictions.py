@@ -34,4 +34,5 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """
     config = load_config(config, overrides)
     grid = Grid.of(config)
-    return dataset.label(config, grid, dataset.predicted(prediction.predict(config.tier, grid, config.measure)), {})
+    found = dataset.predicted(prediction.predict(config.tier, grid, config.measure))
+    return dataset.label(config, grid, found, {"config": config.to_yaml()})

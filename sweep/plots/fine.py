@@ -1,0 +1,74 @@
+"""Critical spins between the cells of a map, by formulas and eigenvalues, so that their lines are smooth.
+
+From the dataset alone, and without any library that draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+
+import numpy as np
+import xarray as xr
+
+from sweep.axis import Axis
+from sweep.config import Config, ConfigError
+from sweep.grid import Grid
+from sweep.parameters import START
+from sweep.prediction import predict
+from sweep.results.accessor import configuration
+from sweep.results.dataset import predicted
+
+_POINTS = {1: 401, 2: 41}
+"""Values along one axis, and along each of two; the eigenvalues of a body take 0.1 ms."""
+
+
+def critical_spins(dataset: xr.Dataset, *axes: Axis) -> Mapping[str, xr.DataArray]:
+    """The critical spins along the axes of a map, from edge to edge, by the names that they have in a dataset.
+
+    Each extends over those of the axes on which the body depends.  There are none if a parameter of the body varies
+    along another axis, and none if the dataset tells no configuration, or one whose model is code of a user.
+    """
+    text = str(dataset.attrs.get("config", ""))
+    config = _config(text)
+    body = [name for name in config.tier.parameters if name not in START] if config else []
+    drawn = {axis.name: axis for axis in axes if axis.name in body}
+    fixed = [name for name in body if name not in drawn]
+    if not config or any(name not in dataset.coords or dataset[name].ndim for name in fixed):
+        return {}
+    between = tuple((name, tuple(_between(axis, len(drawn), config))) for name, axis in drawn.items())
+    return _evaluated(text, between, tuple((name, float(dataset[name])) for name in fixed))
+
+
+def _between(axis: Axis, axes: int, config: Config) -> Iterator[float]:
+    """Values along one of so many axes from edge to edge, as far as the parameter may have them."""
+    first, last = axis.straight(axis.edges)[[0, -1]]
+    for value in axis.bent(np.linspace(first, last, _POINTS[axes])).tolist():
+        if config.table[axis.name].allows(value) and (value > 0 or axis.name not in config.tier.positive):
+            yield value
+
+
+@lru_cache(maxsize=8)
+def _config(text: str) -> Config | None:
+    try:
+        return configuration(text)
+    except (ConfigError, ValueError):
+        return None
+
+
+@lru_cache(maxsize=8)
+def _evaluated(
+    text: str, axes: tuple[tuple[str, tuple[float, ...]], ...], fixed: tuple[tuple[str, float], ...]
+) -> Mapping[str, xr.DataArray]:
+    """The critical spins over bodies, of the configuration with this text; kept, since panels and maps share them."""
+    config = _config(text)
+    assert config is not None
+    # No critical spin depends on the start.
+    starts = {name: value.numbers[0] for name, value in config.parameters.items() if name in START}
+    grid = Grid({name: np.array(values) for name, values in axes}, {**starts, **dict(fixed)})
+    found = predicted(predict(config.tier, grid))
+    return {
+        name: xr.DataArray(values.reshape(grid.shape), grid.axes, grid.dims)
+        for name, values in found.items()
+        if name.startswith("n_c")
+    }

@@ -1,0 +1,71 @@
+"""The lines of theory over maps and curves, beside the formulas and eigenvalues of the bodies that they pass."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import sweep
+from sweep.axis import Axis
+from sweep.models import MODELS
+from sweep.models.ladder import analytic
+from sweep.models.theory import stability
+from sweep.plots.theory import Line, crossings, lines
+
+BODY = {"a": 10.0, "c": 1.0, "delta": 0.03}
+
+
+def predictions(mu: list[float], n0: list[float] | float = 0.02) -> xr.Dataset:
+    """Of four shapes alone, so that a line from cell to cell would be far off."""
+    return sweep.predict({"body": {"b": [2.5, 4.5, 6.5, 8.5]}, "friction": {"mu": mu}, "start": {"n0": n0}})
+
+
+def axis(dataset: xr.Dataset, name: str) -> Axis:
+    return Axis(name, dataset[name].values)
+
+
+def exact(line: Line, **varying: np.ndarray) -> np.ndarray:
+    """The critical spin of a line at bodies."""
+    size = len(next(iter(varying.values())))
+    columns = {name: np.full(size, value) for name, value in BODY.items()} | varying
+    if line.name == "n_c2":
+        return 2 * analytic.critical_spins(columns)[0]
+    return stability.critical_spins(MODELS["slip"], columns)[0]
+
+
+@pytest.mark.parametrize("mu", [[30.0, 80.0, 130.0, 180.0], [10.0, 30.0, 90.0, 270.0]])
+def test_lines_pass_between_the_cells_and_end_at_the_edges(mu: list[float]) -> None:
+    dataset = predictions(mu)
+    b, friction = axis(dataset, "b"), axis(dataset, "mu")
+    found = [line for line in lines(dataset, b, friction) if line.name != "best"]
+    assert {line.name for line in found} == {"n_c1", "n_c2"}
+    for line in found:
+        x, y = max(line.parts, key=lambda part: len(part[0]))
+        np.testing.assert_allclose(exact(line, b=x, mu=y), 0.02, rtol=0.03)
+        for end in (0, -1):
+            on_edges = [np.isclose(at[end], of.edges[[0, -1]]).any() for at, of in ((x, b), (y, friction))]
+            assert any(on_edges)
+
+
+def test_lines_over_start_spins_are_those_of_each_friction() -> None:
+    dataset = predictions([30.0, 80.0, 130.0, 180.0], [0.01, 0.05, 0.09]).sel(b=4.5)
+    for line in lines(dataset, axis(dataset, "mu"), axis(dataset, "n0")):
+        if line.symbol.endswith("⁺"):
+            ((mu, spin),) = line.parts
+            np.testing.assert_allclose(spin, exact(line, b=np.full(len(mu), 4.5), mu=mu), rtol=1e-9)
+            assert mu[[0, -1]].tolist() == pytest.approx([5.0, 205.0])
+
+
+def test_crossings_lie_where_the_spin_is_critical() -> None:
+    dataset = predictions([30.0, 80.0, 130.0, 180.0]).sel(mu=30.0)
+    (line,) = [line for line in crossings(dataset, axis(dataset, "b")) if line.name == "n_c2"]
+    ((at, _),) = line.parts
+    np.testing.assert_allclose(exact(line, b=at, mu=np.full(len(at), 30.0)), 0.02, rtol=1e-3)
+
+
+def test_the_code_of_a_users_model_does_not_run_for_a_picture() -> None:
+    dataset = predictions([30.0, 80.0, 130.0, 180.0])
+    dataset.attrs["config"] = dataset.attrs["config"].replace("model: slip", "model: nowhere.py")
+    (line,) = [line for line in lines(dataset, axis(dataset, "b"), axis(dataset, "mu")) if line.name == "n_c2"]
+    assert set(line.parts[0][0]) & {2.5, 4.5, 6.5, 8.5}  # from cell to cell
