@@ -50,13 +50,15 @@ class Axis:
         return int(np.abs(self.values - value).argmin())
 
 
-def contours(values: Array, x: Axis, y: Axis, level: float = 0.0) -> Iterator[tuple[Array, Array]]:
+def contours(
+    values: Array, x: Axis, y: Axis, level: float = 0.0, *, corners: bool = False
+) -> Iterator[tuple[Array, Array]]:
     """Where `values`, of shape (y, x), pass through `level`: the x and y of each curve, in order, on lines of the grid.
 
-    There is no curve beside values that are NaN.
+    There is no curve beside values that are NaN, or with `corners` between three others, which may end on a diagonal.
     """
     if min(values.shape) < 2:
         return
     grid = x.straight(x.values), y.straight(y.values), np.ma.masked_invalid(values)
-    for part in map(np.asarray, contour_generator(*grid, corner_mask=False).lines(level)):
+    for part in map(np.asarray, contour_generator(*grid, corner_mask=corners).lines(level)):
         yield x.bent(part[:, 0]), y.bent(part[:, 1])
