@@ -75,7 +75,8 @@ def run(
 ) -> None:  # fmt: skip
     """Run the sweep that CONFIG describes.
 
-    Writes NAME.nc (the dataset) and NAME.png (its maps), where NAME is the name of the run.  If it is
+    Writes NAME.nc (the dataset) and NAME.png (its maps), where NAME is the name of the run, and a
+    NAME_VARIABLE.png for each further variable that CONFIG names under `picture`.  If it is
     interrupted, finished work is kept, and the same command resumes the run.  If CONFIG has since
     got more values along an axis, or a later t_end, only what the dataset lacks is simulated.
     """
@@ -326,5 +327,6 @@ def _written(
 
 def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:
     """Return marks, by suffix, that change when the results `name` in `folder` are written anew."""
-    stats = {suffix: path.stat() for suffix in (".nc", ".png") if (path := folder / f"{name}{suffix}").exists()}
+    found = [path for ending in (".nc", ".png", "_*.png") for path in sorted(folder.glob(f"{name}{ending}"))]
+    stats = {path.name.removeprefix(name): path.stat() for path in found}
     return {suffix: (stat.st_ino, stat.st_mtime_ns) for suffix, stat in stats.items()}

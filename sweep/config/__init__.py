@@ -151,6 +151,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         integrator=_integrator(values, model, numbers if physics.units == SI and rattleback else {}),
         measure=tuple(measures.default(model) if values.measure is None else values.measure),
         max_failed_fraction=values.max_failed_fraction,
+        picture=tuple(values.picture or ()),
         verify=values.verify or 0.0,
         refine=values.refine,
         cases=columns,

@@ -53,6 +53,8 @@ class Config:
     measure: tuple[str, ...]
     """Specs of measurements, as `sweep.kernels.measures.chosen` takes them."""
     max_failed_fraction: float
+    picture: tuple[str, ...] = ()
+    """Variables to be drawn, as `sweep.plots.quantities.field` takes them; empty for what was measured first."""
     verify: float = 0.0
     refine: int = 0
     cases: dict[str, tuple[float, ...]] | None = None
@@ -192,6 +194,7 @@ class Config:
                 {name: n if name == Misfit.name else int(n)} if n else name
                 for name, _, n in (m.partition("=") for m in self.measure)
             ],
+            **({"picture": list(self.picture)} if self.picture else {}),
             "verify": self.verify,
             "refine": self.refine,
             "max_failed_fraction": self.max_failed_fraction,
@@ -206,10 +209,10 @@ class Config:
         return stream.getvalue()
 
     def fingerprint(self) -> str:
-        """Hash of everything that determines the numbers: not the name, nor how many failures are accepted."""
+        """Hash of everything that determines the numbers: not the name, the pictures, nor how many may fail."""
         decisive = self.document()
         # What the file of a model says, which its SHA-256 tells, not where it lies.
-        for key in ("name", "max_failed_fraction", "cases", *(["model"] if self.origin else [])):
+        for key in ("name", "max_failed_fraction", "picture", "cases", *(["model"] if self.origin else [])):
             decisive.pop(key, None)
         seen = [self.film.sha256] if self.film else []
         text = json.dumps([decisive, list(self.axes), self.cases, *seen], sort_keys=True)

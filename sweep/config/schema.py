@@ -56,6 +56,13 @@ def _measure(raw: Any, i: int) -> str:
     return kind(setting).spec  # type: ignore[call-arg]
 
 
+def _each_once(raw: Any) -> Any:
+    for i, name in enumerate(raw if isinstance(raw, list) else []):
+        if name in raw[:i]:
+            raise wrong(f"{name} twice; name each once", i)
+    return raw
+
+
 VERIFIED = 0.002
 """Share of the cells that are run again unasked, in runs of so many cells that it amounts to one."""
 
@@ -198,6 +205,9 @@ class _Top(Strict):
     measure: Annotated[list[str] | None, BeforeValidator(_measures), Allowed(f"a list of {', '.join(MEASURES)}")] = (
         Field(default=None, description="what to compute; by default the usual measurements that the model supports")
     )
+    picture: Annotated[
+        list[str] | None, BeforeValidator(_each_once), Allowed("a list of variables, such as [reversals, spin_mean]")
+    ] = Field(default=None, description="variables that `run` draws; by default what `measure` names first")
     verify: float | None = Field(
         default=None, ge=0, le=1,
         description=f"share of the cells, drawn at random, to run again with the plain method at half its step; by "

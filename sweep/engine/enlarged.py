@@ -32,7 +32,9 @@ RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
 """Names of the cells that a run can be asked to compute again, with their statuses."""
 
 # What may differ between a run and the one that it enlarges; one that computes cells again may change the integrator.
-_FREE = {"name", "max_failed_fraction", "verify", "measure", "samples", "seed", "until", "integrator.t_end"}
+_FREE = {
+    "name", "max_failed_fraction", "picture", "verify", "measure", "samples", "seed", "until", "integrator.t_end",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
 from sweep.interrupt import deferred, point
 from sweep.kernels.methods import METHODS
+from sweep.plots import quantities
 from sweep.results import dataset
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity, not_resumed
@@ -61,6 +62,7 @@ def run(
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun must be {' or '.join(RERUN)}, not {rerun!r}")
     dataset.check_names(config)
+    quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)
     if output is None:
         memory = STORES["memory"](Path(), identity, reporter.note)
@@ -74,13 +76,14 @@ def run(
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
             earlier = _earlier(config, found, identity, files, rerun)
-            files.picture.unlink(missing_ok=True)  # of a dataset that is gone
+            for path in files.pictures(config.picture):
+                path.unlink(missing_ok=True)  # of a dataset that is gone
             store = STORES["checkpoint"](files.checkpoint, identity, reporter.note)
             _compute(config, store, reporter, cluster, earlier).save(files.dataset)
         files.discard_checkpoint()
         point()
         result = open_dataset(files.dataset, load=Grid.of(config).size <= LARGE)
-        _draw(result, files, reporter)
+        _draw(config.picture, result, files, reporter)
     return result
 
 
@@ -161,15 +164,14 @@ def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count
         count.tile(done.arrays["status"])
 
 
-def _draw(result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
-    """Draw the maps of a run beside its dataset, unless they are there."""
+def _draw(variables: Sequence[str], result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
+    """Draw the pictures of a run beside its dataset, unless they are there."""
     from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
 
-    if files.picture.exists():
-        return
-    try:
-        figure = picture.plot(result)
-    except ValueError as error:
-        reporter.note(f"no picture: {error}")
-        return
-    files.save_picture(figure)
+    others = quantities.pictured(result) != [*variables]  # than when the dataset was made
+    for path, variable in files.pictures(variables).items():
+        if others or not path.exists():
+            try:
+                files.save_picture(picture.plot(result, variable), path)
+            except ValueError as error:
+                reporter.note(f"no picture{f' of {variable}' if variable else ''}: {error}")

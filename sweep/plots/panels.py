@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.plots import labels
-from sweep.plots.quantities import PREDICTIONS, field, subject
+from sweep.plots.quantities import PREDICTIONS, field, pictured, subject
 
 MAX_PANELS = 8
 """Panels that a figure may have."""
@@ -124,7 +124,8 @@ def _variables(dataset: xr.Dataset, variable: str | None) -> list[str]:
     chosen = variable or subject(dataset)
     field(dataset, chosen)  # raises if there is none
     predicted, comparison = PREDICTIONS.get(chosen, ("", ""))
-    alone = predicted not in dataset or variable == "reversals"
+    named = variable or next(iter(pictured(dataset)), "")
+    alone = predicted not in dataset or named == "reversals"
     return [chosen] if alone else [chosen, predicted, comparison]
 
 

@@ -10,8 +10,12 @@ from dataclasses import dataclass
 
 import xarray as xr
 
+from sweep.config import Config, ConfigError
+from sweep.config.faults import either, refusal
 from sweep.kernels.measures import MEASURES
 from sweep.plots import labels, regimes
+from sweep.results.dataset import VARIABLES
+from sweep.results.probabilities import PROBABILITIES
 
 
 @dataclass(frozen=True)
@@ -83,18 +87,40 @@ def with_derived(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign({name: field(dataset, name) for name in derivable(dataset)})
 
 
+def pictured(dataset: xr.Dataset) -> list[str]:
+    """The variables that the configuration of a dataset names for its pictures."""
+    return str(dataset.attrs.get("pictured", "")).split()
+
+
+def check_pictures(config: Config) -> None:
+    """Raise a `ConfigError` where a configuration names a picture of what its run does not have."""
+    measured = {variable: name for name, kind in MEASURES.items() for variable in kind.variables}
+    there = {variable for spec in config.measure for variable in MEASURES[spec.partition("=")[0]].variables}
+    known = {*VARIABLES, *PROBABILITIES, *DERIVED}
+    for i, name in enumerate(config.picture):
+        needs = DERIVED[name].needs if name in DERIVED else (name,)
+        lacking = sorted({measured[each] for each in needs if each in measured and each not in there})
+        words = f"{name} is not measured; add {', '.join(lacking)} to measure" if lacking else ""
+        if name not in known:
+            words = refusal(name, f"a variable, such as {either(sorted(DERIVED))}", known)
+        if words:
+            raise ConfigError([config.fault(("picture", i), words)])
+
+
 def subject(dataset: xr.Dataset) -> str:
     """The variable that a dataset is about, which is shown where none is named.
 
-    It is the first variable of the measurement that the configuration names first, or the quantity that this serves.
-    Where it is lacking, it is the reversals.
+    It is the first picture that the configuration names.  If it names none, it is the first variable of the measurement
+    that it names first, or the quantity that this serves.  Where it is lacking, it is the reversals.
     """
+    there = {*map(str, dataset.data_vars), *derivable(dataset)}
+    if (named := pictured(dataset)[:1]) and named[0] in there:
+        return named[0]
     if "probability" in dataset:
         return "probability"
     measurement = str(dataset.attrs.get("measured", "")).partition(" ")[0].partition("=")[0]
     served = [_SERVE[measurement]] if measurement in _SERVE else []
     variables = MEASURES[measurement].variables if measurement in MEASURES else {}
     own = [name for name, spec in variables.items() if not spec.along]
-    there = {*map(str, dataset.data_vars), *derivable(dataset)}
     wanted = (*served, *own[:1], "reversals", "reversals_predicted")
     return next((name for name in wanted if name in there), "spin_final")

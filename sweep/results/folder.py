@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +36,11 @@ class RunFiles:
     @property
     def picture(self) -> Path:
         return self.folder / f"{self.name}.png"
+
+    def pictures(self, variables: Sequence[str]) -> dict[Path, str | None]:
+        """The pictures of a run that names these variables, and what each shows; None for what the dataset is about."""
+        further = {self.folder / f"{self.name}_{name}.png": name for name in variables[1:]}
+        return {self.picture: variables[0] if variables else None, **further}
 
     @property
     def configuration(self) -> Path:
@@ -120,8 +125,9 @@ class RunFiles:
         netcdf.write(self.dataset, dataset)
         self.save_picture(figure)
 
-    def save_picture(self, figure: Figure) -> None:
-        with replacing(self.picture) as temporary:
+    def save_picture(self, figure: Figure, path: Path | None = None) -> None:
+        """Write a picture, by default the first one."""
+        with replacing(path or self.picture) as temporary:
             figure.savefig(temporary, format="png")
 
     def discard(self) -> None:

@@ -49,11 +49,6 @@ class Counts:
         known = np.isin(found["status"], (SETTLED, TIME_LIMIT))
         return cls(found["reversals"].astype(float), found["margin_more"], found["margin_fewer"], known)
 
-    @property
-    def widths(self) -> Array:
-        """How much spin the count of each cell takes, as far as that is known."""
-        return np.asarray(np.nan_to_num(self.more) + np.nan_to_num(self.fewer))
-
     def distance(self, level: Any, width: Array | None = None) -> Array:
         """How far in spin each cell is from where `level` reversals begin: negative where it counts fewer.
 
@@ -61,7 +56,8 @@ class Counts:
         NaN where that is not known.  For a cell whose count is farther away than by one, it is a guess: as if each
         count between took so much spin (`width`), by default as much as its own.
         """
-        count, width = self.reversals, self.widths if width is None else width
+        count = self.reversals
+        width = np.nan_to_num(self.more) + np.nan_to_num(self.fewer) if width is None else width
         found = np.where(
             count >= level, self.fewer + (count - level) * width, -(self.more + (level - 1 - count) * width)
         )

@@ -85,6 +85,7 @@ def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] =
         "config": identity.config,
         "config_hash": identity.config_hash,
         "measured": " ".join(config.measure),
+        **({"pictured": " ".join(config.picture)} if config.picture else {}),
         "source_hash": identity.source_hash,
         "versions": identity.versions,
         **({"film_sha256": film.sha256, "film_instants": len(film.time)} if (film := config.film) else {}),

@@ -1,0 +1,88 @@
+"""The pictures that a configuration names, which a run draws."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from support.cli import invoke, refused
+
+import sweep
+from sweep.config import load_config
+from sweep.plots import picture
+from sweep.plots.quantities import check_pictures
+
+ROOT = Path(__file__).parents[2]
+FORMULA = """\
+model: analytic
+body: {b: [2, 3, 4, 5, 6]}
+friction: {mu: [20, 60, 100, 140, 180]}
+"""
+
+
+def drawn(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.png")}
+
+
+def test_a_run_draws_the_pictures_that_are_named(tmp_path: Path) -> None:
+    file, folder = tmp_path / "map.yaml", tmp_path / "out"
+    file.write_text(f"{FORMULA}picture: [status, form_factor]\n", encoding="utf-8")
+    first = invoke("run", file, "--output", folder)
+    assert first.stdout.splitlines()[-1] == f"wrote {folder / 'map'}.nc and .png and _form_factor.png"
+    before = drawn(folder)
+    for name, variable in (("map.png", None), ("map.png", "status"), ("map_form_factor.png", "form_factor")):
+        picture.plot(folder / "map.nc", variable, output=tmp_path / "again.png")
+        assert before[name] == (tmp_path / "again.png").read_bytes()
+    assert "nothing was written" in invoke("run", file, "--output", folder).stdout
+
+    other = invoke("run", file, "--output", folder, "--set", "picture=[form_factor]")
+    assert "already complete" in other.stderr
+    assert drawn(folder)["map.png"] == before["map_form_factor.png"]
+
+
+def test_without_a_name_it_is_what_the_dataset_is_about(tmp_path: Path) -> None:
+    (tmp_path / "map.yaml").write_text(FORMULA, encoding="utf-8")
+    result = sweep.run(tmp_path / "map.yaml", output=tmp_path, progress=False)
+    assert "pictured" not in result.attrs
+    sweep.plot(result, output=tmp_path / "again.png")
+    assert drawn(tmp_path)["map.png"] == drawn(tmp_path)["again.png"]
+
+
+def test_pictures_are_no_part_of_what_a_run_is() -> None:
+    asked = {"friction": {"mu": [20, 60]}}
+    plain, named = load_config(asked), load_config(asked, {"picture": ["spin_mean"]})
+    assert plain.fingerprint() == named.fingerprint()
+    assert "picture: [spin_mean]" in named.to_yaml()
+    assert load_config(named.document()).picture == ("spin_mean",)
+
+
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [
+        ("[status, spn_mean]", "4:19: picture[1]: must be a variable, such as difference, ratio or regime, "
+         "not 'spn_mean' (did you mean spin_mean?)"),
+        ("[cycle_mean]", "4:11: picture[0]: cycle_mean is not measured; add cycles to measure"),
+        ("[regime]", "4:11: picture[0]: regime is not measured; add cycles, lyapunov to measure"),
+        ("[status, status]", "4:19: picture[1]: status twice; name each once"),
+        ("status", "4:10: picture: must be a list of variables, such as [reversals, spin_mean], not 'status'"),
+    ],
+)  # fmt: skip
+def test_what_no_run_has_is_refused_before_it_begins(named: str, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "map.yaml"
+    file.write_text(f"{FORMULA}picture: {named}\n", encoding="utf-8")
+    refused(invoke("run", file, "--output", tmp_path / "out"), f"{file}:{said}")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_drawn(tmp_path: Path) -> None:
+    file = tmp_path / "map.yaml"
+    file.write_text(f"{FORMULA}picture: [probability, status]\n", encoding="utf-8")
+    result = invoke("run", file, "--output", tmp_path / "out")
+    assert result.exit_code == 0
+    assert "no picture of probability: there is no variable probability" in result.stderr
+    assert list(drawn(tmp_path / "out")) == ["map_status.png"]
+
+
+@pytest.mark.parametrize("file", sorted(ROOT.glob("configs/*.yaml")), ids=lambda file: file.stem)
+def test_shipped_configurations_measure_what_they_draw(file: Path) -> None:
+    check_pictures(load_config(file))
