@@ -12,7 +12,6 @@ from matplotlib.lines import Line2D
 from sweep.plots import labels, theory
 from sweep.plots.description import along
 from sweep.plots.figure import Picture, framed, set_scale
-from sweep.plots.lines import in_maths
 from sweep.plots.panels import MAX_PANELS, indices
 
 _COLOURS = {"n_c1": "C0", "n_c2": "C1"}
@@ -45,7 +44,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()}
     sources = [drawn for suffix, drawn in _SOURCES.items() if {f"n_c1_plus{suffix}", f"n_c2_plus{suffix}"} & {*dataset}]
     figure.explain([
-        *(Line2D([], [], color=colour, linewidth=4, label=in_maths(words)) for words, colour in names.items()),
+        *(Line2D([], [], color=colour, linewidth=4, label=words) for words, colour in names.items()),
         *(Line2D([], [], color="0.3", linewidth=1, label=words, **style) for words, style in sources),
     ])  # fmt: skip
     return figure

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from math import log
 from string import ascii_lowercase
@@ -11,10 +12,12 @@ from typing import Any, Literal
 
 import matplotlib as mpl
 import xarray as xr
+from matplotlib import _mathtext
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sweep.axis import Axis
@@ -42,7 +45,10 @@ _STYLE: dict[Any, Any] = {
 """Settings of matplotlib, where the user has none of his own."""
 
 _PRINT: dict[Any, Any] = {"font.size": 7.5, "figure.dpi": 300}
-"""What figures for print have in their place: no text is smaller than 6 points."""
+"""What figures for print have in their place, so that no text is too small."""
+
+_SMALLEST = 6.0
+"""Points of the smallest text in a figure for print, and of the subscripts in a legend of any figure."""
 
 _LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.75, 0.17, 4
 """Inches that a letter, the rest of an entry and a line take in a legend, and lines for which figures have room."""
@@ -81,16 +87,28 @@ class Picture(Figure):
         scale = mpl.rcParams["font.size"] / TEXT
         super().__init__((width * scale, height * scale), layout="constrained")
         self._constants, self._width, self._height = "", width, height
+        self._legend_size = FontProperties(size=mpl.rcParams["legend.fontsize"]).get_size_in_points()
         self._style: dict[Any, Any] = {name: mpl.rcParams[name] for name in _STYLE}
 
     def draw(self, renderer: RendererBase) -> None:
-        with mpl.rc_context(self._style):
+        with self._drawing():
             super().draw(renderer)
 
     def savefig(self, *args: Any, **kwargs: Any) -> None:
         """Save it as any figure of matplotlib, in the style in which it was drawn."""
-        with mpl.rc_context(self._style):
+        with self._drawing():
             super().savefig(*args, **kwargs)
+
+    @contextmanager
+    def _drawing(self) -> Iterator[None]:
+        """The style of the figure, while it is drawn."""
+        usual = _mathtext.SHRINK_FACTOR  # of subscripts, for which matplotlib has no setting
+        _mathtext.SHRINK_FACTOR = max(usual, min(_SMALLEST / self._legend_size, 1.0))
+        try:
+            with mpl.rc_context(self._style):
+                yield
+        finally:
+            _mathtext.SHRINK_FACTOR = usual
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()
@@ -112,8 +130,9 @@ class Picture(Figure):
         longest = max((len(line) for each in words for line in each.split("\n")), default=0)
         columns = min(max(1, int(self._width / (longest * _LETTER + _HANDLE))), max(len(words), 1))
         self.legend(
-            list(handles), words, loc="outside lower center", frameon=False, handlelength=3,
-            ncols=columns, title=self._constants or None,
+            list(handles), [labels.in_maths(each) for each in words], loc="outside lower center", frameon=False,
+            handlelength=3, ncols=columns, title=self._constants or None,
+            alignment="left" if columns == 1 else "center",
         )  # fmt: skip
         lines = sum(each.count("\n") + 1 for each in words) / columns + self._constants.count("\n") + 1
         more = max(0, lines - _LINES) * _LINE

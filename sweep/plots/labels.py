@@ -195,6 +195,12 @@ def _distributions(dataset: xr.Dataset) -> Iterator[str]:
             yield f"{symbol(str(name))}: {known}{si_unit(dataset, str(name))}"
 
 
+def in_maths(words: str) -> str:
+    """Words in which n_c1 and n_c1⁺ are set as symbols."""
+    signs = {"": "", "⁺": "^+", "⁻": "^-"}
+    return re.sub(r"n_(c\d)([⁺⁻]?)", lambda found: rf"n$_{{\mathrm{{{found[1]}}}}}{signs[found[2]]}$", words)
+
+
 def _fraction(units: str) -> str:
     """A CF unit such as "kg m2 s-1" as a fraction: kg m²/s."""
     parts = [re.fullmatch(r"([A-Za-z]+)(-?)(\d*)", part) for part in units.replace("radian", "rad").split()]

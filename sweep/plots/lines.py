@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -12,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import Stroke, withStroke
 
 from sweep.axis import Axis
-from sweep.plots import levels
+from sweep.plots import labels, levels
 from sweep.plots.description import Map
 from sweep.plots.theory import Line
 
@@ -62,13 +61,7 @@ def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
 
 def entry(name: str, words: str) -> Line2D:
     """The entry of a legend for a line."""
-    return Line2D([], [], color="black", label=in_maths(words), **_STYLES[name])
-
-
-def in_maths(words: str) -> str:
-    """Words in which n_c1 and n_c1⁺ are set as symbols."""
-    signs = {"": "", "⁺": "^+", "⁻": "^-"}
-    return re.sub(r"n_(c\d)([⁺⁻]?)", lambda found: f"n$_{{{found[1]}}}{signs[found[2]]}$", words)
+    return Line2D([], [], color="black", label=words, **_STYLES[name])
 
 
 def _halo(width: float) -> list[Stroke]:
@@ -90,6 +83,6 @@ def _label(axes: Axes, shown: Map, line: Line) -> None:
         place: dict[str, Any] = {"xytext": (0, 4 * outwards), "ha": "center", "va": "bottom" if outwards > 0 else "top"}
     else:
         if shown.x.name != "n0":
-            outwards = 1 if path[k, 0] < 0.5 else -1
+            outwards = 1 if (path[k, 0] < 0.5) == (line.name == "n_c2") else -1  # n_c1 beyond n_c2
         place = {"xytext": (4 * outwards, 0), "ha": "left" if outwards > 0 else "right", "va": "center"}
-    axes.annotate(in_maths(line.symbol), points[k], textcoords="offset points", path_effects=_halo(2), **place)
+    axes.annotate(labels.in_maths(line.symbol), points[k], textcoords="offset points", path_effects=_halo(2), **place)

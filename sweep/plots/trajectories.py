@@ -167,7 +167,7 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
             entries[name].set(linestyle=_CRITICAL[name], linewidth=0.9)
             if all(abs(at - other) > 0.04 * (high - low) for other in written):
                 axes.annotate(
-                    lines.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
+                    labels.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
                     textcoords="offset points", va="center", color=colour,
                 )  # fmt: skip
                 written.append(at)

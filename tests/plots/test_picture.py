@@ -169,8 +169,8 @@ def test_the_critical_spins_are_curves_over_start_spins(x: str, y: str) -> None:
         for line, sign in zip(curves, (2, -2), strict=True):
             spin, mu = line.get_data() if x == "n0" else reversed(line.get_data())
             np.testing.assert_allclose(spin, sign / np.asarray(mu))
-    assert any("n$_{c1}$ (eigenvalues)" in text for text in entries(figure))
-    assert any("n$_{c2}$ (formula)" in text for text in entries(figure))
+    assert any(r"n$_{\mathrm{c1}}$ (eigenvalues)" in text for text in entries(figure))
+    assert any(r"n$_{\mathrm{c2}}$ (formula)" in text for text in entries(figure))
 
 
 def test_theory_is_drawn_over_reversals_alone() -> None:

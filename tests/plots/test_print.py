@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,20 @@ def test_a_figure_for_print_is_as_wide_as_asked_and_can_be_read(kind: str, width
     panels = [axes for axes in figure.axes if axes.get_label() == ""]
     assert letters(figure) == ("abcdefghijkl"[: len(panels)] if len(panels) > 1 else "")
     assert all(axes.get_window_extent().width > 0.3 * figure.bbox.width / 3 for axes in panels)
+
+
+def test_no_text_in_a_file_for_print_is_smaller_than_6_points(tmp_path: Path) -> None:
+    with mpl.rc_context({"pdf.compression": 0}):
+        picture.plot(made(n0=[0.02]), width="85mm", output=tmp_path / "map.pdf")
+    sizes = {float(size) for size in re.findall(rb"/F\S+ ([\d.]+) Tf", (tmp_path / "map.pdf").read_bytes())}
+    assert len(sizes) >= 3  # with subscripts
+    assert min(sizes) >= 6
+
+
+def test_words_with_symbols_are_as_long_as_they_look() -> None:
+    figure = picture.plot(made(n0=[0.02]), "reversals", width="85mm")
+    lines = [line for text in entries(figure) if "formula" in text for line in text.split("\n")]
+    assert lines == [r"n₀ = n$_{\mathrm{c2}}$ (formula): the spin reverses where that is", "smaller"]
 
 
 def test_maps_that_do_not_fit_side_by_side_stand_below_each_other() -> None:
