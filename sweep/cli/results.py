@@ -27,6 +27,8 @@ if TYPE_CHECKING:
               help="Draw only the cells nearest to this value of a parameter, e.g. n0=0.05 (repeatable).")  # fmt: skip
 @click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
 @click.option("--cmap", metavar="NAME", help="A colour map of matplotlib, such as viridis.")
+@click.option("--contours", is_flag=True, help="Draw lines of equal value over maps of real numbers.")
+@click.option("--histogram", is_flag=True, help="Draw how many cells have each value.")
 @click.option("--width", metavar="LENGTH",
               help="Width of a figure for print, such as 85mm, with text of 6 points or more.")  # fmt: skip
 @click.option("--no-title", is_flag=True, help="Draw no title.")
@@ -37,7 +39,8 @@ if TYPE_CHECKING:
 )
 def plot(
     files: tuple[Path, ...], variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...],
-    limits: str | None, cmap: str | None, width: str | None, no_title: bool, output: Path | None,
+    limits: str | None, cmap: str | None, contours: bool, histogram: bool, width: str | None, no_title: bool,
+    output: Path | None,
 ) -> None:  # fmt: skip
     """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries.
 
@@ -53,8 +56,9 @@ def plot(
     if formats.suffix(target) == formats.PAGE:
         if len(files) > 1:
             refuse(f"--output {target}", f"a page shows one dataset; write a {formats.A_PICTURE} of several")
-        for option, value in (("--limits", limits), ("--cmap", cmap), ("--width", width)):
-            if value is not None:
+        given = {"--limits": limits, "--cmap": cmap, "--contours": contours, "--histogram": histogram, "--width": width}
+        for option, value in given.items():
+            if value:
                 refuse(option, f"not for a page; write a {formats.A_PICTURE}")
         _plot_page(files[0], target, variable, x, y, sel)
         return
@@ -67,8 +71,8 @@ def plot(
                 say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
     with about(files[0]):
         picture.plot(
-            datasets, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, width=width, title=not no_title,
-            output=target,
+            datasets, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, contours=contours, histogram=histogram,
+            width=width, title=not no_title, output=target,
         )  # fmt: skip
     say(f"wrote {target}")
 

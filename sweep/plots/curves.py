@@ -56,8 +56,7 @@ def _curves(panels: Panels, frames: list[tuple[Axes, xr.Dataset]], limits: Limit
     entries: dict[str, Artist] = {}
     for axes, chosen in frames:
         entries |= _panel(axes, chosen, names, x)
-        counts = len(names) > 1 and names[0] == "reversals"
-        axes.set_ylabel("spin reversals" if counts else labels.label(dataset, names[0]))
+        axes.set_ylabel(labels.common(dataset, names[0]))
         if limits:
             axes.set_ylim(limits)
     words = legend(dataset, names[0])

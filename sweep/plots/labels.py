@@ -126,6 +126,11 @@ def label(dataset: xr.Dataset, name: str) -> str:
     return f"{words(dataset, name)} ({found})" if (found := unit(dataset, name)) else words(dataset, name)
 
 
+def common(dataset: xr.Dataset, name: str) -> str:
+    """The label of an axis or a bar that a variable shares with its prediction."""
+    return "spin reversals" if name.startswith("reversals") else label(dataset, name.removesuffix("_predicted"))
+
+
 def flag_words(dataset: xr.Dataset, name: str) -> dict[int, str]:
     """The meaning of each value of a variable with flags, in words; empty for another variable."""
     attributes = dataset[name].attrs

@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import Stroke, withStroke
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.ticker import LogLocator
 
 from sweep.axis import Axis
 from sweep.plots import labels, levels
 from sweep.plots.description import Map
+from sweep.plots.scales import Scale
 from sweep.plots.theory import Line
 
 _STYLES: dict[str, dict[str, Any]] = {
@@ -51,6 +54,19 @@ def number(axes: Axes, drawn: Iterable[Line], x: Axis, y: Axis) -> None:
         axes.annotate(count, (at_x, at_y), size="small", ha="center", va="center", path_effects=_halo(2))
 
 
+def draw_contours(axes: Axes, shown: Map, scale: Scale) -> None:
+    """Lines of equal value, with the values in them, on a map of real numbers; counts have their boundaries instead."""
+    if shown.values.dtype.kind == "f" and min(shown.values.shape) > 1:
+        values = np.ma.masked_where(shown.blank, shown.values)
+        locator = LogLocator(subs=(1, 2, 5)) if isinstance(scale.norm, LogNorm) else None
+        levels = list(scale.ticks) if scale.ticks else None
+        how: dict[str, Any] = {"norm": scale.norm, "locator": locator, "colors": "black", "linewidths": 0.6}
+        found = axes.contour(shown.x.values, shown.y.values, values, levels, **how)
+        found.set_path_effects(_halo(1.2))
+        for number in axes.clabel(found, fmt=labels.number, fontsize="small"):
+            number.set_path_effects(_halo(2))
+
+
 def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
     """Draw lines over curves; returns their entries for the legend."""
     for line in lines:
@@ -64,7 +80,7 @@ def entry(name: str, words: str) -> Line2D:
     return Line2D([], [], color="black", label=words, **_STYLES[name])
 
 
-def _halo(width: float) -> list[Stroke]:
+def _halo(width: float) -> list[AbstractPathEffect]:
     return [withStroke(linewidth=width, foreground="white")]
 
 

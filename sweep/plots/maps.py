@@ -52,7 +52,7 @@ _TITLES = {
 """What a map beside others is called, and a small one."""
 
 
-def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Picture:
+def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, *, contours: bool = False) -> Picture:
     """A map of each variable over two axes, side by side, and such a row for each value of the other axes."""
     dataset, names = panels.dataset, panels.names
     together = [names] if fits(len(names)) else [[name] for name in names]
@@ -80,24 +80,29 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) 
                 continue
             axes = figure.add_subplot(at, sharex=first, sharey=first)
             first = first or axes
-            entries |= _map(axes, maps[k][name], scales[name], alone=len(names) == 1, labelled=not small)
+            how = {"alone": len(names) == 1, "labelled": not small, "contours": contours}
+            entries |= _map(axes, maps[k][name], scales[name], **how)
             axes.set_title(_title(panels, name, panels.each[k], small=small and len(group) > 1))
             _label_axes(axes, dataset, maps[k][name], left=i == 0, lowest=place + across >= len(groups))
     figure.explain([*_meanings([panels], [maps], each_scales[0]), *entries.values()])
     return figure
 
 
-def draw_in(axes: Axes, panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> None:
+def draw_in(
+    axes: Axes, panels: Panels, limits: Limits | None = None, cmap: str | None = None, *, contours: bool = False
+) -> None:
     """Draw the map of the first variable into these axes, with its bar beside them."""
     name = panels.names[0]
     shown = _maps(panels, [name])[0][name]
     scale = common_scale([shown], limits, cmap)
-    _map(axes, shown, scale, alone=True, labelled=True)
+    _map(axes, shown, scale, alone=True, labelled=True, contours=contours)
     _label_axes(axes, panels.dataset, shown)
     _bar(make_axes(axes)[0], panels.dataset, name, scale)
 
 
-def draw_beside(each: list[Panels], limits: Limits | None = None, cmap: str | None = None) -> Picture:
+def draw_beside(
+    each: list[Panels], limits: Limits | None = None, cmap: str | None = None, *, contours: bool = False
+) -> Picture:
     """A map of the first variable for each panel of each dataset, on axes of its own, with one scale.
 
     Raises
@@ -124,7 +129,7 @@ def draw_beside(each: list[Panels], limits: Limits | None = None, cmap: str | No
     for panels, of_one in zip(each, maps, strict=True):
         for panel, shown in zip(panels.each, of_one, strict=True):
             axes = figure.add_subplot(grid[next(places)])
-            entries |= _map(axes, shown[name], scale, alone=True, labelled=False)
+            entries |= _map(axes, shown[name], scale, alone=True, labelled=False, contours=contours)
             words = [_name(panels.dataset), title(panels.dataset, panel)]
             axes.set_title(", ".join(filter(None, words)))
             _label_axes(axes, panels.dataset, shown[name])
@@ -161,7 +166,7 @@ def _scales(maps: Maps, k: int, limits: Limits | None, cmap: str | None) -> dict
     return {name: common if name in together else common_scale([each]) for name, each in shown.items()}
 
 
-def _map(axes: Axes, whole: Map, scale: Scale, *, alone: bool, labelled: bool) -> dict[str, Artist]:
+def _map(axes: Axes, whole: Map, scale: Scale, *, alone: bool, labelled: bool, contours: bool) -> dict[str, Artist]:
     """Draw one map, alone or with others of the same cells; returns the entries that its lines need in the legend."""
     shown = _thinned(whole)
     set_scale(axes, "x", shown.x.values)
@@ -175,6 +180,8 @@ def _map(axes: Axes, whole: Map, scale: Scale, *, alone: bool, labelled: bool) -
     compared = shown.name in COMPARISONS and not alone
     hatches.draw(axes, {kind: w for kind, w in shown.marks.items() if not compared or kind in _OF_DIFFERENCES},
                  (shown.y.edges, shown.x.edges), dark)  # fmt: skip
+    if contours:
+        lines.draw_contours(axes, shown, scale)
     return dict(lines.draw(axes, shown, labelled=labelled))
 
 
@@ -210,8 +217,7 @@ def _label_axes(axes: Axes, dataset: xr.Dataset, shown: Map, *, left: bool = Tru
 def _bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
     """Draw the bar of a scale, with what it shows."""
     bar = Colorbar(axes, ScalarMappable(scale.norm, scale.colours), extend=scale.arrows)
-    words = "spin reversals" if name.startswith("reversals") else labels.label(dataset, name.removesuffix("_predicted"))
-    bar.set_label(f"{words}\n")  # an empty line, or it would seem to belong to the next map
+    bar.set_label(f"{labels.common(dataset, name)}\n")  # an empty line, or it would seem to belong to the next map
     if scale.ticks:
         bar.set_ticks(list(scale.ticks), labels=list(scale.ticks.values()))
         bar.ax.minorticks_off()

@@ -12,7 +12,19 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sweep.plots import boundaries, critical, curves, fit, indices, maps, panels, probabilities, scales, trajectories
+from sweep.plots import (
+    boundaries,
+    critical,
+    curves,
+    fit,
+    histograms,
+    indices,
+    maps,
+    panels,
+    probabilities,
+    scales,
+    trajectories,
+)
 from sweep.plots.figure import Picture, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED, subject
@@ -46,6 +58,8 @@ def plot(
     sel: Mapping[str, float] | None = None,
     limits: Limits | None = None,
     cmap: str | None = None,
+    contours: bool = False,
+    histogram: bool = False,
     width: str | None = None,
     figsize: tuple[float, float] | None = None,
     title: bool = True,
@@ -66,6 +80,8 @@ def plot(
     sel : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
     limits : lowest and highest value of the scale
     cmap : name of a colour map of matplotlib
+    contours : whether maps of real numbers have lines of equal value
+    histogram : whether to draw, in place of maps or curves, how many of their cells have each value
     width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, and panels have
         letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if that was changed
     figsize : width and height in inches, by default as high as the panels need
@@ -101,13 +117,13 @@ def plot(
     opened = [_opened(each) for each in ([dataset] if isinstance(dataset, Source) else dataset)]
     if variable is None and isinstance(dataset, xr.DataArray):
         variable = str(dataset.name)
-    axes, colours = {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap}
+    axes, how = {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap, "contours": contours}
     if ax is not None:
-        figure = _draw_in(ax, opened, variable, axes, colours)
+        figure = _draw_in(ax, opened, variable, axes, how, histogram=histogram)
     else:
         across = inches(width) if width is not None else None
         with mpl.rc_context(style(across) | ({"figure.figsize": figsize} if figsize else {})):
-            figure = _drawn(opened, variable, axes, colours)
+            figure = _drawn(opened, variable, axes, how, histogram=histogram)
             if across:
                 figure.letter()
         if figsize:
@@ -128,42 +144,51 @@ def _opened(source: Source) -> xr.Dataset:
     return source if isinstance(source, xr.Dataset) else open_dataset(Path(source))
 
 
-def _drawn(datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], colours: dict[str, Any]) -> Picture:
+def _drawn(
+    datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], how: dict[str, Any], *, histogram: bool
+) -> Picture:
     """The figure of datasets, of whatever kind they are."""
     kinds = {kind(each) for each in datasets}
     if len(datasets) != 1:
-        if kinds != {RUN}:
-            raise ValueError("several datasets can be drawn side by side only if each is of a run")
+        if kinds != {RUN} or histogram:
+            raise ValueError("several datasets can be drawn side by side only if each is of a run, and as maps")
         common = variable or subject(datasets[0])
-        return maps.draw_beside([panels.choose(each, common, **axes) for each in datasets], **colours)
+        return maps.draw_beside([panels.choose(each, common, **axes) for each in datasets], **how)
     (dataset,), (found,) = datasets, kinds
     if found in _OWN and variable is not None:
         raise ValueError(f"variable: not for a figure of {found}, which draws what it is; leave it out")
     if found in (TRAJECTORY, *_OWN) or (found == CRITICAL and variable is None):
-        if given := [name for name, value in {**axes, **colours}.items() if value]:
+        if given := [name for name, value in {**axes, **how, "histogram": histogram}.items() if value]:
             raise ValueError(f"{given[0]}: not for a figure of {found}; name it for the maps of a run alone")
         if found == TRAJECTORY:
             return trajectories.draw(dataset, variable)
         return {**_OWN, CRITICAL: critical.draw}[found](dataset)
     chosen = panels.choose(dataset, variable, **axes)
     if chosen.names == ["probability"] and len(chosen.across) < 2:
+        if histogram:
+            raise ValueError("histogram: a probability is a share already; name another variable, such as reversals")
         return probabilities.draw(chosen)
-    return maps.draw(chosen, **colours) if len(chosen.across) == 2 else curves.draw(chosen, colours["limits"])
+    if histogram:
+        return histograms.draw(chosen)
+    return maps.draw(chosen, **how) if len(chosen.across) == 2 else curves.draw(chosen, how["limits"])
 
 
 def _draw_in(
-    ax: Axes, datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], colours: dict[str, Any]
-) -> Figure:
+    ax: Axes, datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], how: dict[str, Any], *,
+    histogram: bool,
+) -> Figure:  # fmt: skip
     """Draw one map or curve into axes of the user; returns their figure."""
     if {kind(each) for each in datasets} != {RUN} or len(datasets) > 1:
         raise ValueError("ax: only a map or a curve of one run is drawn into given axes")
     chosen = panels.choose(datasets[0], variable, **axes)
     if len(chosen.each) > 1 or "probability" in chosen.names:
         raise ValueError(f"ax: {chosen.names[0]} needs more than one panel; select a value of each other axis")
-    if len(chosen.across) == 2:
-        maps.draw_in(ax, chosen, **colours)
+    if histogram:
+        histograms.draw_in(ax, chosen)
+    elif len(chosen.across) == 2:
+        maps.draw_in(ax, chosen, **how)
     else:
-        curves.draw_in(ax, chosen, colours["limits"])
+        curves.draw_in(ax, chosen, how["limits"])
     return cast(Figure, ax.get_figure(root=True))
 
 
