@@ -33,6 +33,9 @@ _STYLES: dict[str, dict[str, Any]] = {
 }
 """Markers of variables, and of the kinds of cell, drawn around those of the first variable."""
 
+_ROOM = 6.0
+"""Points along the axis for each mark of full size."""
+
 
 def draw(panels: Panels, limits: Limits | None = None) -> Picture:
     """The variables over the one long axis, in a panel for each value of the others."""
@@ -72,14 +75,15 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str) -> dict[str
     first = described[0]
     at = first.x.values
     set_scale(axes, "x", at)
+    size = float(np.clip(72 * axes.bbox.width / axes.figure.dpi / len(at) / _ROOM, 0.4, 1))
     for shown in described:
         height = np.where(shown.blank, np.nan, shown.values)[0]
         style = {"marker": "x", "color": "C0"} | _STYLES.get(shown.name, {})
-        entries[shown.name] = _points(axes, at, height, style, labels.words(chosen, shown.name))
+        entries[shown.name] = _points(axes, at, height, style, labels.words(chosen, shown.name), size)
         for kind, (where,) in shown.marks.items() if shown is first else ():
             if where.any():
                 place = np.zeros(where.sum()) if kind in BLANK else height[where]
-                entries[kind] = _points(axes, at[where], place, _STYLES[kind], kind)
+                entries[kind] = _points(axes, at[where], place, _STYLES[kind], kind, size)
     if first.values.dtype.kind == "i":
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     if first.flags:
@@ -93,8 +97,9 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str) -> dict[str
     return entries
 
 
-def _points(axes: Axes, at: Array, values: Array, style: dict[str, Any], label: str) -> Line2D:
+def _points(axes: Axes, at: Array, values: Array, style: dict[str, Any], label: str, size: float) -> Line2D:
     (line,) = axes.plot(at, values, linestyle="none", label=label, **{"markersize": 5, **style})
+    line.set_markersize(line.get_markersize() * size)
     return line
 
 

@@ -66,6 +66,16 @@ def test_words_with_symbols_are_as_long_as_they_look() -> None:
     assert lines == [r"n₀ = n$_{\mathrm{c2}}$ (formula): the spin reverses where that is", "smaller"]
 
 
+def test_marks_on_dense_curves_are_small() -> None:
+    sizes = {}
+    for number in (10, 60):
+        figure = picture.plot(made(mu=np.linspace(20, 200, number)), x="mu", sel={"b": 3.0}, width="85mm")
+        (mark,) = [line for line in figure.axes[0].lines if line.get_label() == "spin reversals, simulated"]
+        sizes[number] = mark.get_markersize()
+    assert sizes[10] == 5
+    assert sizes[60] < 85 / 25.4 * 72 / 60
+
+
 def test_maps_that_do_not_fit_side_by_side_stand_below_each_other() -> None:
     one = made()
     for width, columns in (("85mm", 1), ("180mm", 3)):
