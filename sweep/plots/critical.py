@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.lines import Line2D
 
-from sweep.plots import labels, theory
+from sweep.axis import Axis
+from sweep.plots import fine, labels, theory
 from sweep.plots.description import along
 from sweep.plots.figure import Picture, framed, set_scale
 from sweep.plots.panels import MAX_PANELS, indices
@@ -37,8 +38,11 @@ def draw(dataset: xr.Dataset) -> Picture:
         chosen = chosen.sortby(x) if x else chosen
         at = along(chosen, x)
         set_scale(axes, "x", at)
+        between = fine.critical_spins(chosen, Axis(x, at)) if x else {}
         for variable in filter(chosen.__contains__, styles):
-            axes.plot(at, np.atleast_1d(chosen[variable].values), gid=variable, **styles[variable])
+            values = between.get(variable, chosen[variable])
+            places = values[x].values if variable in between else at
+            axes.plot(places, np.atleast_1d(values.values), gid=variable, **styles[variable])
         axes.axhline(0, color="black", linewidth=0.5)
         axes.set_ylabel(f"spin n ({labels.unit(dataset, 'n_c2_plus_simulated')})")
     names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()}

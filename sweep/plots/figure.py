@@ -56,6 +56,9 @@ _LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.75, 0.17, 4
 _OF_TITLE = 0.09
 """Inches of a letter of a title, at most."""
 
+_OF_LABEL = 0.085
+"""Inches of a letter of a label of an axis, with some room, since axes are laid out later."""
+
 _LEAST = 2.1
 """Inches of a map across, at least."""
 
@@ -123,6 +126,7 @@ class Picture(Figure):
 
     def explain(self, handles: Sequence[Artist]) -> None:
         """A legend below the figure, never over its data, in as many columns as fit; over it the constants."""
+        self._wrap_labels()
         if not handles and not self._constants:
             return
         room = int((self._width - _HANDLE) / _LETTER)
@@ -137,6 +141,13 @@ class Picture(Figure):
         lines = sum(each.count("\n") + 1 for each in words) / columns + self._constants.count("\n") + 1
         more = max(0, lines - _LINES) * _LINE
         self.set_figheight(self.get_figheight() * (1 + more / self._height))
+
+    def _wrap_labels(self) -> None:
+        """Break the labels of panels that are longer than their axes."""
+        for axes in (each for each in self.axes if each.get_label() != BESIDE):
+            letter = _OF_LABEL * self.dpi * self.get_figwidth() / self._width
+            for label, length in ((axes.xaxis.label, axes.bbox.width), (axes.yaxis.label, axes.bbox.height)):
+                label.set_text(fill(label.get_text(), int(length / letter), break_long_words=False))
 
     def letter(self) -> None:
         """Letters a, b, c at the panels, if there are several."""

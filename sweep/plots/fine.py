@@ -24,10 +24,11 @@ _POINTS = {1: 401, 2: 41}
 
 
 def critical_spins(dataset: xr.Dataset, *axes: Axis) -> Mapping[str, xr.DataArray]:
-    """The critical spins along the axes of a map, from edge to edge, by the names that they have in a dataset.
+    """The critical spins along the axes of a map or the one of curves, by the names that they have in a dataset.
 
-    Each extends over those of the axes on which the body depends.  There are none if a parameter of the body varies
-    along another axis, and none if the dataset tells no configuration, or one whose model is code of a user.
+    They go from edge to edge of a map, and from the first to the last value of curves.  Each extends over those of the
+    axes on which the body depends.  There are none if a parameter of the body varies along another axis, and none if
+    the dataset tells no configuration, or one whose model is code of a user.
     """
     text = str(dataset.attrs.get("config", ""))
     config = _config(text)
@@ -36,14 +37,15 @@ def critical_spins(dataset: xr.Dataset, *axes: Axis) -> Mapping[str, xr.DataArra
     fixed = [name for name in body if name not in drawn]
     if not config or any(name not in dataset.coords or dataset[name].ndim for name in fixed):
         return {}
-    between = tuple((name, tuple(_between(axis, len(drawn), config))) for name, axis in drawn.items())
+    number, whole = _POINTS.get(len(drawn), 1), len(axes) > 1
+    between = tuple((name, tuple(_between(axis, number, config, whole=whole))) for name, axis in drawn.items())
     return _evaluated(text, between, tuple((name, float(dataset[name])) for name in fixed))
 
 
-def _between(axis: Axis, axes: int, config: Config) -> Iterator[float]:
-    """Values along one of so many axes from edge to edge, as far as the parameter may have them."""
-    first, last = axis.straight(axis.edges)[[0, -1]]
-    for value in axis.bent(np.linspace(first, last, _POINTS[axes])).tolist():
+def _between(axis: Axis, number: int, config: Config, *, whole: bool) -> Iterator[float]:
+    """Values along an axis, as far as the parameter may have them; of a whole map from edge to edge."""
+    first, last = axis.straight(axis.edges if whole else axis.values)[[0, -1]]
+    for value in axis.bent(np.linspace(first, last, number)).tolist():
         if config.table[axis.name].allows(value) and (value > 0 or axis.name not in config.tier.positive):
             yield value
 

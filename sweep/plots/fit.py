@@ -28,7 +28,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     above.axhline(0, color="black", linewidth=0.5)
     above.set_ylabel(labels.label(dataset, "seen"))
     below.axhline(0, color="black", linewidth=0.5)
-    below.set_ylabel("film - fit")
+    below.set_ylabel("film − fit")
     below.set_xlabel(labels.label(dataset, "time"))
     words = [_of_law(name, one) for name, one in laws] or _values(dataset)
     where: Any = "outside right center" if page() > 2 * _VALUES else "outside lower center"

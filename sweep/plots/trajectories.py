@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
@@ -158,14 +159,15 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
         bodies.setdefault(tuple(found), i)
     entries: dict[str, Line2D] = {}
     written: list[float] = []
-    low, high = axes.get_ylim()
+    letter = mpl.rcParams["font.size"] / (72 * axes.bbox.height / axes.figure.dpi)
+    apart = 1.6 * letter * np.ptp(axes.get_ylim())
     for body, i in bodies.items():
         colour = "0.4" if len(bodies) == 1 else f"C{i}"
         for name, symbol, at, source in body:
             axes.axhline(at, color=colour, linestyle=_CRITICAL[name], linewidth=0.9, gid=name)
             entries[name] = lines.entry(name, theory.words(name, source, over_n0=True, spin="n"))
             entries[name].set(linestyle=_CRITICAL[name], linewidth=0.9)
-            if all(abs(at - other) > 0.04 * (high - low) for other in written):
+            if all(abs(at - other) > apart for other in written):
                 axes.annotate(
                     labels.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
                     textcoords="offset points", va="center", color=colour,

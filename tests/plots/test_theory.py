@@ -11,6 +11,7 @@ from sweep.axis import Axis
 from sweep.models import MODELS
 from sweep.models.ladder import analytic
 from sweep.models.theory import stability
+from sweep.plots import picture
 from sweep.plots.theory import Line, crossings, lines
 
 BODY = {"a": 10.0, "c": 1.0, "delta": 0.03}
@@ -69,3 +70,16 @@ def test_the_code_of_a_users_model_does_not_run_for_a_picture() -> None:
     dataset.attrs["config"] = dataset.attrs["config"].replace("model: slip", "model: nowhere.py")
     (line,) = [line for line in lines(dataset, axis(dataset, "b"), axis(dataset, "mu")) if line.name == "n_c2"]
     assert set(line.parts[0][0]) & {2.5, 4.5, 6.5, 8.5}  # from cell to cell
+
+
+def test_curves_of_critical_spins_are_smooth_from_the_first_value_to_the_last() -> None:
+    dataset = predictions([30.0, 80.0, 130.0, 180.0]).sel(b=4.5).drop_vars(["n0", "reversals_predicted"])
+    dataset["critical_reason"] = dataset["n_c1_plus"].astype("int8")
+    dataset["n_c2_plus_simulated"] = dataset["n_c2_plus"]
+    (axes,) = picture.plot(dataset).axes
+    for name in ("n_c1_plus_linear", "n_c2_plus"):
+        (line,) = [each for each in axes.lines if each.get_gid() == name]
+        mu = line.get_xdata()
+        assert [len(mu) > 100, mu[0], mu[-1]] == [True, 30, 180]
+        wanted = exact(Line(name[:4], "", []), b=np.full(len(mu), 4.5), mu=mu)
+        np.testing.assert_allclose(line.get_ydata(), wanted, rtol=1e-9)
