@@ -78,12 +78,13 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str) -> dict[str
     size = float(np.clip(72 * axes.bbox.width / axes.figure.dpi / len(at) / _ROOM, 0.4, 1))
     for shown in described:
         height = np.where(shown.blank, np.nan, shown.values)[0]
+        words = labels.words(chosen, shown.name)
         style = {"marker": "x", "color": "C0"} | _STYLES.get(shown.name, {})
-        entries[shown.name] = _points(axes, at, height, style, labels.words(chosen, shown.name), size)
+        entries[shown.name] = _points(axes, at, height, style | {"gid": shown.name}, words, size)
         for kind, (where,) in shown.marks.items() if shown is first else ():
             if where.any():
                 place = np.zeros(where.sum()) if kind in BLANK else height[where]
-                entries[kind] = _points(axes, at[where], place, _STYLES[kind], kind, size)
+                entries[kind] = _points(axes, at[where], place, _STYLES[kind] | {"gid": kind}, kind, size)
     if first.values.dtype.kind == "i":
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     if first.flags:

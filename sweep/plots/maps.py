@@ -173,8 +173,9 @@ def _map(axes: Axes, whole: Map, scale: Scale, *, alone: bool, labelled: bool, c
     set_scale(axes, "y", shown.y.values)
     values = np.ma.masked_where(shown.blank, shown.values)
     axes.pcolormesh(
-        shown.x.edges, shown.y.edges, values, cmap=scale.colours, norm=scale.norm, rasterized=values.size > 5000
-    )
+        shown.x.edges, shown.y.edges, values, cmap=scale.colours, norm=scale.norm, rasterized=values.size > 5000,
+        gid=shown.name,
+    )  # fmt: skip
     axes.set(xlim=shown.x.edges[[0, -1]], ylim=shown.y.edges[[0, -1]])
     dark = ~shown.blank & (scale.lightness(values.filled(values.data.flat[0])) < 0.5)
     compared = shown.name in COMPARISONS and not alone

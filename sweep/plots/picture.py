@@ -168,9 +168,8 @@ def _drawn(
         if histogram:
             raise ValueError("histogram: a probability is a share already; name another variable, such as reversals")
         return probabilities.draw(chosen)
-    if histogram:
-        return histograms.draw(chosen)
-    return maps.draw(chosen, **how) if len(chosen.across) == 2 else curves.draw(chosen, how["limits"])
+    room, options = _way(chosen, how, histogram=histogram)
+    return cast(Picture, room.draw(chosen, **options))
 
 
 def _draw_in(
@@ -183,13 +182,16 @@ def _draw_in(
     chosen = panels.choose(datasets[0], variable, **axes)
     if len(chosen.each) > 1 or "probability" in chosen.names:
         raise ValueError(f"ax: {chosen.names[0]} needs more than one panel; select a value of each other axis")
-    if histogram:
-        histograms.draw_in(ax, chosen)
-    elif len(chosen.across) == 2:
-        maps.draw_in(ax, chosen, **how)
-    else:
-        curves.draw_in(ax, chosen, how["limits"])
+    room, options = _way(chosen, how, histogram=histogram)
+    room.draw_in(ax, chosen, **options)
     return cast(Figure, ax.get_figure(root=True))
+
+
+def _way(chosen: panels.Panels, how: dict[str, Any], *, histogram: bool) -> tuple[Any, dict[str, Any]]:
+    """Which module draws the panels of a run, and what it is told."""
+    if histogram:
+        return histograms, {}
+    return (maps, how) if len(chosen.across) == 2 else (curves, {"limits": how["limits"]})
 
 
 def inches(width: str) -> float:

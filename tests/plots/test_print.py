@@ -142,6 +142,7 @@ def test_a_picture_in_given_axes(selection: dict[str, int], variable: str | None
     assert picture.plot(one, variable, ax=right) is figure
     assert right.get_xlabel() == "short semi-axis b (c)"
     assert right.get_ylabel()
+    assert right.findobj(lambda artist: artist.get_gid() == (variable or "reversals"))
     assert right.has_data()
     assert not left.has_data()
     (beside,) = figure.axes[2:]
