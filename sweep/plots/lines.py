@@ -63,7 +63,7 @@ def draw_contours(axes: Axes, shown: Map, scale: Scale) -> None:
         how: dict[str, Any] = {"norm": scale.norm, "locator": locator, "colors": "black", "linewidths": 0.6}
         found = axes.contour(shown.x.values, shown.y.values, values, levels, **how)
         found.set_path_effects(_halo(1.2))
-        for number in axes.clabel(found, fmt=labels.number, fontsize="small"):
+        for number in axes.clabel(found, fmt=scale.ticks or labels.number, fontsize="small"):
             number.set_path_effects(_halo(2))
 
 
