@@ -73,10 +73,10 @@ class CellControls:
         """How long the trajectories took, and how they ended."""
         told = []
         for k, curve in enumerate(curves):
-            if curve:
+            if curve and curve.whole:
                 status = labels.flag_words(curve.dataset, "status")[int(curve.dataset["status"])]
                 unit = labels.si_unit(curve.dataset, "t_stop")
-                end = f"{status}, followed to t = {float(curve.dataset['t_stop']):.6g}{unit}"
+                end = f"{status}, followed to t = {labels.number(float(curve.dataset['t_stop']))}{unit}"
                 told.append(f"{k + 1}: {escape(end)}, run in {curve.seconds:.2g} s")
         self._end.text = "<br>".join(told)
 

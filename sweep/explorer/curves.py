@@ -11,7 +11,7 @@ from bokeh import models
 from bokeh.core.properties import value
 from bokeh.plotting import figure
 
-from sweep.explorer.colours import CURVES
+from sweep.explorer.colours import CURVES, numbers
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
 from sweep.grid import Array
@@ -123,6 +123,8 @@ class _Slot:
         self.trail = models.ColumnDataSource({"x": [], "y": []}, syncable=False)
         self.point = models.ColumnDataSource({"x": [], "y": [], "alpha": []}, syncable=False)
         self.item = models.LegendItem()
+        self._curve: Curve | None = None
+        self._put(None)
         self.show(None, "")
         line = curves.spin.line("time", "spin", source=self.series, color=colour, width=1.2)
         dots = curves.spin.scatter("x", "y", source=self.reversals, color=colour, size=8, line_color="white")
@@ -134,8 +136,14 @@ class _Slot:
         curves.path.scatter("x", "y", source=self.point, color=colour, size=9, line_color="white", alpha="alpha")
 
     def show(self, curve: Curve | None, name: str) -> None:
-        """Draw a curve, or nothing; what it does not tell is NaN."""
+        """Draw a curve, or nothing."""
         self.item.update(label=value(name), visible=curve is not None)
+        if curve is not self._curve:
+            self._curve = curve
+            self._put(curve)
+
+    def _put(self, curve: Curve | None) -> None:
+        """Send a curve to the browser; what it does not tell is NaN."""
         one, reversals = (
             (curve.dataset, curve.reversals) if curve else (xr.Dataset({"time": ("time", [])}), np.zeros(0))
         )
@@ -170,5 +178,5 @@ def _figure(height: int, name: str) -> Any:
     plot.toolbar.update(logo=None, autohide=True)
     plot.grid.grid_line_color = "#e8ebee"
     for axis in plot.axis:
-        axis.update(**_AXIS)
+        axis.update(formatter=numbers(), **_AXIS)
     return plot

@@ -43,16 +43,15 @@ class Drawn:
         self.active = max(min(self.active, len(self._jobs) - 1), 0)
 
     def hear(self, job: Job) -> bool:
-        """Take the news of a run; false if its cell is no longer drawn."""
-        if job not in self._jobs:
+        """Take the news of a run; true if there is more of its curve to draw."""
+        if job not in self._jobs or not job.curve or job.curve is self.curves[k := self._jobs.index(job)]:
             return False
-        if job.curve:
-            self.curves[self._jobs.index(job)] = job.curve
+        self.curves[k] = job.curve
         return True
 
     def running(self) -> Iterator[tuple[int, Job]]:
         """The places of the cells that are run, and their runs."""
-        return ((k, job) for k, job in enumerate(self._jobs) if not (job.curve or job.fault))
+        return ((k, job) for k, job in enumerate(self._jobs) if not job.over)
 
     def leave(self) -> None:
         """Give up all runs."""

@@ -23,7 +23,7 @@ from bokeh.models import (
 )  # fmt: skip
 from bokeh.plotting import figure
 
-from sweep.explorer.colours import is_logarithmic, mapping
+from sweep.explorer.colours import is_logarithmic, mapping, numbers
 from sweep.explorer.patterns import TILES
 from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.grid import Array
@@ -89,7 +89,9 @@ class MapFigure:
         overlay = ColumnDataSource({"image": [np.zeros((2, 2), "uint32")], **self._place}, syncable=False)
         plot.image_rgba(image="image", x="x", y="y", dw="dw", dh="dh", source=overlay)
         self._lines = {name: _line(plot, *style) for name, style in LINES.items()}
-        self._numbers = _numbers(plot)
+        self._numbers = _counts(plot)
+        self._uncertain = ColumnDataSource({"x": [], "y": [], "size": []}, name="uncertain")
+        plot.scatter(source=self._uncertain, size="size", color="white", line_color="black", line_width=0.7)
         self.cursor, self.pins = _cursor(plot), _pins(plot)
         self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
@@ -125,6 +127,13 @@ class MapFigure:
             "y": [self._y.place(y) for _, y, _ in numbers],
             "count": [count for *_, count in numbers],
         }
+        up, across = np.nonzero(part.marks["uncertain"])
+        size = float(np.clip(120 / max(part.values.shape), 2.0, 6.0))
+        self._uncertain.data = {
+            "x": self._x.place(part.x.values[across]),
+            "y": self._y.place(part.y.values[up]),
+            "size": np.full(len(up), size),
+        }
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]
@@ -137,7 +146,8 @@ class MapFigure:
         ticks = scale.ticks or {}
         return ColorBar(
             color_mapper=mapper, ticker=FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
-            title=labels.unit(self._source.cell, part.name) or None, major_label_overrides=ticks, **_BAR,
+            formatter=numbers(), title=labels.unit(self._source.cell, part.name) or None, major_label_overrides=ticks,
+            **_BAR,
         )  # fmt: skip
 
 
@@ -149,7 +159,7 @@ def _line(plot: Any, dash: str, width: float) -> ColumnDataSource:
     return source
 
 
-def _numbers(plot: Any) -> ColumnDataSource:
+def _counts(plot: Any) -> ColumnDataSource:
     """The counts on the boundaries."""
     source = ColumnDataSource({"x": [], "y": [], "count": []}, name="numbers")
     plot.text("x", "y", "count", source=source, text_font_size="11px", text_align="center", text_baseline="middle",
@@ -194,7 +204,7 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
     plot.toolbar.logo = None
     plot.grid.visible = False
     for axis in plot.axis:
-        axis.update(**_STYLE)
+        axis.update(formatter=numbers(), **_STYLE)
     plot.title.update(text_font_size="14px", text_font_style="bold")
     plot.yaxis.visible = bool(up.name)
     for axis, drawn in ((across, plot.xaxis[0]), (up, plot.yaxis[0])):
@@ -215,12 +225,12 @@ def _tip(source: Source, part: Map, columns: list[str]) -> tuple[str, dict[str, 
     for axis, variable, index in ((part.x, "$x", "i"), (part.y, "$y", "j")):
         if axis.name:
             rows.append((labels.symbol(axis.name), f"{variable}{{custom}}"))
-            code = f"return Number(values[special_vars.image_index.{index}].toPrecision(6)).toString()"
+            code = f"return sweep.number(values[special_vars.image_index.{index}])"
             formatters[variable] = CustomJSHover(args={"values": axis.values}, code=code)
     for name in columns:
         rows.append((_SHORT.get(name) or source.words(name), f"@{{{name}}}{{custom}}"))
         flags = labels.flag_words(source.cell, name)
-        code = "return words[value] ?? (Number.isFinite(value) ? Number(value.toPrecision(6)).toString() : 'none')"
+        code = "return words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')"
         formatters[f"@{{{name}}}"] = CustomJSHover(args={"words": {str(k): w for k, w in flags.items()}}, code=code)
     table = "".join(
         f'<tr><td style="color:#5b6875;padding-right:10px">{_escaped(words)}</td><td><b>{value}</b></td></tr>'

@@ -3,6 +3,14 @@
 "use strict"
 
 const sweep = (() => {
+  /** A number as pictures have it, such as −2×10⁻⁵. */
+  function number(at) {
+    const [digits, power] = at.toExponential(5).split("e").map(Number)
+    if (!(power < -4 || power >= 6)) return String(Number(at.toPrecision(6))).replace("-", "−")
+    const ten = `10${[...String(power)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`
+    return `${digits}×${ten}`.replace("-", "−").replace(/^(−?)1×/, "$1")
+  }
+
   // ---- cells and edges
 
   /** Index of the cell whose edges enclose `at`, or -1. */
@@ -252,6 +260,6 @@ const sweep = (() => {
 
   document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
 
-  const api = {address, called, copy, moment, picture, play, point, save, tap, use}
+  const api = {address, called, copy, moment, number, picture, play, point, save, tap, use}
   return api
 })()

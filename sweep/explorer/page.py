@@ -46,8 +46,7 @@ def dress(document: Document, source: Source, query: str | None = None) -> None:
 
 def legend(part: Map, scale: Scale) -> str:
     """The patterns and lines that occur in a map, and what lies beyond its scale, as HTML."""
-    box = "height:14px;border:1px solid #8a949e;border-radius:2px"
-    items = [(f"{box};background:{patterns.swatch(kind)}", words) for kind, words in part.legend.items()]
+    items = [(patterns.swatch(kind), words) for kind, words in part.legend.items()]
     lines = {line.words: figure.LINES[line.name] for line in part.lines}
     items += [(f"border-top:{2 * width}px {dash} #000", words) for words, (dash, width) in lines.items()]
     return str(PARTS.legend(items, beyond(part, scale)))

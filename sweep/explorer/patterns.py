@@ -37,15 +37,17 @@ TILES = {
     "time_limit": _tile(10, lambda x, y: _lines((x + y) % 10)),
     "inferred": _tile(6, lambda x, y: np.where(x < 2, _lines(y), 0)),
     "noise_limited": _tile(8, lambda _, y: _lines(y)),
-    "uncertain": _tile(8, lambda x, _: _lines(x)),
 }
-assert list(TILES) == list(marks.WORDS)
+assert [*TILES, "uncertain"] == list(marks.WORDS)  # which has a dot
 
 
 def swatch(kind: str) -> str:
-    """The CSS background of a kind in a legend."""
+    """The CSS of a kind in a legend."""
+    if kind == "uncertain":
+        return "background:#fff;border:1px solid #000;border-radius:50%;height:5px;margin:0 9px;width:5px"
     tile = Image.fromarray(TILES[kind][::-1].view("uint8").reshape(*TILES[kind].shape, 4), "RGBA")
     file = io.BytesIO()
     tile.save(file, "PNG")
     colour = "#" + bytes(_EXAMPLE).hex()
-    return f"url(data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}) {colour}"
+    picture = f"url(data:image/png;base64,{base64.b64encode(file.getvalue()).decode()})"
+    return f"height:14px;border:1px solid #8a949e;border-radius:2px;background:{picture} {colour}"

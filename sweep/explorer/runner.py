@@ -6,8 +6,9 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from queue import SimpleQueue
+from dataclasses import dataclass, field, replace
+from itertools import count
+from queue import PriorityQueue
 
 import xarray as xr
 
@@ -18,8 +19,9 @@ from sweep.engine.reporter import Progress, Reporter
 from sweep.explorer.setup import Setup
 from sweep.explorer.state import Cell
 from sweep.grid import Array
-from sweep.jit import showing
+from sweep.jit import load_numba, showing
 from sweep.kernels import measures
+from sweep.kernels.status import FAILURES, RUNNING, TIME_LIMIT
 from sweep.plots.trajectories import lively_until, reversal_times
 from sweep.studies.trajectory import trajectory
 
@@ -28,6 +30,9 @@ LONG = 30_000.0
 without an end (`t_end: .inf`) ends here."""
 
 COMPILING = "compiling the simulation for this machine; later runs find it in the cache"
+
+_STRETCHES = tuple(0.25**k for k in range(4, -1, -1))
+"""A trajectory is run to these shares of its time in turn, so that the first of its curve is seen at once."""
 
 _KEPT = 64
 """Trajectories that are remembered."""
@@ -46,6 +51,8 @@ class Curve:
     """Times of the reversals, in the unit of the dataset."""
     seconds: float
     """The time that the run took."""
+    whole: bool = True
+    """False if the curve goes on."""
 
 
 class Dropped(Exception):
@@ -59,15 +66,25 @@ class Job(Reporter):
     cell: Cell
     tell: Callable[[Job], None]
     share: float = 0.0
-    """The part of the run that is over."""
+    """The part of the time that has been run."""
     delay: str = ""
     """The reason if it does not get on."""
     curve: Curve | None = None
+    """As far as it has been run."""
     fault: str = ""
     """The reason if there will be no curve."""
     dropped: bool = False
     """Set by whoever no longer waits: the run is not begun, or ends at its next chunk, and nothing more is told."""
+    t_end: float = 1.0
+    """The time at which the run ends."""
+    rest: Iterator[Curve] = field(default_factory=lambda: iter(()))
+    """Runs it further."""
     _told: float = 0.0
+
+    @property
+    def over(self) -> bool:
+        """True if there is nothing more to come."""
+        return bool(self.fault or (self.curve and self.curve.whole))
 
     def news(self, delay: str = "") -> None:
         """Tell that something has changed, unless nobody waits."""
@@ -79,32 +96,44 @@ class Job(Reporter):
         """Tell how far the run is; ends it by `Dropped` if nobody waits."""
         if self.dropped:
             raise Dropped
-        self.share = progress.done / progress.cells
+        self.share = max(self.share, progress.done / self.t_end)
         if time.perf_counter() - self._told > _TELL_EVERY:
             self.news()
 
 
-def run(setup: Setup, cell: Cell, reporter: Reporter | None = None) -> Curve:
-    """Run the trajectory of a cell, with the usual measurements, and keep what is worth a look (`lively_until`)."""
-    began = time.perf_counter()
+def run(setup: Setup, cell: Cell, job: Job | None = None) -> Iterator[Curve]:
+    """Run the trajectory of a cell, with the usual measurements, to later and later times: one curve after another.
+
+    The last one goes to `t_end`, or to where the trajectory has settled and nothing is worth a look (`lively_until`).
+    """
     parameters = {name: Values.one(value) for name, value in cell.items()}
     t_end = setup.config.integrator.patient.t_end
     t_end = LONG if t_end >= FOREVER else t_end
-    integrator = setup.config.integrator.model_copy(update={"t_end": t_end})
-    usual = measures.default(setup.config.equations)
-    config = replace(setup.config, parameters=parameters, measure=usual, integrator=integrator)
+    if job:
+        job.t_end = t_end
+    usual, seconds = measures.default(setup.config.equations), 0.0
+    config = replace(setup.config, parameters=parameters, measure=usual)
     every = t_end / (2 * LONG) if t_end > LONG else None
-    one = trajectory(config, every=every, reporter=reporter).isel(trajectory=0)
-    one = one.sel(time=slice(0, lively_until(one)))
-    return Curve(one, reversal_times(one), time.perf_counter() - began)
+    for until in (share * t_end for share in _STRETCHES):
+        began = time.perf_counter()
+        integrator = config.integrator.model_copy(update={"t_end": until})
+        one = trajectory(replace(config, integrator=integrator), every=every, reporter=job).isel(trajectory=0)
+        lively, seconds = lively_until(one), seconds + time.perf_counter() - began
+        still = one["status"] not in (RUNNING, TIME_LIMIT) and lively < one["time"][-1]
+        whole = bool(until == t_end or still or one["status"] in FAILURES)
+        one = one.sel(time=slice(0, lively)) if whole else one
+        yield Curve(one, reversal_times(one), seconds, whole)
+        if whole:
+            return
 
 
 class Runner:
-    """Runs one trajectory after the other, in the order in which they are asked for."""
+    """Runs the trajectories that are asked for, the first stretch of each before the later ones of the others."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
-        self._jobs: SimpleQueue[Job] = SimpleQueue()
+        self._jobs: PriorityQueue[tuple[float, int, Job]] = PriorityQueue()
+        self._numbers = count()
         self._known: dict[tuple[tuple[str, float], ...], Curve] = {}
         self._running: Job | None = None
         self._compiles = False
@@ -112,37 +141,40 @@ class Runner:
         threading.Thread(target=self._work, daemon=True, name="trajectories").start()
 
     def submit(self, job: Job) -> None:
-        """Run a trajectory as soon as those asked for before are over."""
-        self._jobs.put(job)
+        """Run a trajectory as soon as those asked for before are as far."""
+        job.rest = run(self._setup, job.cell, job)
+        self._jobs.put((0.0, next(self._numbers), job))
         if self._compiles:
             job.news(COMPILING)
 
     def _work(self) -> None:
+        # A trajectory has work for one thread.  Others would wait for it busily, and where cores are shared it for
+        # them: ten times as long.
+        load_numba().set_num_threads(1)
         with showing(self._compiling):
             while True:
-                self._running = self._jobs.get()
-                self._finish(self._running)
+                *_, self._running = self._jobs.get()
+                self._go_on(self._running)
 
-    def _finish(self, job: Job) -> None:
+    def _go_on(self, job: Job) -> None:
+        key = tuple(sorted(job.cell.items()))
         try:
-            job.curve = self._curve(job)
+            if job.dropped:
+                return
+            job.curve = self._known.get(key) or next(job.rest)
         except Dropped:
             return
         except ConfigError as error:
             job.fault = error.faults[0].message if error.faults else str(error)
         except Exception as error:  # told on the page: this thread has to go on
             job.fault = printable(f"{type(error).__name__}: {error}")
-        job.news()
-
-    def _curve(self, job: Job) -> Curve:
-        if job.dropped:
-            raise Dropped
-        key = tuple(sorted(job.cell.items()))
-        if key not in self._known:
-            self._known[key] = run(self._setup, job.cell, job)
+        if job.curve and job.curve.whole:
+            self._known[key] = job.curve
             if len(self._known) > _KEPT:
                 del self._known[next(iter(self._known))]
-        return self._known[key]
+        if not job.over:
+            self._jobs.put((job.share, next(self._numbers), job))
+        job.news()
 
     @contextmanager
     def _compiling(self) -> Iterator[None]:

@@ -143,11 +143,11 @@ class Source:
     def _value(self, cell: xr.Dataset, name: str) -> str:
         values = np.ravel(cell[name].values)
         if name == "difference":
-            return f"{values[0]:+d}" if values[0] else "0"
+            return labels.number(values[0]) if values[0] <= 0 else f"+{values[0]}"
         flags = labels.flag_words(cell, name)
         if flags:
             return ", ".join(flags.get(int(v), str(v)) for v in values)
-        finite = [f"{v:.6g}" for v in values if np.isfinite(v)]
+        finite = [labels.number(v) for v in values if np.isfinite(v)]
         return f"{', '.join(finite)} {labels.unit(cell, name)}".strip() if finite else "none"
 
 

@@ -87,25 +87,27 @@ def choices(source: Source) -> dict[str, Choice]:
     counts = [n for n in _COUNTS if n in source.variables]
     others = [n for n in source.variables if n not in counts]
     words = [*(_COUNTS[n] for n in counts), *map(source.words, others)]
-    axes = source.dims, [source.words(d) for d in source.dims]
+    axes = list(source.axes), [source.words(d) for d in source.axes]
     found = [Choice("show", "variable", [*counts, *others], words, len(counts))]
     found.append(Choice("x", "horizontal axis", *axes))
-    if len(source.dims) > 1:
+    if len(source.axes) > 1:
         found.append(Choice("y", "vertical axis", *axes))
     for name, axis in source.axes.items():
         unit = labels.si_unit(source.dataset, name)
-        exact, short = [f"{v:.12g}" for v in axis.values], [f"{v:.6g}{unit}" for v in axis.values]
+        exact, short = [f"{v:.12g}" for v in axis.values], [f"{labels.number(v)}{unit}" for v in axis.values]
         found.append(Choice(name, source.words(name), exact, short, len(exact) * (len(exact) <= _BUTTONS), axis))
     return {choice.name: choice for choice in found}
 
 
 def first(source: Source) -> State:
-    """The state when the address asks for nothing: the dataset's subject over its two longest axes, in its order."""
-    longest = sorted(source.dims, key=lambda d: -len(source.axes[d].values))[:2]
-    x, *rest = [d for d in source.dims if d in longest]
+    """The state when the address asks for nothing: the dataset's subject over its two longest axes, as in a picture."""
     about = subject(source.dataset)
     show = about if about in source.variables else source.variables[0]
-    return State(x, rest[0] if rest else "", show, dict.fromkeys(source.axes, 0))
+    dims = [str(d) for d in source.cell[show].dims]
+    dims += [d for d in source.axes if d not in dims][: max(0, 2 - len(dims))]
+    longest = sorted(dims, key=lambda d: -len(source.axes[d].values))[:2]
+    *y, x = [d for d in dims if d in longest]
+    return State(x, y[0] if y else "", show, dict.fromkeys(source.axes, 0))
 
 
 def write(state: State, source: Source, base: Cell) -> str:

@@ -18,7 +18,7 @@ from sweep.explorer.colours import CURVES
 from sweep.explorer.curves import Curves
 from sweep.explorer.drawn import Drawn
 from sweep.explorer.page import PARTS
-from sweep.explorer.runner import Job, Runner
+from sweep.explorer.runner import Curve, Job, Runner
 from sweep.explorer.setup import Setup, why_still
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State
@@ -28,8 +28,7 @@ from sweep.plots import labels
 _BESIDE = ("reversals", "reversals_predicted", "status")
 """The pointer shows these of a cell at once; the server adds everything else."""
 
-_NOTICE = {"background": "#1b2733", "border-radius": "8px", "box-shadow": "0 4px 18px #0004", "color": "white",
-           "max-width": "calc(100vw - 72px)", "padding": "8px 16px"}  # fmt: skip
+_NOTICE = {"background": "#1b2733", "border-radius": "8px 8px 0 0", "color": "white", "padding": "6px 16px"}
 
 
 class View:
@@ -63,7 +62,7 @@ class View:
         self._map = Column(sizing_mode="stretch_width", name="map")
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._cell = Div(sizing_mode="stretch_width", name="cell")
-        self._notice = Div(name="notice", styles=_NOTICE)
+        self._notice = Div(name="notice", styles=_NOTICE, sizing_mode="stretch_width", margin=0)
         self._figures = Curves()
         self._controls = controls.MapControls(self._source, self._change)
         self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
@@ -123,8 +122,8 @@ class View:
         if index is None:
             self._cell.text = str(PARTS.hint("" if self._setup else why_still(self._source)))
             return
-        units = {d: labels.si_unit(self._source.dataset, d) for d in self._source.dims}
-        here = [f"{labels.symbol(d)} = {self._source.axes[d].values[index[d]]:.6g}{units[d]}" for d in units]
+        dataset, axes = self._source.dataset, self._source.axes
+        here = [labels.measured(dataset, d, axes[d].values[index[d]]) for d in self._source.dims]
         told = self._source.describe(index)
         self._cell.text = str(PARTS.cell(", ".join(here), told.pop("note", ""), told))
 
@@ -169,9 +168,9 @@ class View:
 
     def _hear(self, job: Job) -> None:
         if self._drawn.hear(job):
+            self._draw_curves()
+        if not job.dropped:
             self._faults = [job.fault] if job.fault else self._faults
-            if job.curve:
-                self._draw_curves()
             self._draw_progress()
 
     def _draw_cells(self) -> None:
@@ -198,7 +197,7 @@ class View:
     def _draw_curves(self) -> None:
         curves = self._drawn.curves
         names = [
-            f"{k}: {name}" + (f", {labels.reversals(len(curve.reversals))}" if curve else "")
+            f"{k}: {name}{_counted(curve) if curve else ''}"
             for k, (name, curve) in enumerate(zip(self._names(), curves, strict=True), 1)
         ]
         self._hint.visible = not any(curves)
@@ -231,12 +230,21 @@ class View:
         return export.yaml(self._source, self._setup, self.state).encode()
 
 
+def _counted(curve: Curve) -> str:
+    return f", {labels.reversals(len(curve.reversals))}{'' if curve.whole else ' …'}"
+
+
+def _end(job: Job) -> None:
+    """Give a run up as soon as there is something of its curve."""
+    job.dropped = job.curve is not None
+
+
 def make(source: Source, setup: Setup | None) -> Callable[[Document], None]:
     """A function that fills the document of each visitor."""
     runner = Runner(setup) if setup else None
     if setup and runner:
         # Compiles the simulation, or loads it from the cache, before the first click needs it.
-        runner.submit(Job(setup.base, lambda _: None))
+        runner.submit(Job(setup.base, _end))
 
     def fill(document: Document) -> None:
         request: Any = document.session_context.request if document.session_context else None

@@ -26,6 +26,7 @@ import xarray as xr
 from support import ROOT, own
 
 import sweep
+from sweep.plots import labels
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Download, Locator, Page
@@ -80,7 +81,7 @@ def visit(browser: Browser, served: str) -> Iterator[Callable[..., Page]]:
         page.set_default_timeout(TIMEOUT)
         page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.goto(f"{served}?{query}" if query else served)
+        page.goto(f"{served}?x=mu&y=b&{query}" if query else served)
         if ready:
             settle(page)
         return page
@@ -262,7 +263,7 @@ def test_the_pointer_tells_all_of_a_cell(visit: Callable[..., Page], opened: xr.
     cell = opened.isel(mu=2, b=0, n0=N0)
     assert "lower bound" in told
     for name in ("spin_final", "t_stop", "n_c1_plus_linear", "form_factor", "energy_error"):
-        assert f"{cell[name].item():.6g}" in told
+        assert labels.number(cell[name].item()) in told
     assert "ended at the time limit" in told
     near = tip.text_content() or ""
     assert re.search(rf"simulated\s*{int(cell['reversals'])}predicted", near), near
@@ -272,7 +273,9 @@ def test_the_pointer_tells_all_of_a_cell(visit: Callable[..., Page], opened: xr.
 
 def test_axes_variable_and_selection_change(visit: Callable[..., Page], opened: xr.Dataset) -> None:
     page = visit()
-    assert page.url.endswith("?show=reversals&x=mu&y=b&n0=0.02")
+    assert page.url.endswith("?show=reversals&x=b&y=mu&n0=0.02")
+    select(page, "x", "friction μ")
+    page.wait_for_url(re.compile("x=mu&y=b"))
     select(page, "y", "start spin n₀")
     page.wait_for_url(re.compile("x=mu&y=n0"))
     settle(page)
@@ -314,6 +317,20 @@ def test_a_click_runs_the_cell(visit: Callable[..., Page], opened: xr.Dataset) -
     )
     np.testing.assert_allclose(np.array(energy)[[0, -1]] + np.array(lost)[[0, -1]], energy[0], rtol=1e-5)
     assert page.url.endswith("cell=b:4,mu:70,n0:0.05")
+
+
+def test_a_curve_is_seen_while_it_grows(visit: Callable[..., Page]) -> None:
+    page = visit("n0=0.05")
+    page.evaluate(f"""(() => {{
+        const data = {NAMED}('spin').renderers[0].data_source
+        window.ends = []
+        data.properties.data.change.connect(() => window.ends.push(data.data.time.at(-1)))
+    }})()""")
+    page.mouse.click(*place(page, 3, 2))
+    wait_for_curves(page, 1)
+    ends = page.evaluate("window.ends")
+    assert ends == sorted(ends)
+    assert ends[0] < ends[-1] / 100
 
 
 def test_cells_are_overlaid_and_removed(visit: Callable[..., Page]) -> None:
@@ -449,7 +466,7 @@ def test_a_click_runs_a_users_model_that_the_user_names(browser: Browser, tmp_pa
             page.goto(address(process))
             settle(page)
             spot = {"torque": 2, "damping": 1}
-            page.mouse.click(*place(page, *(spot[str(dim)] for dim in run["reversals"].dims)))
+            page.mouse.click(*place(page, *(spot[str(dim)] for dim in reversed(run["reversals"].dims))))
             wait_for_curves(page, 1)
             count = run["reversals"].isel(spot).item()
             assert curves(page)[0].endswith(f"torque = 1.2, {count} reversals")
@@ -484,6 +501,9 @@ def test_a_body_in_si_units_says_them(browser: Browser, tmp_path: Path) -> None:
             assert model(page, "parameter sigma", "m.title") == "σ (kg m²/s)"
             wait(page, "drag sigma", f"Math.abs(m.value - {np.log(3.2e-6)}) < 1e-3")
             wait(page, "energies", "m.below[0].axis_label === 'time t (s)'")
+            ticks = "m.left[0].formatter.doFormat([1e-5, 5e-6, -0.02, 1200000], {})"
+            assert model(page, "map figure", ticks) == ["10⁻⁵", "5×10⁻⁶", "−0.02", "1.2×10⁶"]
+            assert page.evaluate("[0, 1, -1e-7, NaN].map(sweep.number)") == ["0", "1", "−10⁻⁷", "NaN"]
             page.get_by_text(re.compile(r"followed to t = \d+ s")).wait_for()
             field = control(page, "parameter sigma", "input")
             field.fill("5e-6")
@@ -571,7 +591,7 @@ def test_a_map_is_one_file_that_needs_no_network(browser: Browser, opened: xr.Da
     tip.wait_for()
     cell = opened.isel(mu=2, b=0, n0=N0)
     near = tip.text_content() or ""
-    assert f"{float(cell['spin_final']):.6g}"[:7] in near
+    assert f"{float(cell['spin_final']):.6g}".replace("-", "−")[:7] in near
     assert "ended at the time limit" in near
     assert "lower bound" in text(page, "legend")
     assert len(np.unique(pixels(page, 2, 0), axis=0)) > 1

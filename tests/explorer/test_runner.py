@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +26,12 @@ def cell_at(source: Source, setup: Setup, **index: int) -> dict[str, float]:
     return {**setup.base, **source.parameters_at(tuple(setup.base), index)}
 
 
+def whole(setup: Setup, cell: Cell) -> Curve:
+    """The curve of a cell when it is over."""
+    *_, curve = runner.run(setup, cell)
+    return curve
+
+
 class Heard(Job):
     """A job that remembers what it was delayed by when it told news, and can be waited for."""
 
@@ -33,7 +41,7 @@ class Heard(Job):
 
     def _hear(self, job: Job) -> None:
         self.delays.append(job.delay)
-        if job.curve or job.fault:
+        if job.over:
             self._ended.set()
 
     def wait(self) -> Job:
@@ -43,7 +51,7 @@ class Heard(Job):
 
 def test_a_trajectory_has_the_sweeps_numbers(source: Source, setup: Setup, opened: xr.Dataset) -> None:
     index = {"mu": 3, "b": 2, "n0": 1}
-    curve = runner.run(setup, cell_at(source, setup, **index))
+    curve = whole(setup, cell_at(source, setup, **index))
     cell = opened.isel(index)
     for name in ("reversals", "t_last_reversal"):
         assert curve.dataset[name].item() == cell[name].item()
@@ -55,19 +63,60 @@ def test_a_curve_goes_on_where_a_sweep_ends(setup: Setup) -> None:
     """A spin below 1.5 n_c1 settles within a few units of time, and is seen nevertheless."""
     cell = {**setup.base, "mu": 75.0, "b": 3.0, "n0": -0.006}
     assert sweep.trajectory(setup.config, **cell, stop_when_settled=True)["t_stop"].item() < 10
-    assert runner.run(setup, cell).dataset["time"][-1] == setup.config.integrator.t_end
+    assert whole(setup, cell).dataset["time"][-1] == setup.config.integrator.t_end
+
+
+def test_a_curve_grows(source: Source, setup: Setup) -> None:
+    """Its first stretch, which takes a small part of the time, is the beginning of the whole."""
+    first, *later = runner.run(setup, cell_at(source, setup, mu=3, b=2, n0=1))
+    assert not first.whole
+    assert [curve.whole for curve in later] == [False, False, False, False, True][-len(later) :]
+    last = later[-1].dataset
+    assert first.dataset["time"][-1] < last["time"][-1] / 100
+    few = first.dataset["spin"].values
+    np.testing.assert_allclose(few, np.interp(first.dataset["time"], last["time"], last["spin"]), atol=1e-4)
+
+
+def test_a_curve_ends_where_nothing_happens_any_more(opened: xr.Dataset) -> None:
+    """What a longer run counts is counted by then."""
+    config = str(opened.attrs["config"])
+    setup = Setup(Source(opened.assign_attrs(config=re.sub("t_end: [^,}]*", "t_end: 12000.0", config))))
+    assert setup.config.integrator.t_end == 12000
+    cell = {**setup.base, "mu": 40.0, "b": 4.0, "n0": 0.02}
+    curve, long = whole(setup, cell), sweep.trajectory(setup.config, **cell)
+    assert curve.dataset["t_stop"] < 12000
+    assert curve.dataset["reversals"] == long["reversals"].item() > 0
+
+
+def test_short_stretches_go_first(setup: Setup) -> None:
+    """A cell that is added is seen before those before it are run to their ends."""
+    told = list[tuple[float, bool]]()
+
+    class Noting(Heard):
+        def _hear(self, job: Job) -> None:
+            if job.curve:
+                told.append((job.cell["mu"], job.curve.whole))
+            super()._hear(job)
+
+    running = Runner(setup)
+    jobs = [Noting({**setup.base, "mu": mu, "b": 4.0, "n0": 0.05}) for mu in (60.0, 70.0)]
+    for job in jobs:
+        running.submit(job)
+    for job in jobs:
+        job.wait()
+    assert told.index((70.0, False)) < told.index((60.0, True))
 
 
 def test_long_trajectories_are_sampled_sparsely(
     source: Source, setup: Setup, monkeypatch: pytest.MonkeyPatch
 ) -> None:  # fmt: skip
     cell = cell_at(source, setup, mu=3, b=2, n0=1)
-    whole = runner.run(setup, cell).dataset
+    dense = whole(setup, cell).dataset
     monkeypatch.setattr(runner, "LONG", 250.0)
-    sparse = runner.run(setup, cell).dataset
-    assert whole.sizes["time"] > 2000
+    sparse = whole(setup, cell).dataset
+    assert dense.sizes["time"] > 2000
     assert 200 < sparse.sizes["time"] <= 502
-    assert sparse["spin_final"] == whole["spin_final"]
+    assert sparse["spin_final"] == dense["spin_final"]
 
 
 def test_what_cannot_be_run_is_told(setup: Setup) -> None:
@@ -80,12 +129,12 @@ def test_nothing_is_heard_of_dropped_jobs(setup: Setup, monkeypatch: pytest.Monk
     """The running one ends at its next chunk, and the waiting one is never begun."""
     begun, inside, go_on = list[float](), threading.Event(), threading.Event()
 
-    def slow(_: Setup, cell: Cell, reporter: Job) -> Curve:
+    def slow(_: Setup, cell: Cell, reporter: Job) -> Iterator[Curve]:
         begun.append(cell["mu"])
         inside.set()
         assert go_on.wait(60)
         reporter.chunk(Progress(1, 0.5, 0, 0, 1.0))
-        return Curve(xr.Dataset(), np.zeros(0), 0.0)
+        yield Curve(xr.Dataset(), np.zeros(0), 0.0)
 
     monkeypatch.setattr(runner, "run", slow)
     running, first, second, third = Runner(setup), *(Heard({"mu": mu}) for mu in (1.0, 2.0, 3.0))
@@ -102,11 +151,11 @@ def test_nothing_is_heard_of_dropped_jobs(setup: Setup, monkeypatch: pytest.Monk
 def test_compiling_is_announced_to_all_who_wait(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
     inside, go_on = threading.Event(), threading.Event()
 
-    def compile_first(*_: object) -> Curve:
+    def compile_first(*_: object) -> Iterator[Curve]:
         with compiling():
             inside.set()
             assert go_on.wait(60)
-        return Curve(xr.Dataset(), np.zeros(0), 0.0)
+        yield Curve(xr.Dataset(), np.zeros(0), 0.0)
 
     monkeypatch.setattr(runner, "run", compile_first)
     running, first, second = Runner(setup), Heard({"mu": 1.0}), Heard({"mu": 2.0})
@@ -123,7 +172,7 @@ def test_the_files_make_what_is_seen(source: Source, setup: Setup, opened: xr.Da
     cell = cell_at(source, setup, mu=3, b=2, n0=1)
     state = State("mu", "b", "reversals", {"n0": 1}, (cell,))
     saved = tmp_path / "saved.nc"
-    saved.write_bytes(export.netcdf(source, "x=mu", state, [runner.run(setup, cell)]))
+    saved.write_bytes(export.netcdf(source, "x=mu", state, [whole(setup, cell)]))
     with xr.open_dataset(saved, decode_times=False) as part:
         xr.testing.assert_equal(part.load(), opened.isel(n0=1))
         assert part.attrs["explored"] == "x=mu"
@@ -149,7 +198,7 @@ def test_cases_are_run_with_their_own_parameters(tmp_path: Path) -> None:
     setup = Setup(source)
     cell = cell_at(source, setup, case=1)
     assert (cell["mu"], cell["b"]) == (70, 4)
-    assert runner.run(setup, cell).dataset["spin_final"].item() == dataset["spin_final"][1].item()
+    assert whole(setup, cell).dataset["spin_final"].item() == dataset["spin_final"][1].item()
 
 
 @pytest.mark.parametrize("text", ["", "colour: red\n", "model: analytic\nfriction: {mu: [1, 2]}\n"])

@@ -40,7 +40,7 @@ def read(query: str, source: Source, base: state.Cell) -> tuple[State, list[str]
 
 def test_the_longest_axes_are_shown_first(source: Source) -> None:
     shown = state.first(source)
-    assert (shown.x, shown.y, shown.show) == ("mu", "b", "reversals")
+    assert (shown.x, shown.y, shown.show) == ("b", "mu", "reversals")
 
 
 def test_what_is_written_is_read_again(source: Source, base: state.Cell) -> None:
