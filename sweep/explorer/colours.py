@@ -1,4 +1,4 @@
-"""Colours and numbers of the explorer: those of a map's scale as Bokeh wants them, and those of curves."""
+"""Colours of the explorer: those of a map's scale as Bokeh wants them, and those of curves."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from bokeh.models import CustomJSTickFormatter
 from matplotlib.colors import BoundaryNorm, LogNorm, to_hex
 
 from sweep.plots.description import Map
@@ -28,11 +27,6 @@ def mapping(scale: Scale) -> dict[str, Any]:
     else:
         at = np.asarray(scale.norm.inverse(np.linspace(0, 1, 256)))
     return {"palette": [to_hex(colour) for colour in scale.rgba(at)], "low": low, "high": high}
-
-
-def numbers() -> CustomJSTickFormatter:
-    """Write the numbers on an axis as pictures do."""
-    return CustomJSTickFormatter(code="return sweep.number(tick)")
 
 
 def is_logarithmic(scale: Scale) -> bool:

@@ -11,7 +11,8 @@ from bokeh import models
 from bokeh.core.properties import value
 from bokeh.plotting import figure
 
-from sweep.explorer.colours import CURVES, numbers
+from sweep.explorer import axes
+from sweep.explorer.colours import CURVES
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
 from sweep.grid import Array
@@ -26,9 +27,6 @@ _CRITICAL = {"n_c1_plus": "dotted", "n_c1_minus": "dotted", "n_c2_plus": "dashed
 
 _LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.8,
            "border_line_color": None}  # fmt: skip
-
-_AXIS = {"axis_label_text_font_style": "normal", "axis_label_text_font_size": "12px", "axis_line_color": "#8a949e",
-         "major_tick_line_color": "#8a949e", "minor_tick_line_color": None}  # fmt: skip
 
 
 class Curves:
@@ -176,7 +174,6 @@ def _figure(height: int, name: str) -> Any:
         active_drag="box_zoom", toolbar_location="right", name=name, outline_line_color=None,
     )  # fmt: skip
     plot.toolbar.update(logo=None, autohide=True)
-    plot.grid.grid_line_color = "#e8ebee"
-    for axis in plot.axis:
-        axis.update(formatter=numbers(), **_AXIS)
+    plot.grid.grid_line_color = axes.GRID
+    axes.style(plot)
     return plot

@@ -23,11 +23,13 @@ from bokeh.models import (
 )  # fmt: skip
 from bokeh.plotting import figure
 
-from sweep.explorer.colours import is_logarithmic, mapping, numbers
+from sweep.explorer import axes
+from sweep.explorer.colours import is_logarithmic, mapping
+from sweep.explorer.cuts import Cuts
 from sweep.explorer.patterns import TILES
 from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.grid import Array
-from sweep.plots import labels, levels, scales
+from sweep.plots import labels, levels, marks, scales
 from sweep.plots.description import Map, common_scale
 from sweep.plots.scales import Scale
 
@@ -37,9 +39,6 @@ HEIGHT = 480
 _SHORT = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference", "status": "end"}
 """What these are called under the pointer, where the table must not hide the map."""
 
-_TICKS = 12
-"""On an axis whose values are listed one by one, at most."""
-
 LINES = {"n_c1": ("dotted", 1.5), "n_c2": ("solid", 1.5), "best": ("dashed", 1.5), "boundary": ("solid", 0.7)}
 """How the lines over a map are dashed, and how wide they are."""
 
@@ -47,11 +46,6 @@ _BAR = {
     "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": "#1b2733",
     "bar_line_color": "#8a949e", "major_label_text_font_size": "12px", "background_fill_color": None,
     "title_text_font_style": "normal",
-}  # fmt: skip
-
-_STYLE = {
-    "axis_line_color": "#8a949e", "major_tick_line_color": "#8a949e", "minor_tick_line_color": None,
-    "axis_label_text_font_style": "normal", "axis_label_text_font_size": "13px", "major_label_text_font_size": "12px",
 }  # fmt: skip
 
 
@@ -96,9 +90,12 @@ class MapFigure:
         self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
         self._kinds = ColumnDataSource({"kinds": [np.zeros((1, 1), "uint8")]})
+        self._cuts = Cuts(source, [(self._x, plot.x_range), (self._y, plot.y_range)])
+        self.cuts = self._cuts.root
         _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
-                 "ex": edges_x, "ey": edges_y, "cursor": self.cursor, "probe": probe,
+                 "ex": edges_x, "ey": edges_y, "cursor": self.cursor, "probe": probe, "cells": self._cells,
+                 "cuts": self._cuts.models, "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK),
                  "request": request})  # fmt: skip
 
     def show(self, part: Map, columns: Mapping[str, Array]) -> Scale:
@@ -134,6 +131,7 @@ class MapFigure:
             "y": self._y.place(part.y.values[up]),
             "size": np.full(len(up), size),
         }
+        self._cuts.show(labels.label(self._source.cell, part.name), scale.ticks if part.flags else None)
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]
@@ -146,8 +144,8 @@ class MapFigure:
         ticks = scale.ticks or {}
         return ColorBar(
             color_mapper=mapper, ticker=FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
-            formatter=numbers(), title=labels.unit(self._source.cell, part.name) or None, major_label_overrides=ticks,
-            **_BAR,
+            title=labels.unit(self._source.cell, part.name) or None, formatter=axes.numbers(),
+            major_label_overrides=ticks, **_BAR,
         )  # fmt: skip
 
 
@@ -194,8 +192,8 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
         sizing_mode="stretch_width", min_width=240,
         x_range=Range1d(x[0], x[-1], bounds=(x[0], x[-1])),
         y_range=Range1d(y[0], y[-1], bounds=(y[0], y[-1])),
-        x_axis_type="log" if across.spacing == "log" else "linear",
-        y_axis_type="log" if up.spacing == "log" else "linear",
+        x_axis_type=axes.kind(across),
+        y_axis_type=axes.kind(up),
         x_axis_label=source.label(across.name),
         y_axis_label=source.label(up.name) if up.name else None,
         tools="pan,box_zoom,wheel_zoom,reset,save", active_drag="box_zoom", toolbar_location="above",
@@ -203,20 +201,12 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
     )  # fmt: skip
     plot.toolbar.logo = None
     plot.grid.visible = False
-    for axis in plot.axis:
-        axis.update(formatter=numbers(), **_STYLE)
+    axes.style(plot)
     plot.title.update(text_font_size="14px", text_font_style="bold")
     plot.yaxis.visible = bool(up.name)
     for axis, drawn in ((across, plot.xaxis[0]), (up, plot.yaxis[0])):
-        if axis.spacing == "uneven":
-            _list_ticks(axis, drawn)
+        axes.place_ticks(axis, drawn)
     return plot
-
-
-def _list_ticks(axis: PlacedAxis, drawn: Any) -> None:
-    ticks = [float(t) for t in range(0, len(axis.values), -(-len(axis.values) // _TICKS))]
-    drawn.ticker = FixedTicker(ticks=ticks, minor_ticks=[])
-    drawn.major_label_overrides = {t: f"{axis.values[int(t)]:g}" for t in ticks}
 
 
 def _tip(source: Source, part: Map, columns: list[str]) -> tuple[str, dict[str, CustomJSHover]]:

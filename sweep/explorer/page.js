@@ -87,10 +87,27 @@ const sweep = (() => {
   function use(map) {
     current = map
     repaint(map)
+    cut(...map.cut ?? chosen(map.cursor))
+  }
+
+  /** Draw the values of the row and of the column of a cell; with cells without a value, there are gaps. */
+  function cut(i, j) {
+    const {cuts, cells, kinds, blank, ex} = current
+    if (i < 0 || j < 0) return
+    current.cut = [i, j]
+    const values = cells.data.image[0], bits = kinds.data.kinds[0], across = ex.length - 1
+    cuts.forEach(({source, title, at, values: places, symbol}, n) => {
+      const [along, other] = n ? [j, cuts[0]] : [i, cuts[1]]
+      const cell = (k) => n ? k * across + i : j * across + k
+      const value = Array.from(at, (_, k) => bits[cell(k)] & blank ? NaN : values[cell(k)])
+      source.data = {at, value, here: value.map((v, k) => k === along ? v : NaN)}
+      title.text = other ? `at ${other.symbol} = ${number(other.values[n ? i : j])}` : " "
+    })
   }
 
   function choose(i, j) {
     const {cursor, ex, ey} = current
+    cut(i, j)
     const [left, right, bottom, top] = [ex[i], ex[i + 1], ey[j], ey[j + 1]]
     cursor.data = {left: [left], right: [right], bottom: [bottom], top: [top], i: [i], j: [j]}
   }
@@ -111,10 +128,11 @@ const sweep = (() => {
   /** Tell the server which cell is under the pointer, or else the chosen one: at most twenty times a second. */
   function point(event) {
     const {cursor, probe, ex, ey} = current
-    if (!probe) return
     const i = event ? cell(ex, event.x) : -1, j = event ? cell(ey, event.y) : -1
+    const here = i < 0 || j < 0 ? chosen(cursor) : [i, j]
+    if (String(here) !== String(current.cut)) cut(...here)
     clearTimeout(waiting)
-    waiting = setTimeout(() => tell(probe, ...(i < 0 || j < 0 ? chosen(cursor) : [i, j])), 50)
+    if (probe) waiting = setTimeout(() => tell(probe, ...here), 50)
   }
 
   function tell(probe, i, j) {

@@ -80,7 +80,7 @@ def save_html(
     drawn = figure.MapFigure(source, shown.x, shown.y)
     scale = drawn.show(part, _all_values(source, shown))
     document = Document()
-    document.add_root(Column(drawn.figure, sizing_mode="stretch_width", name="map"))
+    document.add_root(Column(drawn.figure, drawn.cuts, sizing_mode="stretch_width", name="map"))
     document.add_root(Div(text=legend(part, scale), sizing_mode="stretch_width", name="legend"))
     dress(document, source)
     variables = document.template_variables

@@ -100,7 +100,7 @@ class View:
         tables = self._source.tables(beside, state.x, state.y, state.at)
         if self._shown is None or self._shown.axes != (state.x, state.y):
             self._shown = figure.MapFigure(self._source, state.x, state.y, self._probe, self._request)
-            self._map.children = [self._shown.figure]
+            self._map.children = [self._shown.figure, self._shown.cuts]
         self._part = part
         self._legend.text = page.legend(part, self._shown.show(part, {state.show: part.values, **tables}))
         self._controls.show(state)

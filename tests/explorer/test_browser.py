@@ -271,6 +271,23 @@ def test_the_pointer_tells_all_of_a_cell(visit: Callable[..., Page], opened: xr.
     assert re.search(r"end\s*ended at the time limit", near), near
 
 
+def test_cuts_follow_the_pointer(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    """Those of the row and of the column; a cell that failed is a gap."""
+    page = visit("n0=0.05")
+    counts = opened["reversals"].isel(n0=N0).transpose("b", "mu").values.astype(float)
+    counts[0, 0] = np.nan
+    for i, j in [(2, 1), (3, 0)]:
+        page.mouse.move(*place(page, i, j))
+        wait(page, "cut along mu", f"m.title.text === 'at b = {2 + j}'")
+        for name, expected in (("mu", counts[j]), ("b", counts[:, i])):
+            value = model(page, f"cut along {name}", "[...m.renderers[0].data_source.data.value]")
+            np.testing.assert_array_equal(value, expected)
+        here = model(page, "cut along b", "[...m.renderers[1].data_source.data.here]")
+        assert np.flatnonzero(np.isfinite(here)).tolist() == [j]
+    page.evaluate(f"{MAP}.x_range.start = 50")
+    assert model(page, "cut along mu", "m.x_range.start") == 50
+
+
 def test_axes_variable_and_selection_change(visit: Callable[..., Page], opened: xr.Dataset) -> None:
     page = visit()
     assert page.url.endswith("?show=reversals&x=b&y=mu&n0=0.02")

@@ -1,0 +1,54 @@
+"""Cuts through a map along the row and the column of the cell under the pointer, drawn by the browser."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bokeh.models import ColumnDataSource, Row
+from bokeh.plotting import figure
+
+from sweep.explorer import axes
+from sweep.explorer.slices import PlacedAxis, Source
+from sweep.plots import labels
+
+_HEIGHT = 150
+"""Of a cut, in pixels."""
+
+
+class Cuts:
+    """A figure for each axis of a map, which follows its zoom."""
+
+    def __init__(self, source: Source, ranges: list[tuple[PlacedAxis, Any]]) -> None:
+        drawn = [(axis, span) for axis, span in ranges if axis.name]
+        self._figures = [_figure(source, axis, span) for axis, span in drawn]
+        self.root = Row(*self._figures, name="cuts", sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
+        self.models = [
+            {
+                "source": plot.renderers[0].data_source, "title": plot.title, "at": axis.place(axis.values),
+                "values": axis.values, "symbol": labels.symbol(axis.name),
+            }
+            for plot, (axis, _) in zip(self._figures, drawn, strict=True)
+        ]  # fmt: skip
+        """What `sweep.cut` of page.js fills."""
+
+    def show(self, label: str, ticks: dict[float, str] | None) -> None:
+        """Name the values of another map, which the ticks spell if they are words."""
+        for plot in self._figures:
+            plot.yaxis.axis_label = label
+            plot.yaxis.major_label_overrides = ticks or {}
+
+
+def _figure(source: Source, axis: PlacedAxis, span: Any) -> Any:
+    plot = figure(
+        height=_HEIGHT, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, x_range=span,
+        x_axis_type=axes.kind(axis), x_axis_label=source.label(axis.name), name=f"cut along {axis.name}", title=" ",
+        outline_line_color=None,
+    )  # fmt: skip
+    data = ColumnDataSource({"at": [], "value": [], "here": []}, syncable=False)
+    plot.step("at", "value", source=data, mode="center", color="#0072b2", line_width=1.5)
+    plot.scatter("at", "here", source=data, color="#d55e00", size=8)
+    axes.style(plot)
+    axes.place_ticks(axis, plot.xaxis[0])
+    plot.title.update(text_font_size="12px", text_font_style="normal")
+    plot.grid.grid_line_color = axes.GRID
+    return plot
