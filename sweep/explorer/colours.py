@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import BoundaryNorm, LogNorm, to_hex
+from matplotlib.colors import BoundaryNorm, LogNorm, Normalize, to_hex
 
-from sweep.plots.description import Map
-from sweep.plots.scales import Scale
+from sweep.explorer.state import Colours
+from sweep.plots import scales
+from sweep.plots.description import Map, common_scale
+from sweep.plots.scales import SEQUENTIAL, Scale, colour_map
 
 CURVES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00")
 """Of Okabe and Ito: safe for the colour-blind."""
@@ -27,6 +30,28 @@ def mapping(scale: Scale) -> dict[str, Any]:
     else:
         at = np.asarray(scale.norm.inverse(np.linspace(0, 1, 256)))
     return {"palette": [to_hex(colour) for colour in scale.rgba(at)], "low": low, "high": high}
+
+
+def scale_of(part: Map, colours: Colours) -> Scale:
+    """The scale of a map, with whatever of it the visitor has chosen; all values of flags have their colours."""
+    palette = colours.palette or None
+    if part.flags:
+        return scales.flags(part.flags, palette)
+    shown = part.shown[np.isfinite(part.shown)].astype(float)
+    if colours.spacing == "log":
+        shown = shown[shown > 0]
+    if not shown.size:
+        return common_scale([part], cmap=palette)
+    low, high = (
+        shown.min() if colours.low is None else colours.low,
+        shown.max() if colours.high is None else colours.high,
+    )
+    given = (colours.low, colours.high) != (None, None) and low < high
+    scale = common_scale([part], (low, high) if given else None, palette)
+    norm = {"linear": Normalize, "log": LogNorm}.get(colours.spacing)
+    if norm is None or not (low < high and (low > 0 or norm is Normalize)):
+        return scale
+    return replace(scale, norm=norm(low, high), ticks=None, colours=colour_map(palette or SEQUENTIAL))
 
 
 def is_logarithmic(scale: Scale) -> bool:

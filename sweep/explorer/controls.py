@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from bokeh.models import Column, CustomJS, Div, RadioButtonGroup, Row, Select, Slider
+from bokeh.models import Column, CustomJS, Div, RadioButtonGroup, Row, Select, Slider, TextInput
 
 from sweep.explorer.slices import Source
-from sweep.explorer.state import Choice, State, choices
+from sweep.explorer.state import LIMITS, Choice, State, choices, number
 from sweep.plots import labels
 
 BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }"
@@ -33,7 +35,8 @@ class MapControls:
         self._state: State | None = None
         self._choices = choices(source)
         self._widgets = {name: _Widgets(choice, partial(self._pick, choice)) for name, choice in self._choices.items()}
-        self.root = Row(children=[widgets.root for widgets in self._widgets.values()], name="controls",
+        self._limits = {name: self._limit(name, words) for name, words in LIMITS.items()}
+        self.root = Row(children=[*(w.root for w in self._widgets.values()), *self._limits.values()], name="controls",
                         sizing_mode="stretch_width",
                         styles={"gap": "10px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 
@@ -44,11 +47,28 @@ class MapControls:
         for name, widgets in self._widgets.items():
             widgets.show(self._choices[name].of(state))
             widgets.root.visible = name not in self._source.axes or name in along - {state.x, state.y}
+        for name, field in self._limits.items():
+            limit = getattr(state.colours, name)
+            field.value = "" if limit is None else f"{limit:.6g}"
 
     def _pick(self, choice: Choice, k: Any) -> None:
         """Take an option that the browser sent, which may be anything."""
         if self._state and isinstance(k, int | float) and 0 <= k < len(choice.options):
             self._change(choice.put(self._state, int(k)))
+
+    def _limit(self, name: str, words: str) -> TextInput:
+        """The field of an end of the colour scale; what is no number leaves it to the values."""
+        field = TextInput(title=words, placeholder="least" if name == "low" else "most", width=80, name=name,
+                          stylesheets=[BARE])  # fmt: skip
+
+        def put(text: str) -> None:
+            limit = number(text)
+            if self._state:
+                colours = self._state.colours.limited(name, limit if math.isfinite(limit) else None)
+                self._change(replace(self._state, colours=colours))
+
+        on(field, "value", put)
+        return field
 
 
 class _Widgets:

@@ -31,11 +31,10 @@ class Cuts:
         ]  # fmt: skip
         """What `sweep.cut` of page.js fills."""
 
-    def show(self, label: str, ticks: dict[float, str] | None) -> None:
-        """Name the values of another map, which the ticks spell if they are words."""
+    def spell(self, words: dict[float, str]) -> None:
+        """Write the values of another map in words, if they stand for some."""
         for plot in self._figures:
-            plot.yaxis.axis_label = label
-            plot.yaxis.major_label_overrides = ticks or {}
+            plot.yaxis.major_label_overrides = words
 
 
 def _figure(source: Source, axis: PlacedAxis, span: Any) -> Any:

@@ -24,13 +24,14 @@ from bokeh.models import (
 from bokeh.plotting import figure
 
 from sweep.explorer import axes
-from sweep.explorer.colours import is_logarithmic, mapping
+from sweep.explorer.colours import is_logarithmic, mapping, scale_of
 from sweep.explorer.cuts import Cuts
 from sweep.explorer.patterns import TILES
 from sweep.explorer.slices import PlacedAxis, Source, plain
+from sweep.explorer.state import Colours
 from sweep.grid import Array
-from sweep.plots import labels, levels, marks, scales
-from sweep.plots.description import Map, common_scale
+from sweep.plots import labels, levels, marks
+from sweep.plots.description import Map
 from sweep.plots.scales import Scale
 
 HEIGHT = 480
@@ -98,14 +99,15 @@ class MapFigure:
                  "cuts": self._cuts.models, "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK),
                  "request": request})  # fmt: skip
 
-    def show(self, part: Map, columns: Mapping[str, Array]) -> Scale:
+    def show(self, part: Map, columns: Mapping[str, Array], colours: Colours) -> Scale:
         """Show a map over these axes; returns how its values become colours.
 
         Parameters
         ----------
         columns : what the pointer shows of a cell beside its place: tables of shape (y, x) by their variables
+        colours : as the visitor wants them
         """
-        scale = scales.flags(part.flags) if part.flags else common_scale([part])
+        scale = scale_of(part, colours)
         logarithmic = is_logarithmic(scale)
         for image in self._images:
             image.visible = (image is self._images[1]) == logarithmic
@@ -131,7 +133,7 @@ class MapFigure:
             "y": self._y.place(part.y.values[up]),
             "size": np.full(len(up), size),
         }
-        self._cuts.show(labels.label(self._source.cell, part.name), scale.ticks if part.flags else None)
+        self._cuts.spell((scale.ticks or {}) if part.flags else {})
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]

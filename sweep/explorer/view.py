@@ -102,7 +102,8 @@ class View:
             self._shown = figure.MapFigure(self._source, state.x, state.y, self._probe, self._request)
             self._map.children = [self._shown.figure, self._shown.cuts]
         self._part = part
-        self._legend.text = page.legend(part, self._shown.show(part, {state.show: part.values, **tables}))
+        columns = {state.show: part.values, **tables}
+        self._legend.text = page.legend(part, self._shown.show(part, columns, state.colours))
         self._controls.show(state)
 
     def _place(self, source: ColumnDataSource) -> dict[str, int] | None:

@@ -26,6 +26,7 @@ import xarray as xr
 from support import ROOT, own
 
 import sweep
+from sweep.kernels.status import LIFT_OFF
 from sweep.plots import labels
 
 if TYPE_CHECKING:
@@ -314,6 +315,31 @@ def test_axes_variable_and_selection_change(visit: Callable[..., Page], opened: 
     page.wait_for_url(re.compile("show=spin_final"))
     select(page, "x", "start spin n₀")
     page.wait_for_url(re.compile("x=n0&y=mu"))
+
+
+def test_the_colour_scale_is_chosen(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    """Its palette, its spacing and its ends, which a link keeps; colours are compared with matplotlib's own."""
+    page = visit("show=t_last_reversal&n0=0.05")
+    select(page, "palette", "gray")
+    select(page, "spacing", "logarithmic")
+    field = control(page, "high", "input")
+    field.fill("2000")
+    field.press("Enter")
+    page.wait_for_url(re.compile("palette=gray&spacing=log&high=2000"))
+    other = visit(page.url.partition("?")[2])
+    last = opened["t_last_reversal"].isel(n0=N0)
+    low = float(last.where(opened["status"].isel(n0=N0) != LIFT_OFF).min())
+    share = np.log(last.values[4, 3] / low) / np.log(2000 / low)
+    assert 0.05 < share < 0.95
+    for each in (page, other):
+        wait(each, "map figure", "m.renderers[1].visible")
+        settle(each)
+        each.mouse.move(0, 0)
+        grey = np.median(pixels(each, 4, 3), axis=0)
+        np.testing.assert_allclose(grey, 255 * share, atol=3)
+    field.fill("")
+    field.press("Enter")
+    page.wait_for_url(re.compile("spacing=log$"))
 
 
 # ---- trajectories

@@ -9,17 +9,19 @@ import pytest
 from sweep.explorer import state
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
-from sweep.explorer.state import State
+from sweep.explorer.state import Colours, State
 
 HOSTILE = {
     "show=../../etc/passwd": "show=../../etc/passwd is not there; choose reversals, ",
     "show=<script>alert(1)</script>": "show=<script>alert(1)</script> is not there; choose ",
     "x=delta": "x=delta is not there; choose mu, b, n0",
-    "file=/etc/passwd": "file is no part of an address; there are show, x, y, mu, b, n0 and cell",
+    "file=/etc/passwd": "file is no part of an address; there are show, x, y, mu, b, n0, palette, spacing, low, high and",
     "n0=nan": "n0=nan is not there; choose from 0.02 to 0.05",
     "n0=1e999": "n0=1e999 is not there",
     "n0=7": "n0=7 is not there",
     "n0=" + "1" * 5000: "n0=1111",
+    "palette=jet": "palette=jet is not there; choose , viridis",
+    "low=nan": "low=nan is no number",
     "cell=__class__:1": "cell=__class__:1: __class__ is no parameter; there are ",
     "cell=mu:-1": "cell=mu:-1: mu has to be a finite number >= 0",
     "cell=mu:sixty": "cell=mu:sixty: mu has to be",
@@ -45,7 +47,7 @@ def test_the_longest_axes_are_shown_first(source: Source) -> None:
 
 def test_what_is_written_is_read_again(source: Source, base: state.Cell) -> None:
     cells = ({**base, "mu": 47.123456789, "b": 3.0}, {**base, "delta": -0.25})
-    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, cells)
+    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, cells, Colours("gray", "log", high=4.5))
     again, faults = read(state.write(shown, source, base), source, base)
     assert not faults
     assert again == shown
