@@ -11,11 +11,14 @@ from sweep.explorer.slices import PlacedAxis
 _TICKS = 12
 """On an axis whose values are listed one by one, at most."""
 
-GRID = "#8a949e40"
+SOFT = "#77828d"
+"""A grey that can be read on a light page and on a dark one."""
+
+GRID = f"{SOFT}40"
 """The colour of lines across a figure."""
 
 _STYLE = {
-    "axis_line_color": "#8a949e", "major_tick_line_color": "#8a949e", "minor_tick_line_color": None,
+    "axis_line_color": SOFT, "major_tick_line_color": SOFT, "minor_tick_line_color": None,
     "axis_label_text_font_style": "normal", "axis_label_text_font_size": "12px", "major_label_text_font_size": "12px",
 }  # fmt: skip
 

@@ -11,7 +11,7 @@ from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, TextInput
 
 from sweep.axis import Axis
 from sweep.explorer.colours import CURVES
-from sweep.explorer.controls import BARE, on
+from sweep.explorer.controls import BARE, WIDGETS, on
 from sweep.explorer.runner import Curve
 from sweep.explorer.slices import Source
 from sweep.explorer.state import MAX_CELLS, Cell, number
@@ -43,7 +43,7 @@ class CellControls:
         grid = Column(*dragged, Row(*typed, sizing_mode="stretch_width", styles=wrap), sizing_mode="stretch_width")
         self._editor = Column(self._title, grid, sizing_mode="stretch_width", visible=False, name="parameters")
         self.root = Column(self._keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
-                           sizing_mode="stretch_width", visible=bool(base))  # fmt: skip
+                           stylesheets=[WIDGETS], sizing_mode="stretch_width", visible=bool(base))  # fmt: skip
 
     @staticmethod
     def _order(source: Source, base: Cell) -> list[str]:

@@ -15,6 +15,9 @@ from sweep.explorer.slices import Source
 from sweep.explorer.state import LIMITS, Choice, State, choices, number
 from sweep.plots import labels
 
+WIDGETS = ":host { color: #1b2733; color-scheme: light; filter: var(--widgets) }"
+"""Of the outermost widgets, which a dark page inverts."""
+
 BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }"
 
 
@@ -37,7 +40,7 @@ class MapControls:
         self._widgets = {name: _Widgets(choice, partial(self._pick, choice)) for name, choice in self._choices.items()}
         self._limits = {name: self._limit(name, words) for name, words in LIMITS.items()}
         self.root = Row(children=[*(w.root for w in self._widgets.values()), *self._limits.values()], name="controls",
-                        sizing_mode="stretch_width",
+                        stylesheets=[WIDGETS], sizing_mode="stretch_width",
                         styles={"gap": "10px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 
     def show(self, state: State) -> None:

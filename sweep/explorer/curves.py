@@ -13,6 +13,7 @@ from bokeh.plotting import figure
 
 from sweep.explorer import axes
 from sweep.explorer.colours import CURVES
+from sweep.explorer.controls import WIDGETS
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
 from sweep.grid import Array
@@ -25,8 +26,8 @@ _OVER_TIME, _PATH = ("spin", "energy", "dissipated"), ("contact_x", "contact_y")
 
 _CRITICAL = {"n_c1_plus": "dotted", "n_c1_minus": "dotted", "n_c2_plus": "dashed", "n_c2_minus": "dashed"}
 
-_LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.8,
-           "border_line_color": None}  # fmt: skip
+_LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.0,
+           "label_text_color": axes.SOFT, "border_line_color": None}  # fmt: skip
 
 
 class Curves:
@@ -41,12 +42,12 @@ class Curves:
         self.spin.add_layout(models.Legend(items=items, location="top_right", name="curve legend", **_LEGEND))
         self.spin.y_range.renderers = [item.renderers[0] for item in items]  # critical spins may be far away
         for words, dash in (("energy above rest", "solid"), ("work against friction", "dashed")):
-            self.energy.line([np.nan], [np.nan], color="#4d5864", line_dash=dash, legend_label=words)
+            self.energy.line([np.nan], [np.nan], color=axes.SOFT, line_dash=dash, legend_label=words)
         self.energy.legend.update(location="right", **_LEGEND)
         self._critical = models.ColumnDataSource({"spin": [], "time": [], "dash": [], "symbol": []})
-        self.spin.hspan("spin", source=self._critical, line_color="#6b7580", line_dash="dash", level="underlay")
+        self.spin.hspan("spin", source=self._critical, line_color=axes.SOFT, line_dash="dash", level="underlay")
         self.spin.text("time", "spin", "symbol", source=self._critical, text_font_size="11px", text_align="right",
-                       text_color="#4d5864")  # fmt: skip
+                       text_color=axes.SOFT)  # fmt: skip
         self.player = self._player()
 
     def show(self, curves: Sequence[Curve | None], names: Sequence[str], active: int) -> None:
@@ -85,7 +86,7 @@ class Curves:
 
     def _player(self) -> models.Column:
         """Buttons that play the trajectories; everything happens in the browser."""
-        line = models.Span(location=0, dimension="height", line_color="#1b2733", line_width=1, syncable=False)
+        line = models.Span(location=0, dimension="height", line_color=axes.SOFT, line_width=1, syncable=False)
         clock = models.Label(x=6, y=6, x_units="screen", y_units="screen", text_font_size="12px", syncable=False)
         for plot, mark in ((self.spin, line), (self.energy, line), (self.path, clock)):
             plot.add_layout(mark)
@@ -109,7 +110,7 @@ class Curves:
         code = "cb_obj.label = cb_obj.active ? '⏸ Pause' : '▶ Play'; sweep.play(models, cb_obj.active)"
         button.js_on_change("active", models.CustomJS(args={"models": parts}, code=code))
         row = models.Row(button, speed, trail, styles={"align-items": "end", "gap": "4px"})
-        return models.Column(self._slider, row, sizing_mode="stretch_width", name="player")
+        return models.Column(self._slider, row, sizing_mode="stretch_width", name="player", stylesheets=[WIDGETS])
 
 
 class _Slot:

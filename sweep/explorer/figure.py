@@ -44,9 +44,9 @@ LINES = {"n_c1": ("dotted", 1.5), "n_c2": ("solid", 1.5), "best": ("dashed", 1.5
 """How the lines over a map are dashed, and how wide they are."""
 
 _BAR = {
-    "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": "#1b2733",
-    "bar_line_color": "#8a949e", "major_label_text_font_size": "12px", "background_fill_color": None,
-    "title_text_font_style": "normal",
+    "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": axes.SOFT,
+    "bar_line_color": axes.SOFT, "major_label_text_font_size": "12px", "background_fill_color": None,
+    "title_text_font_style": "normal", "major_label_text_color": axes.SOFT, "title_text_color": axes.SOFT,
 }  # fmt: skip
 
 

@@ -92,8 +92,8 @@ const sweep = (() => {
 
   /** Draw the values of the row and of the column of a cell; with cells without a value, there are gaps. */
   function cut(i, j) {
-    const {cuts, cells, kinds, blank, ex} = current
-    if (i < 0 || j < 0) return
+    const {cuts, cells, kinds, blank, ex, ey} = current
+    if (i < 0 || j < 0) [i, j] = [(ex.length - 1) >> 1, (ey.length - 1) >> 1]
     current.cut = [i, j]
     const values = cells.data.image[0], bits = kinds.data.kinds[0], across = ex.length - 1
     cuts.forEach(({source, title, at, values: places, symbol}, n) => {
@@ -130,7 +130,7 @@ const sweep = (() => {
     const {cursor, probe, ex, ey} = current
     const i = event ? cell(ex, event.x) : -1, j = event ? cell(ey, event.y) : -1
     const here = i < 0 || j < 0 ? chosen(cursor) : [i, j]
-    if (String(here) !== String(current.cut)) cut(...here)
+    if (here[0] >= 0 && String(here) !== String(current.cut)) cut(...here)
     clearTimeout(waiting)
     if (probe) waiting = setTimeout(() => tell(probe, ...here), 50)
   }
@@ -207,6 +207,23 @@ const sweep = (() => {
     player = requestAnimationFrame(frame)
   }
 
+  // ---- the dark page
+
+  /** Take over what was chosen last, or else what the system wants; Bokeh takes its colours from the style sheet. */
+  function theme() {
+    const wanted = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"
+    document.documentElement.dataset.theme = localStorage.getItem("theme") ?? wanted
+    for (const model of window.Bokeh?.documents[0]?.all_models ?? []) Bokeh.index.find_one(model)?.request_repaint?.()
+  }
+
+  function turn() {
+    localStorage.setItem("theme", document.documentElement.dataset.theme === "dark" ? "light" : "dark")
+    theme()
+  }
+
+  theme()
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", theme)
+
   // ---- address, downloads, pictures
 
   /** Call the function of this object that the server names. */
@@ -254,9 +271,10 @@ const sweep = (() => {
     canvas.width = Math.max(...layers.map((layer) => layer.width))
     canvas.height = layers.reduce((sum, layer) => sum + layer.height, head)
     const pen = canvas.getContext("2d")
-    pen.fillStyle = "white"
+    const {color, backgroundColor} = getComputedStyle(document.querySelector("#maps"))
+    pen.fillStyle = backgroundColor
     pen.fillRect(0, 0, canvas.width, canvas.height)
-    pen.fillStyle = "#1b2733"
+    pen.fillStyle = color
     pen.font = `600 ${15 * scale}px system-ui, sans-serif`
     pen.fillText(document.querySelector("h1").textContent, 12 * scale, 22 * scale)
     pen.font = `${12 * scale}px system-ui, sans-serif`
@@ -278,6 +296,6 @@ const sweep = (() => {
 
   document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
 
-  const api = {address, called, copy, moment, number, picture, play, point, save, tap, use}
+  const api = {address, called, copy, moment, number, picture, play, point, save, tap, turn, use}
   return api
 })()

@@ -48,7 +48,7 @@ def legend(part: Map, scale: Scale) -> str:
     """The patterns and lines that occur in a map, and what lies beyond its scale, as HTML."""
     items = [(patterns.swatch(kind), words) for kind, words in part.legend.items()]
     lines = {line.words: figure.LINES[line.name] for line in part.lines}
-    items += [(f"border-top:{2 * width}px {dash} #000", words) for words, (dash, width) in lines.items()]
+    items += [(f"border-top:{2 * width}px {dash} currentColor", words) for words, (dash, width) in lines.items()]
     return str(PARTS.legend(items, beyond(part, scale)))
 
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from bokeh.models import Button, Column, CustomJS, Row
 
+from sweep.explorer.controls import WIDGETS
+
 _TYPES = {"nc": ("netCDF", "application/x-netcdf"), "yaml": ("YAML", "application/yaml")}
 
 
@@ -35,7 +37,7 @@ def buttons(
         label, mime = _TYPES[ending]
         made.append(button := Button(label=label, name=label, width=76))
         button.on_click(partial(_send, f"{name}.{ending}", mime, content, call))
-    return Row(link, png, *made, name="save")
+    return Row(link, png, *made, name="save", stylesheets=[WIDGETS])
 
 
 def _send(name: str, mime: str, content: Callable[[], bytes], call: Callable[..., None]) -> None:

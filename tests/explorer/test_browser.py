@@ -237,7 +237,7 @@ def test_boundaries_have_their_counts(width: int, visit: Callable[..., Page], op
         assert (colours < 100).all(axis=1).mean() > 0.05  # its ink
     lines = "Bokeh.index.find_one(m).shadow_el.querySelectorAll('i[style*=border-top]')"
     styles = model(page, "legend", f"[...{lines}].map((i) => getComputedStyle(i).borderTop)")
-    assert styles == ["3px dashed rgb(0, 0, 0)", "1px solid rgb(0, 0, 0)"]
+    assert styles == ["3px dashed rgb(27, 39, 51)", "1px solid rgb(27, 39, 51)"]
     page.get_by_role("button", name="difference").click()
     wait(page, "map figure", f"!{NUMBERS}.count.length")
 
@@ -483,6 +483,39 @@ def test_everything_can_be_done_with_the_keyboard(visit: Callable[..., Page]) ->
     wait_for_curves(page, 2)
 
 
+def test_the_page_is_dark_where_the_system_is(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    """Grounds become dark and letters light, in figures too; the colours of the map stay; the button is remembered."""
+    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
+    wait_for_curves(page, 1)
+
+    def grounds() -> list[float]:
+        """How light the middles of the page's parts are."""
+        page.mouse.move(0, 0)
+        page.wait_for_timeout(300)
+        picture = Image.open(io.BytesIO(page.screenshot(full_page=True))).convert("L")
+        boxes = [
+            page.locator(place).first.bounding_box() for place in ("#controls", "#cell", "#curves", "#chosen", "#path")
+        ]
+        parts = [picture.crop((b["x"], b["y"], b["x"] + b["width"], b["y"] + b["height"])) for b in boxes if b]
+        return [float(np.median(np.asarray(part))) for part in parts]
+
+    from PIL import Image
+
+    assert min(grounds()) > 240
+    page.emulate_media(color_scheme="dark")
+    page.reload()
+    settle(page)
+    wait_for_curves(page, 1)
+    assert max(grounds()) < 60
+    counts = opened["reversals"].isel(n0=N0).values
+    assert (pixels(page, 2, 2) == colour_in_palette(page, int(counts[2, 2]))).all(axis=1).mean() > 0.8
+    page.get_by_role("button", name="Light or dark page").click()
+    assert min(grounds()) > 240
+    page.reload()
+    settle(page)
+    assert min(grounds()[:3]) > 240
+
+
 @pytest.mark.parametrize("width", [1400, 900, 400])
 def test_nothing_runs_out_of_the_window(width: int, visit: Callable[..., Page]) -> None:
     page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
@@ -620,7 +653,7 @@ def test_what_is_seen_is_saved(visit: Callable[..., Page], opened: xr.Dataset, t
 def test_a_map_is_one_file_that_needs_no_network(browser: Browser, opened: xr.Dataset, tmp_path: Path) -> None:
     from sweep.explorer.page import save_html
 
-    save_html(opened, tmp_path / "map.html", "reversals", at={"n0": 0.05})
+    save_html(opened, tmp_path / "map.html", "reversals", "mu", "b", at={"n0": 0.05})
     context = browser.new_context(offline=True, viewport={"width": 1000, "height": 800})
     context.set_offline(True)
     page = context.new_page()
@@ -634,7 +667,7 @@ def test_a_map_is_one_file_that_needs_no_network(browser: Browser, opened: xr.Da
     tip.wait_for()
     cell = opened.isel(mu=2, b=0, n0=N0)
     near = tip.text_content() or ""
-    assert f"{float(cell['spin_final']):.6g}".replace("-", "−")[:7] in near
+    assert labels.number(float(cell["spin_final"]))[:7] in near
     assert "ended at the time limit" in near
     assert "lower bound" in text(page, "legend")
     assert len(np.unique(pixels(page, 2, 0), axis=0)) > 1

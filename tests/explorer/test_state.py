@@ -15,7 +15,7 @@ HOSTILE = {
     "show=../../etc/passwd": "show=../../etc/passwd is not there; choose reversals, ",
     "show=<script>alert(1)</script>": "show=<script>alert(1)</script> is not there; choose ",
     "x=delta": "x=delta is not there; choose mu, b, n0",
-    "file=/etc/passwd": "file is no part of an address; there are show, x, y, mu, b, n0, palette, spacing, low, high and",
+    "file=/etc/passwd": "file is no part of an address; there are show, x, y, mu, b, n0, palette, spacing, low,",
     "n0=nan": "n0=nan is not there; choose from 0.02 to 0.05",
     "n0=1e999": "n0=1e999 is not there",
     "n0=7": "n0=7 is not there",
