@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from sweep.config import Config, Values
 from sweep.explorer.runner import Curve
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State
+from sweep.grid import Array
+from sweep.plots import labels
 
 
 def stem(source: Source) -> str:
@@ -32,6 +37,20 @@ def netcdf(source: Source, address: str, state: State, curves: Sequence[Curve]) 
         for k, curve in enumerate(curves, 1):
             curve.dataset.to_netcdf(path, engine="netcdf4", mode="a", group=f"trajectory_{k}")
         return path.read_bytes()
+
+
+def csv(curves: Sequence[Curve]) -> str:
+    """The samples of all trajectories, one a line, below a line of names and units."""
+    table, head = list[Array](), dict[str, str]()
+    for k, curve in enumerate(curves, 1):
+        one = curve.dataset
+        names = ["time", *(str(name) for name, v in one.data_vars.items() if v.dims == ("time",))]
+        head = {name: f"{name} ({unit})" if (unit := labels.unit(one, name)) else name for name in names}
+        table.append(np.stack([np.full(one.sizes["time"], k), *(one[name].values for name in names)], axis=1))
+    text = io.StringIO()
+    np.savetxt(text, np.concatenate(table) if table else np.zeros((0, 1)), "%.10g", ",", comments="",
+               header=",".join(["trajectory", *head.values()]))  # fmt: skip
+    return text.getvalue()
 
 
 def yaml(source: Source, setup: Setup, state: State) -> str:

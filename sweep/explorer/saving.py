@@ -11,7 +11,7 @@ from bokeh.models import Button, Column, CustomJS, Row
 
 from sweep.explorer.controls import WIDGETS
 
-_TYPES = {"nc": ("netCDF", "application/x-netcdf"), "yaml": ("YAML", "application/yaml")}
+_TYPES = {"csv": ("CSV", "text/csv"), "nc": ("netCDF", "application/x-netcdf"), "yaml": ("YAML", "application/yaml")}
 
 
 def buttons(

@@ -70,7 +70,7 @@ class View:
         shown = self._figures
         curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
         path = Column(shown.path, shown.player, sizing_mode="stretch_width", name="path")
-        files = {"nc": self._netcdf, "yaml": self._yaml} if self._setup else {"nc": self._netcdf}
+        files = {"nc": self._netcdf} | ({"csv": self._csv, "yaml": self._yaml} if self._setup else {})
         name = export.stem(self._source)
         save = saving.buttons(name, self._map, [shown.spin, shown.energy, shown.path], files, self._call)
         # It travels with a root: what a callback of the document alone refers to is not kept up to date.
@@ -224,7 +224,10 @@ class View:
         return states.write(self.state, self._source, self._base)
 
     def _netcdf(self) -> bytes:
-        return export.netcdf(self._source, self._query(), self.state, [curve for curve in self._drawn.curves if curve])
+        return export.netcdf(self._source, self._query(), self.state, list(filter(None, self._drawn.curves)))
+
+    def _csv(self) -> bytes:
+        return export.csv(list(filter(None, self._drawn.curves))).encode()
 
     def _yaml(self) -> bytes:
         assert self._setup

@@ -577,10 +577,19 @@ def test_a_body_in_si_units_says_them(browser: Browser, tmp_path: Path) -> None:
             assert model(page, "parameter sigma", "m.title") == "σ (kg m²/s)"
             wait(page, "drag sigma", f"Math.abs(m.value - {np.log(3.2e-6)}) < 1e-3")
             wait(page, "energies", "m.below[0].axis_label === 'time t (s)'")
-            ticks = "m.left[0].formatter.doFormat([1e-5, 5e-6, -0.02, 1200000], {})"
+            ticks = "m.below[0].formatter.doFormat([1e-5, 5e-6, -0.02, 1200000], {})"
             assert model(page, "map figure", ticks) == ["10⁻⁵", "5×10⁻⁶", "−0.02", "1.2×10⁶"]
             assert page.evaluate("[0, 1, -1e-7, NaN].map(sweep.number)") == ["0", "1", "−10⁻⁷", "NaN"]
             page.get_by_text(re.compile(r"followed to t = \d+ s")).wait_for()
+            saved(page, "CSV").save_as(tmp_path / "a.csv")
+            head, *lines = (tmp_path / "a.csv").read_text().splitlines()
+            assert head.startswith("trajectory,time (s),spin (rad/s),")
+            curve = sweep.trajectory(ROOT / "configs" / "wooden.yaml", sigma=3.2e-6, n0=6.0, t_end=100)
+            rows = np.array([line.split(",")[:3] for line in lines], float)
+            assert rows[0].tolist() == [1, 0, 6]
+            np.testing.assert_allclose(
+                rows[:500, 2], np.interp(rows[:500, 1], curve["time"], curve["spin"][0]), atol=0.02
+            )
             field = control(page, "parameter sigma", "input")
             field.fill("5e-6")
             field.press("Enter")
@@ -592,8 +601,9 @@ def test_a_body_in_si_units_says_them(browser: Browser, tmp_path: Path) -> None:
             field.press("Enter")
             page.get_by_text("sigma has to be a finite number >= 0").wait_for()
             page.keyboard.press("Escape")
-            page.mouse.move(*place(page, 1, 2))
-            page.locator("#cell").get_by_text(re.compile(r"n₀ = -6 rad/s|σ = .* kg m²/s")).first.wait_for()
+            page.evaluate("scrollTo(0, 0)")
+            page.mouse.move(*place(page, 1, 0))
+            page.locator("#cell").get_by_text(re.compile(r"n₀ = −8 rad/s, σ = .*×10⁻⁶ kg m²/s")).first.wait_for()
         finally:
             process.kill()
 
