@@ -5,19 +5,17 @@ from __future__ import annotations
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
-from matplotlib.colors import LightSource, to_rgb
+from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
 from sweep.grid import Array
-from sweep.models.general.surfaces import ELLIPSOID, SURFACES, offset
-from sweep.plots import labels, trajectories
+from sweep.plots import body, labels, trajectories
 from sweep.plots.formats import suffix
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
@@ -120,14 +118,14 @@ class _Scene:
             axes.set_title(trajectories.label(dataset, i), fontsize=9, color=f"C{i}", y=0.82)
             (curve,) = self.spins.plot([], [], color=f"C{i}", linewidth=1)
             self.bodies.append(_Body(one, times, axes, curve, f"C{i}"))
-        spins = np.concatenate([body.spin for body in self.bodies])
+        spins = np.concatenate([each.spin for each in self.bodies])
         margin = 0.08 * max(np.ptp(spins), 1e-12)
         self.spins.set_ylim(min(spins.min(), 0) - margin, max(spins.max(), 0) + margin)
 
     def show(self, frame: int) -> list[Any]:
         """Draw all bodies at a frame."""
-        for body in self.bodies:
-            body.show(frame, self.times)
+        for each in self.bodies:
+            each.show(frame, self.times)
         return []
 
 
@@ -137,38 +135,20 @@ class _Body:
     def __init__(self, one: xr.Dataset, times: Array, axes: Any, curve: Any, colour: str) -> None:
         self.axes, self.curve = axes, curve
         self.surface: Any = None
-        columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "offset") if name in one}
-        surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
-        constants = SimpleNamespace(**{k: v[0] for k, v in zip(surface.constants, surface.of(columns), strict=True)})
-        self.points = _points(surface is ELLIPSOID, columns)
-        series = ("heading", "roll_angle", "pitch_angle", "table_x", "table_y", "spin")
+        self.moving = body.moving(one, times)
         known = np.isfinite(one["heading"].values)
-        at = [np.interp(times, one["time"].values[known], one[name].values[known]) for name in series]
-        self.spin, self.path = at[5], np.array(at[3:5])
-        delta = float(one["delta"]) if "delta" in one else 0.0
-        self.turns = [_rotation(*angles) @ _about_z(-delta) for angles in zip(*at[:3], strict=True)]
-        self.contacts = [np.array(surface.contact(*turn[2, :2], 0.0, 0.0, 0.0, constants)[1]) for turn in self.turns]
-        size = np.abs(self.points).max()
-        middle, half = (self.path.max(1) + self.path.min(1)) / 2, 0.72 * size + np.ptp(self.path, axis=1).max() / 2
-        axes.set(xlim=middle[0] + [-half, half], ylim=middle[1] + [-half, half], zlim=(0, half))
-        axes.set_box_aspect((2, 2, 1), zoom=1.3)
-        axes.set_proj_type("persp", focal_length=0.7)
-        axes.view_init(elev=32, azim=-60)
-        axes.set_axis_off()
-        ticks = np.linspace(-half, half, 9)
-        for tick in ticks:  # the table
-            lines: Any = {"color": "0.85", "linewidth": 0.6, "zorder": 0}
-            axes.plot(middle[0] + ticks[[0, -1]], middle[1] + [tick, tick], 0, **lines)
-            axes.plot(middle[0] + [tick, tick], middle[1] + ticks[[0, -1]], 0, **lines)
+        self.spin = np.interp(times, one["time"].values[known], one["spin"].values[known])
+        self.moving.look(axes)
+        for line in self.moving.table:
+            axes.plot(*line, color="0.85", linewidth=0.6, zorder=0)
         # Seen through the body, which covers most of it.
         (self.trace,) = axes.plot([], [], [], color="black", linewidth=1, zorder=3)
         (self.dot,) = axes.plot([], [], [], "o", color="black", markersize=3, zorder=3)
-        halves = np.where(self.points[0, :-1, :-1] + self.points[0, 1:, 1:] > 0, 0.8, 0.3)[..., None]
-        self.colours = 1 - (1 - np.array(to_rgb(colour))) * halves
+        self.colours = self.moving.colours(colour)
 
     def show(self, frame: int, times: Array) -> None:
-        turn, place = self.turns[frame], [*self.path[:, frame], 0.0]
-        at = np.einsum("ij,jkl->ikl", turn, self.points - self.contacts[frame][:, None, None])
+        moving, place = self.moving, [*self.moving.path[:, frame], 0.0]
+        at = np.einsum("ij,jkl->ikl", moving.turns[frame], moving.points - moving.contacts[frame][:, None, None])
         at += np.array(place)[:, None, None]
         if self.surface is not None:
             self.surface.remove()
@@ -180,44 +160,11 @@ class _Body:
             linewidth=0,
             antialiased=False,
             zorder=2,
-            lightsource=LightSource(azdeg=225, altdeg=60),
+            lightsource=LightSource(**body.SUN),
         )
-        self.trace.set_data_3d(*self.path[:, : frame + 1], np.zeros(frame + 1))
+        self.trace.set_data_3d(*moving.path[:, : frame + 1], np.zeros(frame + 1))
         self.dot.set_data_3d(*([each] for each in place))
         self.curve.set_data(times[: frame + 1], self.spin[: frame + 1])
-
-
-def _points(ellipsoid: bool, columns: dict[str, Array]) -> Array:
-    """Points of a body's surface in its own axes, from the centre of mass, shape (3, heights, azimuths).
-
-    An ellipsoid is whole if its centre of mass is at its centre; other bodies are flat on top.
-    """
-    a, b, c = (float(columns[name][0]) for name in ("a", "b", "c"))
-    below, lid = float(offset(columns)[0]), np.linspace(1, 0, 4)[1:]
-    bowl = np.sin(np.linspace(0, np.pi / (2 if below else 1), 12))
-    depth = np.cos(np.linspace(0, np.pi / (2 if below else 1), 12))
-    if not ellipsoid:
-        a, b, below = c / np.sqrt(a), c / np.sqrt(b), below or 1e-300
-        bowl = np.linspace(0, 1, 12)
-        depth = 1 - bowl**2
-    if below:
-        bowl, depth = np.append(bowl, lid), np.append(depth, 0 * lid)
-    azimuth = np.linspace(2 * np.pi, 0, 33)  # so that the sides that are lit are those outside
-    x, y = a * np.outer(bowl, np.cos(azimuth)), b * np.outer(bowl, np.sin(azimuth))
-    return np.stack([x, y, np.broadcast_to(c * depth[:, None] - below, x.shape)])
-
-
-def _rotation(heading: float, roll: float, pitch: float) -> Array:
-    """The matrix that takes vectors from the body to the table."""
-    (cos, sin), (cos2, sin2) = ((np.cos(angle), np.sin(angle)) for angle in (roll, pitch))
-    about_x = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]])
-    about_y = np.array([[cos2, 0, sin2], [0, 1, 0], [-sin2, 0, cos2]])
-    return np.asarray(np.diag([1, -1, -1]) @ _about_z(-heading) @ about_x @ about_y)
-
-
-def _about_z(angle: float) -> Array:
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
 
 
 def _save(animation: FuncAnimation, path: Path) -> None:

@@ -12,7 +12,7 @@ from matplotlib.animation import FFMpegWriter
 from PIL import Image
 from support.cli import invoke, refused
 
-from sweep.plots import animation
+from sweep.plots import animation, body
 
 
 def turning(bodies: int = 1, **given: float) -> xr.Dataset:
@@ -23,8 +23,8 @@ def turning(bodies: int = 1, **given: float) -> xr.Dataset:
         "roll_angle": 0.1 * np.cos(time), "pitch_angle": 0.2 * np.sin(time), "table_x": time, "table_y": -0.2 * time,
     }  # fmt: skip
     series = {name: (("trajectory", "time"), np.tile(values, (bodies, 1))) for name, values in motion.items()}
-    body = {"a": 4.0, "b": 2.0, "c": 1.0, "delta": 0.2, "n0": 0.3} | given
-    constants = {name: ("trajectory", np.full(bodies, value)) for name, value in body.items()}
+    shape = {"a": 4.0, "b": 2.0, "c": 1.0, "delta": 0.2, "n0": 0.3} | given
+    constants = {name: ("trajectory", np.full(bodies, value)) for name, value in shape.items()}
     return xr.Dataset(
         {**series, **constants}, {"time": time}, {"surface": "paraboloid"} if "paraboloid" in given else {}
     )
@@ -32,22 +32,22 @@ def turning(bodies: int = 1, **given: float) -> xr.Dataset:
 
 @pytest.mark.parametrize("given", [{}, {"offset": 0.3}, {"paraboloid": 1, "a": 0.1, "b": 0.3}], ids=str)
 def test_the_lowest_point_of_the_body_is_where_it_touches_the_table(given: dict[str, float]) -> None:
-    scene = animation._Scene(turning(**given), np.array([0.0, 3.0, 7.0]))
-    (body,) = scene.bodies
-    for frame, time in enumerate(scene.times):
-        points = np.einsum("ij,jkl->ikl", body.turns[frame], body.points - body.contacts[frame][:, None, None])
+    times = np.array([0.0, 3.0, 7.0])
+    moving = body.moving(turning(**given).isel(trajectory=0), times)
+    for frame, time in enumerate(times):
+        points = np.einsum("ij,jkl->ikl", moving.turns[frame], moving.points - moving.contacts[frame][:, None, None])
         assert -1e-12 < points[2].min() < 0.06  # the points are apart
         at = points[:2].reshape(2, -1)[:, points[2].argmin()]
         assert np.abs(at).max() < 1.0
-        assert body.path[:, frame] == pytest.approx([time, -0.2 * time])
+        assert moving.path[:, frame] == pytest.approx([time, -0.2 * time])
 
 
 def test_a_body_turns_by_its_heading() -> None:
-    upright = animation._rotation(0.5, 0, 0)
+    upright = body.rotation(0.5, 0, 0)
     np.testing.assert_allclose(upright[:, 0], [np.cos(0.5), np.sin(0.5), 0], atol=1e-15)
     np.testing.assert_allclose(upright[:, 2], [0, 0, -1], atol=1e-15)
     up = [np.cos(0.1) * np.sin(0.2), -np.sin(0.1), -np.cos(0.1) * np.cos(0.2)]
-    np.testing.assert_allclose(animation._rotation(0.5, 0.1, 0.2)[2], up)
+    np.testing.assert_allclose(body.rotation(0.5, 0.1, 0.2)[2], up)
 
 
 def test_a_clip_lasts_as_asked_and_moves(tmp_path: Path) -> None:

@@ -1,0 +1,116 @@
+"""How a body stands on its table while it turns: its surface, its place, and the view of both.
+
+Animations by matplotlib and the explorer's player both ask here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.colors import to_rgb
+
+from sweep.grid import Array
+from sweep.models.general.surfaces import ELLIPSOID, SURFACES, offset
+
+SUN = {"azdeg": 225, "altdeg": 60}
+"""Where the light comes from, in degrees."""
+
+_LINES = 9
+"""Of the table, in each direction."""
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A body at some moments, and the points of its surface."""
+
+    points: Array
+    """In the body's own axes, from the centre of mass, shape (3, heights, azimuths)."""
+    turns: Array
+    """The matrices that take vectors from the body to the table, shape (times, 3, 3)."""
+    contacts: Array
+    """The contact point in the body's own axes, shape (times, 3)."""
+    path: Array
+    """The contact point on the table, shape (2, times)."""
+
+    @property
+    def box(self) -> tuple[Array, float]:
+        """The middle of the table, shape (2,), and half its side."""
+        reach = 0.72 * np.abs(self.points).max() + np.ptp(self.path, axis=1).max() / 2
+        return (self.path.max(1) + self.path.min(1)) / 2, float(reach)
+
+    @property
+    def table(self) -> list[Array]:
+        """The ends of the lines on the table, each of shape (3, 2)."""
+        middle, half = self.box
+        ticks = np.linspace(-half, half, _LINES)
+        lines = [np.array([ticks[[0, -1]], [tick, tick]]) for tick in ticks]
+        return [np.append(each + middle[:, None], [[0, 0]], axis=0) for line in lines for each in (line, line[::-1])]
+
+    def look(self, axes: Any) -> None:
+        """Let three-dimensional axes of matplotlib show the whole table, in perspective."""
+        middle, half = self.box
+        axes.set(xlim=middle[0] + [-half, half], ylim=middle[1] + [-half, half], zlim=(0, half))
+        axes.set_box_aspect((2, 2, 1), zoom=1.3)
+        axes.set_proj_type("persp", focal_length=0.7)
+        axes.view_init(elev=32, azim=-60)
+        axes.set_axis_off()
+
+    def colours(self, colour: str) -> Array:
+        """Of the faces between the points, shape (heights - 1, azimuths - 1, 3): one half is lighter."""
+        halves = np.where(self.points[0, :-1, :-1] + self.points[0, 1:, 1:] > 0, 0.8, 0.3)[..., None]
+        return np.asarray(1 - (1 - np.array(to_rgb(colour))) * halves)
+
+
+def moving(one: xr.Dataset, times: Array) -> Moving:
+    """The body of a trajectory at some times."""
+    columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "offset") if name in one}
+    surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
+    constants = SimpleNamespace(**{k: v[0] for k, v in zip(surface.constants, surface.of(columns), strict=True)})
+    known = np.isfinite(one["heading"].values)
+    heading, roll, pitch, *path = (
+        np.interp(times, one["time"].values[known], one[name].values[known])
+        for name in ("heading", "roll_angle", "pitch_angle", "table_x", "table_y")
+    )
+    delta = float(one["delta"]) if "delta" in one else 0.0
+    turns = rotation(heading, roll, pitch) @ _about(2, -delta)
+    contacts = np.array(surface.contact(turns[:, 2, 0], turns[:, 2, 1], 0.0, 0.0, 0.0, constants)[1]).T
+    return Moving(_points(surface is ELLIPSOID, columns), turns, contacts, np.array(path))
+
+
+def _points(ellipsoid: bool, columns: dict[str, Array]) -> Array:
+    """Points of a body's surface in its own axes, from the centre of mass, shape (3, heights, azimuths).
+
+    An ellipsoid is whole if its centre of mass is at its centre; other bodies are flat on top.
+    """
+    a, b, c = (float(columns[name][0]) for name in ("a", "b", "c"))
+    below, lid = float(offset(columns)[0]), np.linspace(1, 0, 4)[1:]
+    bowl = np.sin(np.linspace(0, np.pi / (2 if below else 1), 12))
+    depth = np.cos(np.linspace(0, np.pi / (2 if below else 1), 12))
+    if not ellipsoid:
+        a, b, below = c / np.sqrt(a), c / np.sqrt(b), below or 1e-300
+        bowl = np.linspace(0, 1, 12)
+        depth = 1 - bowl**2
+    if below:
+        bowl, depth = np.append(bowl, lid), np.append(depth, 0 * lid)
+    azimuth = np.linspace(2 * np.pi, 0, 33)  # so that the sides that are lit are those outside
+    x, y = a * np.outer(bowl, np.cos(azimuth)), b * np.outer(bowl, np.sin(azimuth))
+    return np.stack([x, y, np.broadcast_to(c * depth[:, None] - below, x.shape)])
+
+
+def rotation(heading: Any, roll: Any, pitch: Any) -> Array:
+    """The matrices that take vectors from the body to the table, shape (…, 3, 3)."""
+    return np.asarray(np.diag([1, -1, -1]) @ _about(2, -heading) @ _about(0, roll) @ _about(1, pitch))
+
+
+def _about(axis: int, angle: Any) -> Array:
+    """The matrices of turns about an axis, shape (…, 3, 3)."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.zeros((*np.shape(angle), 3, 3)) + np.eye(3)
+    turn[..., i, i] = turn[..., j, j] = np.cos(angle)
+    turn[..., j, i] = np.sin(angle)
+    turn[..., i, j] = -turn[..., j, i]
+    return turn
