@@ -1,4 +1,4 @@
-"""Trajectories as Bokeh figures: spin and energies over time, the path of the contact point, and their player."""
+"""Trajectories as Bokeh figures: spin and energies over time, and the body of one of them, which can be played."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bokeh.plotting import figure
 
 from sweep.explorer import axes
 from sweep.explorer.colours import CURVES
-from sweep.explorer.controls import WIDGETS
+from sweep.explorer.player import Player
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
 from sweep.grid import Array
@@ -22,7 +22,7 @@ from sweep.plots import labels, theory
 _STRETCHES = 3000
 """Of a longer curve the lowest and the highest sample of each of so many stretches are drawn, of each series."""
 
-_OVER_TIME, _PATH = ("spin", "energy", "dissipated"), ("contact_x", "contact_y")
+_OVER_TIME = ("spin", "energy", "dissipated")
 
 _CRITICAL = {"n_c1_plus": "dotted", "n_c1_minus": "dotted", "n_c2_plus": "dashed", "n_c2_minus": "dashed"}
 
@@ -34,8 +34,7 @@ class Curves:
     """The figures of the trajectories, with a place for each of `MAX_CELLS` curves."""
 
     def __init__(self) -> None:
-        self.spin, self.energy, self.path = _figure(260, "spin"), _figure(190, "energies"), _figure(320, "contact path")
-        self.path.match_aspect = True
+        self.spin, self.energy = _figure(260, "spin"), _figure(190, "energies")
         self.energy.x_range = self.spin.x_range
         self._slots = [_Slot(self, colour) for colour in CURVES[:MAX_CELLS]]
         items = [slot.item for slot in self._slots]
@@ -48,7 +47,8 @@ class Curves:
         self.spin.hspan("spin", source=self._critical, line_color=axes.SOFT, line_dash="dash", level="underlay")
         self.spin.text("time", "spin", "symbol", source=self._critical, text_font_size="11px", text_align="right",
                        text_color=axes.SOFT)  # fmt: skip
-        self.player = self._player()
+        self._played: tuple[Curve | None, float] | None = None
+        self.player = Player([self.spin, self.energy])
 
     def show(self, curves: Sequence[Curve | None], names: Sequence[str], active: int) -> None:
         """Draw the curves, one a place, with what the legend says of them; the critical spins are those of `active`."""
@@ -57,12 +57,13 @@ class Curves:
         present = [curve.dataset for curve in curves if curve]
         if present:
             self._label(present[0])
-        for part, series in ((self.spin, "spin"), (self.energy, "energy"), (self.path, "contact_x")):
+        for part, series in ((self.spin, "spin"), (self.energy, "energy")):
             part.visible = any(series in one for one in present)
-        self.player.visible = self.path.visible
         end = max([float(np.nanmax(one["time"])) for one in present], default=1.0)
-        self._slider.update(end=end, step=end / 2000)
         chosen = curves[active] if active < len(curves) else None
+        if (chosen, end) != self._played:
+            self._played = chosen, end
+            self.player.show(chosen, CURVES[active], end)
         spins = {n: float(chosen.dataset[n]) for n in _CRITICAL if n in chosen.dataset} if chosen else {}
         shown = [name for name, spin in spins.items() if np.isfinite(spin)]
         self._critical.data = {
@@ -76,51 +77,18 @@ class Curves:
         """Label the axes, in the units of a trajectory."""
         lowest, highest = (self.energy, self.spin) if "energy" in one else (self.spin, self.energy)
         lowest.xaxis.axis_label, highest.xaxis.axis_label = labels.label(one, "time"), None
-        self._slider.tags = [labels.unit(one, "time")]
         for axis, name, words in (
             (self.spin.yaxis, "spin", ""), (self.energy.yaxis, "energy", "energy"),
-            (self.path.xaxis, "contact_x", "contact point x"), (self.path.yaxis, "contact_y", "contact point y"),
         ):  # fmt: skip
             if name in one:
                 axis.axis_label = f"{words or labels.words(one, name)} ({labels.unit(one, name)})".removesuffix(" ()")
-
-    def _player(self) -> models.Column:
-        """Buttons that play the trajectories; everything happens in the browser."""
-        line = models.Span(location=0, dimension="height", line_color=axes.SOFT, line_width=1, syncable=False)
-        clock = models.Label(x=6, y=6, x_units="screen", y_units="screen", text_font_size="12px", syncable=False)
-        for plot, mark in ((self.spin, line), (self.energy, line), (self.path, clock)):
-            plot.add_layout(mark)
-        button = models.Toggle(label="▶ Play", width=84, syncable=False, name="play")
-        self._slider = models.Slider(start=0, end=1, value=0, title=None, show_value=False, syncable=False,
-                                     sizing_mode="stretch_width", min_width=80, name="time")  # fmt: skip
-        speed = models.Select(title="lasts", value="20", width=76, syncable=False, options=[
-            ("10", "10 s"), ("20", "20 s"), ("60", "1 min"), ("600", "10 min")])  # fmt: skip
-        trail = models.Select(title="trail", value="0.02", width=96, syncable=False, options=[
-            ("0.002", "0.2 %"), ("0.02", "2 %"), ("0.2", "20 %"), ("1", "all")])  # fmt: skip
-        parts = {
-            "curves": [slot.samples for slot in self._slots], "trails": [slot.trail for slot in self._slots],
-            "points": [slot.point for slot in self._slots], "line": line, "trail": trail, "clock": clock,
-            "slider": self._slider, "speed": speed, "button": button,
-        }  # fmt: skip
-        moment = models.CustomJS(args={"models": parts}, code="sweep.moment(models)")
-        for model, change in ((self._slider, "value"), (self._slider, "end"), (trail, "value")):
-            model.js_on_change(change, moment)
-        for slot in self._slots:
-            slot.samples.js_on_change("data", moment)
-        code = "cb_obj.label = cb_obj.active ? '⏸ Pause' : '▶ Play'; sweep.play(models, cb_obj.active)"
-        button.js_on_change("active", models.CustomJS(args={"models": parts}, code=code))
-        row = models.Row(button, speed, trail, styles={"align-items": "end", "gap": "4px"})
-        return models.Column(self._slider, row, sizing_mode="stretch_width", name="player", stylesheets=[WIDGETS])
 
 
 class _Slot:
     """The place of one curve in all figures."""
 
     def __init__(self, curves: Curves, colour: str) -> None:
-        self.series, self.samples = models.ColumnDataSource(), models.ColumnDataSource()
-        self.reversals = models.ColumnDataSource()
-        self.trail = models.ColumnDataSource({"x": [], "y": []}, syncable=False)
-        self.point = models.ColumnDataSource({"x": [], "y": [], "alpha": []}, syncable=False)
+        self.series, self.reversals = models.ColumnDataSource(), models.ColumnDataSource()
         self.item = models.LegendItem()
         self._curve: Curve | None = None
         self._put(None)
@@ -130,16 +98,13 @@ class _Slot:
         self.item.renderers = [line, dots]
         curves.energy.line("time", "energy", source=self.series, color=colour, width=1.2)
         curves.energy.line("time", "dissipated", source=self.series, color=colour, width=1.2, dash="dashed")
-        curves.path.line(*_PATH, source=self.series, color=colour, width=0.5, alpha=0.25)
-        curves.path.line("x", "y", source=self.trail, color=colour, width=1.6)
-        curves.path.scatter("x", "y", source=self.point, color=colour, size=9, line_color="white", alpha="alpha")
 
     def show(self, curve: Curve | None, name: str) -> None:
         """Draw a curve, or nothing."""
-        self.item.update(label=value(name), visible=curve is not None)
         if curve is not self._curve:
             self._curve = curve
             self._put(curve)
+        self.item.update(label=value(name), visible=curve is not None)
 
     def _put(self, curve: Curve | None) -> None:
         """Send a curve to the browser; what it does not tell is NaN."""
@@ -149,11 +114,10 @@ class _Slot:
         good = np.isfinite(one["time"].values)
         columns = {
             name: (one[name].values if name in one else np.full(len(good), np.nan))[good].astype("float32")
-            for name in ("time", *_OVER_TIME, *_PATH)
+            for name in ("time", *_OVER_TIME)
         }
         at = _told([columns[name] for name in _OVER_TIME])
         self.series.data = {name: column[at] for name, column in columns.items()}
-        self.samples.data = {name: columns[name] for name in ("time", *_PATH)}
         self.reversals.data = {"x": reversals, "y": np.zeros(len(reversals))}
 
 

@@ -166,18 +166,48 @@ const sweep = (() => {
 
   let player = null
 
-  /** Show the trajectories at the slider's moment: the line in the curves, and the path of the last while. */
-  function moment({curves, trails, points, line, slider, trail, clock}) {
-    const time = slider.value
+  /** Show the slider's moment: the line in the curves, the body, and the path of the last while. */
+  function moment({motion, shape, faces, trace, line, slider, trail, clock}) {
+    const {value: time, end} = slider
     line.location = time
     clock.text = `t = ${time.toFixed(time < 100 ? 1 : 0)} ${slider.tags[0] ?? ""}`.trimEnd()
-    curves.forEach((curve, k) => {
-      const {time: t, contact_x: x, contact_y: y} = curve.data
-      const end = before(t, time), begin = before(t, time - trail.value * slider.end)
-      const some = t.length > 0 && time <= t[t.length - 1]
-      trails[k].data = {x: Array.from(x.slice(begin, end + 1)), y: Array.from(y.slice(begin, end + 1))}
-      points[k].data = end >= 0 && t.length ? {x: [x[end]], y: [y[end]], alpha: [some ? 1 : 0.35]} : {x: [], y: [], alpha: []}
+    const {time: times, turn, contact, path} = motion.data
+    if (!times?.length) return
+    const k = before(times, time), {points: [points], tones: [tones], matrix: [m], sun: [sun]} = shape.data
+    const seen = ([x, y, z]) => {
+      const [u, v, , w] = [0, 4, 8, 12].map((r) => m[r] * x + m[r + 1] * y + m[r + 2] * z + m[r + 3])
+      return [u / w, v / w]
+    }
+    const count = points.length / 3, across = points.shape[2]
+    const placed = Array.from({length: count}, (_, n) => {
+      const from = [0, 1, 2].map((r) => points[n + r * count] - contact[3 * k + r])
+      const at = [0, 3, 6].map((r) => [0, 1, 2].reduce((sum, c) => sum + turn[9 * k + r + c] * from[c], 0))
+      return [at[0] + path[2 * k], at[1] + path[2 * k + 1], at[2]]
     })
+    faces.data = drawn(placed, placed.map(seen), across, tones, sun)
+    const begin = before(times, time - trail.value * end)
+    const way = Array.from({length: k - begin + 1}, (_, n) => seen([path[2 * (begin + n)], path[2 * (begin + n) + 1], 0]))
+    trace.data = {x: way.map(([x]) => x), y: way.map(([, y]) => y)}
+  }
+
+  /** The faces of a convex body that are turned to whoever looks at it, in the light of the sun. */
+  function drawn(placed, seen, across, tones, sun) {
+    const data = {xs: [], ys: [], colour: []}
+    for (let n = 0; n + across < placed.length; n++) {
+      if ((n + 1) % across === 0) continue
+      const corners = [n, n + 1, n + across + 1, n + across]
+      const [a, b, c, d] = corners.map((k) => seen[k])
+      if ((c[0] - a[0]) * (d[1] - b[1]) - (c[1] - a[1]) * (d[0] - b[0]) <= 0) continue
+      const [p, q, r, s] = corners.map((k) => placed[k])
+      const [u, v] = [[0, 1, 2].map((k) => r[k] - p[k]), [0, 1, 2].map((k) => s[k] - q[k])]
+      const normal = [0, 1, 2].map((k) => u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3])
+      const light = 0.75 + (0.25 * normal.reduce((sum, x, k) => sum + x * sun[k], 0)) / Math.hypot(...normal)
+      const face = n - Math.floor(n / across)
+      data.xs.push([a[0], b[0], c[0], d[0]])
+      data.ys.push([a[1], b[1], c[1], d[1]])
+      data.colour.push(`rgb(${[0, 1, 2].map((k) => Math.round(255 * light * tones[3 * face + k]))})`)
+    }
+    return data
   }
 
   /** Index of the last sample not after `time`. */

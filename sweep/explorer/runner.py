@@ -41,7 +41,7 @@ _TELL_EVERY = 0.1
 """Seconds between two reports of progress."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve:
     """A trajectory that was run."""
 

@@ -37,7 +37,7 @@ def buttons(
         label, mime = _TYPES[ending]
         made.append(button := Button(label=label, name=label, width=76))
         button.on_click(partial(_send, f"{name}.{ending}", mime, content, call))
-    return Row(link, png, *made, name="save", stylesheets=[WIDGETS])
+    return Row(link, png, *made, name="save", stylesheets=[WIDGETS], styles={"flex-wrap": "wrap"})
 
 
 def _send(name: str, mime: str, content: Callable[[], bytes], call: Callable[..., None]) -> None:

@@ -69,13 +69,14 @@ class View:
         self._hint = Div(text=str(PARTS.empty()), sizing_mode="stretch_width")
         shown = self._figures
         curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
-        path = Column(shown.path, shown.player, sizing_mode="stretch_width", name="path")
+        player = Column(shown.player.figure, shown.player.controls, sizing_mode="stretch_width", name="played")
         files = {"nc": self._netcdf} | ({"csv": self._csv, "yaml": self._yaml} if self._setup else {})
         name = export.stem(self._source)
-        save = saving.buttons(name, self._map, [shown.spin, shown.energy, shown.path], files, self._call)
+        save = saving.buttons(name, self._map, [shown.spin, shown.energy, shown.player.figure], files, self._call)
         # It travels with a root: what a callback of the document alone refers to is not kept up to date.
         save.tags = [self._calls]
-        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, path,
+        self._document.js_on_event("document_ready", shown.player.moment)
+        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, player,
                      self._chosen.root, save):  # fmt: skip
             self._document.add_root(root)
 

@@ -23,11 +23,12 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 import xarray as xr
+from mpl_toolkits.mplot3d import proj3d
 from support import ROOT, own
 
 import sweep
 from sweep.kernels.status import LIFT_OFF
-from sweep.plots import labels
+from sweep.plots import animation, labels
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Download, Locator, Page
@@ -101,6 +102,8 @@ def settle(page: Page) -> None:
 NAMED = "Bokeh.documents[0].get_model_by_name"
 
 CLOCK = "m.center.filter((c) => c.type === 'Label')[0].text"
+
+FACES = "m.renderers.find((r) => r.data_source.name === 'faces').data_source.data"
 
 NUMBERS = "m.renderers.find((r) => r.data_source.name === 'numbers').data_source.data"
 
@@ -428,11 +431,30 @@ def test_the_trajectory_is_played(visit: Callable[..., Page]) -> None:
     assert model(page, "spin", "m.center.filter((c) => c.type === 'Span' && c.dimension === 'height')[0].location") == (
         moment
     )
-    trail = model(
-        page, "contact path", "[m.renderers[1].data_source.data.x.length, m.renderers[0].data_source.data.time.length]"
-    )
-    assert 20 < trail[0] < trail[1]
-    assert model(page, "contact path", CLOCK) == f"t = {moment:.{1 if moment < 100 else 0}f} √(c/g)"
+    assert model(page, "body", CLOCK) == f"t = {moment:.{1 if moment < 100 else 0}f} √(c/g)"
+
+
+def test_the_body_turns_as_in_an_animation(visit: Callable[..., Page]) -> None:
+    """Its outline, its middle and its trace lie where matplotlib's perspective puts them."""
+    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
+    wait_for_curves(page, 1)
+    one = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=70, b=4, n0=0.05, t_end=1500).isel(trajectory=0)
+    wait(page, "body", f"{FACES}.xs.length")
+    times = one["time"].sel(time=slice(0, model(page, "time", "m.end"))).values
+    scene = animation._Scene(one.expand_dims("trajectory"), times)
+    (body,) = scene.bodies
+    for frame in (0, 100, 1000):
+        page.evaluate(f"{NAMED}('time').value = {times[frame] + 1e-6}")
+        page.wait_for_timeout(300)
+        scene.show(frame)
+        ends = body.axes.get_proj()
+        corners = np.concatenate(body.surface._faces, axis=0)
+        x, y, _ = proj3d.proj_transform(*corners.T, ends)
+        seen = model(page, "body", f"['xs', 'ys'].map((k) => {FACES}[k].map((each) => [...each]))")
+        for drawn, expected in zip(seen, (x, y), strict=True):
+            size = np.ptp(expected)
+            assert np.min(drawn) == pytest.approx(expected.min(), abs=0.03 * size)
+            assert np.max(drawn) == pytest.approx(expected.max(), abs=0.03 * size)
 
 
 def test_a_link_reopens_the_page(visit: Callable[..., Page]) -> None:
@@ -494,7 +516,8 @@ def test_the_page_is_dark_where_the_system_is(visit: Callable[..., Page], opened
         page.wait_for_timeout(300)
         picture = Image.open(io.BytesIO(page.screenshot(full_page=True))).convert("L")
         boxes = [
-            page.locator(place).first.bounding_box() for place in ("#controls", "#cell", "#curves", "#chosen", "#path")
+            page.locator(place).first.bounding_box()
+            for place in ("#controls", "#cell", "#curves", "#chosen", "#played")
         ]
         parts = [picture.crop((b["x"], b["y"], b["x"] + b["width"], b["y"] + b["height"])) for b in boxes if b]
         return [float(np.median(np.asarray(part))) for part in parts]
@@ -524,7 +547,7 @@ def test_nothing_runs_out_of_the_window(width: int, visit: Callable[..., Page]) 
     page.wait_for_function(f"{MAP}.outer_width <= {width}")
     page.wait_for_timeout(300)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    for name in ("map figure", "spin", "energies", "contact path"):
+    for name in ("map figure", "spin", "energies", "body"):
         assert 200 < model(page, name, "m.outer_width") <= width
     # The patterns are painted for the new size.
     shape = model(page, "map figure", "m.renderers[2].data_source.data.image[0].shape")
@@ -548,8 +571,8 @@ def test_a_click_runs_a_users_model_that_the_user_names(browser: Browser, tmp_pa
             assert curves(page)[0].endswith(f"torque = 1.2, {count} reversals")
             wait(page, "spin", "m.left[0].axis_label === 'spin n'")
             wait(page, "spin", "m.below[0].axis_label === 'time t'")
-            wait(page, "contact path", "!m.visible")
-            assert model(page, "contact path", CLOCK) == "t = 0.0"
+            wait(page, "body", "!m.visible")
+            assert model(page, "body", CLOCK) == "t = 0.0"
             field = control(page, "parameter torque", "input")
             field.fill("1.5")
             field.press("Enter")

@@ -1,0 +1,104 @@
+"""Plays a trajectory: its body turns on the table in perspective, above the path of its contact point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from bokeh import models
+from bokeh.plotting import figure
+from matplotlib.colors import LightSource
+from matplotlib.figure import Figure
+
+from sweep.explorer import axes
+from sweep.explorer.controls import WIDGETS
+from sweep.explorer.runner import Curve
+from sweep.grid import Array
+from sweep.plots import body, labels
+
+_MOMENTS = 20_000
+"""Sent to the browser, at most."""
+
+
+class Player:
+    """The body of one trajectory, and the controls that play it; everything happens in the browser."""
+
+    def __init__(self, over_time: list[Any]) -> None:
+        """`over_time` are the figures in which a line marks the moment."""
+        self.figure = plot = figure(
+            height=260, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, name="body",
+            match_aspect=True, outline_line_color=None,
+        )  # fmt: skip
+        plot.axis.visible = plot.grid.visible = False
+        self._table = models.ColumnDataSource({"xs": [], "ys": []})
+        self._motion, self._shape = models.ColumnDataSource(), models.ColumnDataSource()
+        faces = models.ColumnDataSource({"xs": [], "ys": [], "colour": []}, syncable=False, name="faces")
+        trace = models.ColumnDataSource({"x": [], "y": []}, syncable=False)
+        table = plot.multi_line("xs", "ys", source=self._table, color=axes.GRID)
+        plot.patches("xs", "ys", source=faces, color="colour", line_width=0.5)
+        for colour, width in (("white", 3.0), ("black", 1.2)):  # seen through the body, which covers most of it
+            plot.line("x", "y", source=trace, color=colour, line_width=width)
+        for span in (plot.x_range, plot.y_range):
+            span.update(renderers=[table], range_padding=0.05)
+        clock = models.Label(x=6, y=6, x_units="screen", y_units="screen", text_font_size="12px", syncable=False)
+        plot.add_layout(clock)
+        line = models.Span(location=0, dimension="height", line_color=axes.SOFT, line_width=1, syncable=False)
+        for other in over_time:
+            other.add_layout(line)
+        parts = {"motion": self._motion, "shape": self._shape, "faces": faces, "trace": trace, "line": line,
+                 "clock": clock}  # fmt: skip
+        self.controls = self._controls(parts)
+
+    def _controls(self, parts: dict[str, Any]) -> models.Column:
+        button = models.Toggle(label="▶ Play", width=84, syncable=False, name="play")
+        self._slider = models.Slider(start=0, end=1, value=0, title=None, show_value=False, syncable=False,
+                                     sizing_mode="stretch_width", min_width=80, name="time")  # fmt: skip
+        speed = models.Select(title="lasts", value="60", width=76, syncable=False, options=[
+            ("10", "10 s"), ("20", "20 s"), ("60", "1 min"), ("600", "10 min")])  # fmt: skip
+        trail = models.Select(title="trail", value="0.02", width=96, syncable=False, options=[
+            ("0.002", "0.2 %"), ("0.02", "2 %"), ("0.2", "20 %"), ("1", "all")])  # fmt: skip
+        parts |= {"slider": self._slider, "speed": speed, "button": button, "trail": trail}
+        self.moment = moment = models.CustomJS(args={"models": parts}, code="sweep.moment(models)")
+        """Draws the moment of the slider."""
+        for model, change in (
+            (self._slider, "value"), (self._slider, "end"), (trail, "value"), (self._motion, "data"),
+        ):  # fmt: skip
+            model.js_on_change(change, moment)
+        code = "cb_obj.label = cb_obj.active ? '⏸ Pause' : '▶ Play'; sweep.play(models, cb_obj.active)"
+        button.js_on_change("active", models.CustomJS(args={"models": parts}, code=code))
+        row = models.Row(button, speed, trail, styles={"align-items": "end", "gap": "4px"})
+        return models.Column(self._slider, row, sizing_mode="stretch_width", name="player", stylesheets=[WIDGETS])
+
+    def show(self, curve: Curve | None, colour: str, end: float) -> None:
+        """Show the body of a curve, if it tells how that is turned; the slider goes to the time `end`."""
+        self._slider.update(end=end, step=end / 2000)
+        self.figure.visible = self.controls.visible = curve is not None and "heading" in curve.dataset
+        if not curve or not self.figure.visible:
+            self._motion.data = {"time": [], "turn": [], "contact": [], "path": []}
+            return
+        one = curve.dataset
+        self._slider.tags = [labels.unit(one, "time")]
+        times = one["time"].values[:: -(-one.sizes["time"] // _MOMENTS)]
+        moving = body.moving(one, times)
+        matrix = _projection(moving)
+        seen = [_seen(matrix, line) for line in moving.table]
+        self._table.data = {"xs": [x for x, _ in seen], "ys": [y for _, y in seen]}
+        self._shape.data = {
+            "points": [moving.points], "tones": [moving.colours(colour)], "matrix": [matrix],
+            "sun": [LightSource(**body.SUN).direction],
+        }  # fmt: skip
+        columns = {"time": times, "turn": moving.turns, "contact": moving.contacts, "path": moving.path.T}
+        self._motion.data = {name: np.ascontiguousarray(column, "float32") for name, column in columns.items()}
+
+
+def _projection(moving: body.Moving) -> Array:
+    """The matrix of the perspective of `sweep animate`, shape (4, 4)."""
+    shown: Any = Figure().add_axes((0, 0, 1, 1), projection="3d")
+    moving.look(shown)
+    return np.asarray(shown.get_proj())
+
+
+def _seen(matrix: Array, points: Array) -> Array:
+    """Where points of shape (3, points) are drawn, shape (2, points)."""
+    x, y, _, w = matrix @ np.append(points, np.ones((1, points.shape[1])), axis=0)
+    return np.array([x / w, y / w])
