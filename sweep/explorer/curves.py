@@ -135,7 +135,7 @@ def _told(series: Sequence[Array]) -> Array:
 
 def _figure(height: int, name: str) -> Any:
     plot = figure(
-        height=height, min_width=220, sizing_mode="stretch_width", tools="pan,box_zoom,wheel_zoom,reset,save",
+        height=height, min_width=220, sizing_mode="stretch_width", tools="pan,box_zoom,wheel_zoom,reset",
         active_drag="box_zoom", toolbar_location="right", name=name, outline_line_color=None,
     )  # fmt: skip
     plot.toolbar.update(logo=None, autohide=True)

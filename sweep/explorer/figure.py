@@ -67,6 +67,7 @@ class MapFigure:
     ) -> None:  # fmt: skip
         self._source, self.axes = source, (x, y)
         self._x, self._y = (source.axes.get(axis, PlacedAxis("", np.zeros(1))) for axis in (x, y))
+        self.placed = self._x, self._y
         edges_x, edges_y = self._x.drawn_edges, self._y.drawn_edges
         self._place = {
             "x": [edges_x[0]],
@@ -87,6 +88,9 @@ class MapFigure:
         self._numbers = _counts(plot)
         self._uncertain = ColumnDataSource({"x": [], "y": [], "size": []}, name="uncertain")
         plot.scatter(source=self._uncertain, size="size", color="white", line_color="black", line_width=0.7)
+        self.selected = ColumnDataSource({"xs": [], "ys": []}, name="selected")
+        for colour, dash in (("black", "solid"), ("white", "dashed")):
+            plot.patches("xs", "ys", source=self.selected, fill_color=None, line_color=colour, line_dash=dash)
         self.cursor, self.pins = _cursor(plot), _pins(plot)
         self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
@@ -96,6 +100,7 @@ class MapFigure:
         _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
                  "ex": edges_x, "ey": edges_y, "cursor": self.cursor, "probe": probe, "cells": self._cells,
+                 "selected": self.selected,
                  "cuts": self._cuts.models, "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK),
                  "request": request})  # fmt: skip
 
@@ -198,7 +203,7 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
         y_axis_type=axes.kind(up),
         x_axis_label=source.label(across.name),
         y_axis_label=source.label(up.name) if up.name else None,
-        tools="pan,box_zoom,wheel_zoom,reset,save", active_drag="box_zoom", toolbar_location="above",
+        tools="pan,box_zoom,wheel_zoom,box_select,lasso_select,reset", active_drag="box_zoom", toolbar_location="above",
         background_fill_color="#e8ebee",
     )  # fmt: skip
     plot.toolbar.logo = None
@@ -247,6 +252,7 @@ def _connect(plot: Any, kinds: ColumnDataSource, models: dict[str, Any]) -> None
         span.js_on_change("end", repaint)
     for size in ("inner_width", "inner_height"):
         plot.js_on_change(size, repaint)
+    plot.js_on_event("selectiongeometry", CustomJS(code="sweep.select(cb_obj)"))
     plot.js_on_event("tap", CustomJS(code="sweep.tap(cb_obj)"))
     plot.js_on_event("mousemove", CustomJS(code="sweep.point(cb_obj)"))
     plot.js_on_event("mouseleave", CustomJS(code="sweep.point(null)"))

@@ -123,6 +123,14 @@ const sweep = (() => {
     if (current.request) ask(current.request, i, j, Boolean(event.modifiers?.shift))
   }
 
+  /** Take note of what a lasso or a box encloses. */
+  function select({geometry, final}) {
+    if (!final) return
+    const {type, x, y, x0, x1, y0, y1} = geometry
+    const [xs, ys] = type === "rect" ? [[x0, x1, x1, x0], [y0, y0, y1, y1]] : [Array.from(x), Array.from(y)]
+    current.selected.data = {xs: [xs], ys: [ys]}
+  }
+
   let waiting = 0
 
   /** Tell the server which cell is under the pointer, or else the chosen one: at most twenty times a second. */
@@ -326,6 +334,6 @@ const sweep = (() => {
 
   document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
 
-  const api = {address, called, copy, moment, number, picture, play, point, save, tap, turn, use}
+  const api = {address, called, copy, moment, number, picture, play, point, save, select, tap, turn, use}
   return api
 })()

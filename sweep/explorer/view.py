@@ -11,7 +11,7 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.models import Column, ColumnDataSource, CustomJS, Div
 
-from sweep.explorer import controls, export, figure, page, saving
+from sweep.explorer import controls, export, figure, page, saving, selection
 from sweep.explorer import state as states
 from sweep.explorer.chosen import CellControls
 from sweep.explorer.colours import CURVES
@@ -61,6 +61,7 @@ class View:
         controls.on(self._request, "data", lambda _: self._requested())
         self._map = Column(sizing_mode="stretch_width", name="map")
         self._legend = Div(sizing_mode="stretch_width", name="legend")
+        self._selection = Div(sizing_mode="stretch_width", name="selection", visible=False)
         self._cell = Div(sizing_mode="stretch_width", name="cell")
         self._notice = Div(name="notice", styles=_NOTICE, sizing_mode="stretch_width", margin=0)
         self._figures = Curves()
@@ -76,8 +77,8 @@ class View:
         # It travels with a root: what a callback of the document alone refers to is not kept up to date.
         save.tags = [self._calls]
         self._document.js_on_event("document_ready", shown.player.moment)
-        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, player,
-                     self._chosen.root, save):  # fmt: skip
+        for root in (self._controls.root, self._notice, self._map, self._legend, self._selection, self._cell,
+                     curves, player, self._chosen.root, save):  # fmt: skip
             self._document.add_root(root)
 
     def _call(self, name: str, *given: Any) -> None:
@@ -102,10 +103,23 @@ class View:
         if self._shown is None or self._shown.axes != (state.x, state.y):
             self._shown = figure.MapFigure(self._source, state.x, state.y, self._probe, self._request)
             self._map.children = [self._shown.figure, self._shown.cuts]
+            controls.on(self._shown.selected, "data", lambda _: self._draw_selection())
         self._part = part
         columns = {state.show: part.values, **tables}
         self._legend.text = page.legend(part, self._shown.show(part, columns, state.colours))
         self._controls.show(state)
+        self._draw_selection()
+
+    def _draw_selection(self) -> None:
+        """Tell about the cells that are chosen."""
+        assert self._shown
+        around = self._shown.selected.data
+        self._selection.visible = len(around["xs"]) > 0
+        if self._selection.visible:
+            corners = np.array([around["xs"][0], around["ys"][0]], float)
+            chosen = selection.enclosed(corners, *self._shown.placed)
+            told = selection.statistics(self._part, chosen)
+            self._selection.text = str(PARTS.selection(int(chosen.sum()), *told))
 
     def _place(self, source: ColumnDataSource) -> dict[str, int] | None:
         """The index on every axis of the cell that the browser wrote into `source`, which may be anything."""

@@ -292,6 +292,34 @@ def test_cuts_follow_the_pointer(visit: Callable[..., Page], opened: xr.Dataset)
     assert model(page, "cut along mu", "m.x_range.start") == 50
 
 
+def test_a_selection_is_counted(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    """By a box and by a lasso, and again when another slice is shown; a cell that failed has no count."""
+    page = visit("n0=0.05")
+    counts = opened["reversals"].isel(n0=N0).transpose("b", "mu").values
+    for tool, corners, inside in (
+        ("BoxSelectTool", [(-0.4, -0.4), (2.4, 1.4)], np.s_[:2, :3]),
+        ("LassoSelectTool", [(0.5, 0.5), (4.4, 0.5), (4.4, 3.4), (0.5, 3.4), (0.5, 0.6)], np.s_[1:, 1:]),
+    ):
+        page.evaluate(f"{MAP}.toolbar.active_drag = {MAP}.toolbar.tools.find((t) => t.type === '{tool}')")
+        page.evaluate(f"{MAP}.toolbar.tools.find((t) => t.type === '{tool}').active = true")
+        page.mouse.move(*place(page, *corners[0]))
+        page.mouse.down()
+        for corner in corners[1:]:
+            page.mouse.move(*place(page, *corner), steps=4)
+        page.mouse.up()
+        chosen = counts[inside]
+        page.get_by_text(f"{chosen.size} cells chosen").wait_for()
+        told = text(page, "selection")
+        sound = np.delete(chosen.ravel(), 0) if tool == "BoxSelectTool" else chosen.ravel()
+        for value, count in zip(*np.unique(sound, return_counts=True), strict=True):
+            assert re.search(rf"^{value}\s+{count}$", told, re.MULTILINE), told
+        assert f"mean {labels.number(sound.mean())}" in told
+        assert ("failed: 16.7%" in told) == (tool == "BoxSelectTool")
+    page.get_by_role("button", name="0.02", exact=True).click()
+    other = opened["reversals"].isel(n0=0).transpose("b", "mu").values[1:, 1:]
+    page.get_by_text(f"mean {labels.number(other.mean())}").wait_for()
+
+
 def test_axes_variable_and_selection_change(visit: Callable[..., Page], opened: xr.Dataset) -> None:
     page = visit()
     assert page.url.endswith("?show=reversals&x=b&y=mu&n0=0.02")
