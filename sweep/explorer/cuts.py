@@ -21,7 +21,9 @@ class Cuts:
     def __init__(self, source: Source, ranges: list[tuple[PlacedAxis, Any]]) -> None:
         drawn = [(axis, span) for axis, span in ranges if axis.name]
         self._figures = [_figure(source, axis, span) for axis, span in drawn]
-        self.root = Row(*self._figures, name="cuts", sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
+        self.root = Row(
+            *self._figures, name="cuts", sizing_mode="stretch_width", styles={"flex-basis": "100%", "flex-wrap": "wrap"}
+        )
         self.models = [
             {
                 "source": plot.renderers[0].data_source, "title": plot.title, "at": axis.place(axis.values),

@@ -59,11 +59,12 @@ class MapFigure:
     ----------
     probe, request : where the browser writes which cell is under the pointer, and which one is to be run; None on a
         page without a server
+    main : the map beside which this one stands, with the same cells
     """
 
     def __init__(
         self, source: Source, x: str, y: str, probe: ColumnDataSource | None = None,
-        request: ColumnDataSource | None = None,
+        request: ColumnDataSource | None = None, main: MapFigure | None = None,
     ) -> None:  # fmt: skip
         self._source, self.axes = source, (x, y)
         self._x, self._y = (source.axes.get(axis, PlacedAxis("", np.zeros(1))) for axis in (x, y))
@@ -76,6 +77,8 @@ class MapFigure:
             "dh": [edges_y[-1] - edges_y[0]],
         }
         self.figure = plot = _frame(source, self._x, self._y)
+        if main:
+            plot.x_range, plot.y_range = main.figure.x_range, main.figure.y_range
         self._cells = ColumnDataSource({"image": [np.zeros((1, 1), "uint8")], **self._place})
         # Two images, because an image goes on with the mapper that it was made with.
         self._images = [
@@ -91,7 +94,8 @@ class MapFigure:
         self.selected = ColumnDataSource({"xs": [], "ys": []}, name="selected")
         for colour, dash in (("black", "solid"), ("white", "dashed")):
             plot.patches("xs", "ys", source=self.selected, fill_color=None, line_color=colour, line_dash=dash)
-        self.cursor, self.pins = _cursor(plot), _pins(plot)
+        self.cursor: ColumnDataSource = _cursor(plot, main and main.cursor)
+        self.pins: ColumnDataSource = _pins(plot, main and main.pins)
         self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
         self._kinds = ColumnDataSource({"kinds": [np.zeros((1, 1), "uint8")]})
@@ -100,7 +104,7 @@ class MapFigure:
         _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
                  "ex": edges_x, "ey": edges_y, "cursor": self.cursor, "probe": probe, "cells": self._cells,
-                 "selected": self.selected,
+                 "selected": self.selected, "main": main is None,
                  "cuts": self._cuts.models, "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK),
                  "request": request})  # fmt: skip
 
@@ -172,17 +176,17 @@ def _counts(plot: Any) -> ColumnDataSource:
     return source
 
 
-def _cursor(plot: Any) -> ColumnDataSource:
+def _cursor(plot: Any, known: ColumnDataSource | None) -> ColumnDataSource:
     """The outline of the chosen cell."""
-    source = ColumnDataSource({key: [] for key in ("left", "right", "bottom", "top", "i", "j")}, name="cursor")
+    source = known or ColumnDataSource({key: [] for key in ("left", "right", "bottom", "top", "i", "j")}, name="cursor")
     for colour, width in (("black", 4), ("white", 2)):
         plot.quad(source=source, fill_color=None, line_color=colour, line_width=width)
     return source
 
 
-def _pins(plot: Any) -> ColumnDataSource:
+def _pins(plot: Any, known: ColumnDataSource | None) -> ColumnDataSource:
     """The cells whose trajectories are drawn, each with its number."""
-    source = ColumnDataSource({key: [] for key in ("x", "y", "colour", "number", "alpha")}, name="pins")
+    source = known or ColumnDataSource({key: [] for key in ("x", "y", "colour", "number", "alpha")}, name="pins")
     plot.scatter(
         "x", "y", source=source, size=17, fill_color="colour", line_color="white", line_width=1.5, alpha="alpha"
     )

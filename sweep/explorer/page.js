@@ -85,8 +85,9 @@ const sweep = (() => {
 
   /** Take note of the map that is shown; called for every new figure. */
   function use(map) {
-    current = map
     repaint(map)
+    if (!map.main) return
+    current = map
     cut(...map.cut ?? chosen(map.cursor))
   }
 

@@ -65,6 +65,8 @@ class State:
     """One of the source's variables."""
     at: Mapping[str, int] = field(default_factory=dict)
     """The index on each axis that is not drawn."""
+    beside: str = ""
+    """The variable of a second map, if there is one."""
     cells: tuple[Cell, ...] = ()
     colours: Colours = Colours()
 
@@ -121,6 +123,7 @@ def choices(source: Source) -> dict[str, Choice]:
     words = [*(_COUNTS[n] for n in counts), *map(source.words, others)]
     axes = list(source.axes), [source.words(d) for d in source.axes]
     found = [Choice("show", "variable", [*counts, *others], words, len(counts))]
+    found.append(Choice("beside", "beside it", ["", *counts, *others], ["nothing", *words]))
     found.append(Choice("x", "horizontal axis", *axes))
     if len(source.axes) > 1:
         found.append(Choice("y", "vertical axis", *axes))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from bokeh.document import Document
-from bokeh.models import Column, ColumnDataSource, CustomJS, Div
+from bokeh.models import Column, ColumnDataSource, CustomJS, Div, Row
 
 from sweep.explorer import controls, export, figure, page, saving, selection
 from sweep.explorer import state as states
@@ -21,7 +21,7 @@ from sweep.explorer.page import PARTS
 from sweep.explorer.runner import Curve, Job, Runner
 from sweep.explorer.setup import Setup, why_still
 from sweep.explorer.slices import Source
-from sweep.explorer.state import Cell, State
+from sweep.explorer.state import Cell, Colours, State
 from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 
@@ -43,6 +43,7 @@ class View:
         self._known = setup.config.table if setup else PARAMETERS
         self.state, self._faults = states.read(query, source, self._base, self._known)
         self._shown: figure.MapFigure | None = None
+        self._second: figure.MapFigure | None = None
         self._build()
         self._drawn = Drawn(self.state.cells, runner, self._tell)
         self._draw_map()
@@ -59,7 +60,7 @@ class View:
         controls.on(self._probe, "data", lambda _: self._point())
         self._request = ColumnDataSource({"i": [-1], "j": [-1], "add": [False], "count": [0]}, name="request")
         controls.on(self._request, "data", lambda _: self._requested())
-        self._map = Column(sizing_mode="stretch_width", name="map")
+        self._map = Row(sizing_mode="stretch_width", name="map", styles={"flex-wrap": "wrap"})
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._selection = Div(sizing_mode="stretch_width", name="selection", visible=False)
         self._cell = Div(sizing_mode="stretch_width", name="cell")
@@ -102,13 +103,22 @@ class View:
         tables = self._source.tables(beside, state.x, state.y, state.at)
         if self._shown is None or self._shown.axes != (state.x, state.y):
             self._shown = figure.MapFigure(self._source, state.x, state.y, self._probe, self._request)
-            self._map.children = [self._shown.figure, self._shown.cuts]
+            self._second = None
             controls.on(self._shown.selected, "data", lambda _: self._draw_selection())
+        self._second = (self._second or self._beside(self._shown)) if state.beside else None
+        self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts]
+        if self._second:
+            second = self._source.map(state.beside, state.x, state.y, state.at)
+            self._second.show(second, {state.beside: second.values, **tables}, Colours(state.colours.palette))
         self._part = part
         columns = {state.show: part.values, **tables}
         self._legend.text = page.legend(part, self._shown.show(part, columns, state.colours))
         self._controls.show(state)
         self._draw_selection()
+
+    def _beside(self, main: figure.MapFigure) -> figure.MapFigure:
+        """A second map of the same cells."""
+        return figure.MapFigure(self._source, self.state.x, self.state.y, self._probe, self._request, main)
 
     def _draw_selection(self) -> None:
         """Tell about the cells that are chosen."""

@@ -292,6 +292,29 @@ def test_cuts_follow_the_pointer(visit: Callable[..., Page], opened: xr.Dataset)
     assert model(page, "cut along mu", "m.x_range.start") == 50
 
 
+def test_two_maps_stand_side_by_side(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+    """They zoom together, and a click on the second runs the cell."""
+    page = visit("n0=0.05")
+    select(page, "beside", "predicted")
+    page.wait_for_url(re.compile("beside=reversals_predicted"))
+    settle(page)
+    second = f"{NAMED}('map').children[1]"
+    page.wait_for_function(f"{second}.inner_width > 100")
+    values = page.evaluate(f"[...{second}.renderers[0].data_source.data.image[0]]")
+    assert values == opened["reversals_predicted"].isel(n0=N0).transpose("b", "mu").values.ravel().tolist()
+    boxes = page.evaluate(f"[{MAP}, {second}].map((m) => Bokeh.index.find_one(m).el.getBoundingClientRect().toJSON())")
+    assert boxes[0]["y"] == boxes[1]["y"]
+    assert boxes[0]["right"] <= boxes[1]["left"]
+    page.evaluate(f"{MAP}.x_range.setv({{start: 45, end: 75}})")
+    assert page.evaluate(f"{second}.x_range.start") == 45
+    page.mouse.click(boxes[1]["x"] + boxes[1]["width"] / 2, boxes[1]["y"] + boxes[1]["height"] / 2)
+    page.wait_for_url(re.compile("cell=b:[34],mu:60"))
+    page.set_viewport_size({"width": 400, "height": 800})
+    page.wait_for_function(f"{MAP}.outer_width <= 400")
+    page.wait_for_timeout(300)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
 def test_a_selection_is_counted(visit: Callable[..., Page], opened: xr.Dataset) -> None:
     """By a box and by a lasso, and again when another slice is shown; a cell that failed has no count."""
     page = visit("n0=0.05")

@@ -104,7 +104,7 @@ def test_cells_in_an_address_know_its_parameters(source: Source, setup: Setup) -
 
 def test_its_files_make_what_is_seen(source: Source, setup: Setup, tmp_path: Path) -> None:
     cell = {**setup.base, "torque": 1.2, "damping": 0.5}
-    text = export.yaml(source, setup, State("torque", "damping", "reversals", {}, (cell,)))
+    text = export.yaml(source, setup, State("torque", "damping", "reversals", {}, cells=(cell,)))
     (tmp_path / "saved.yaml").write_text(text, encoding="utf-8")
     again = sweep.run(tmp_path / "saved.yaml")
     np.testing.assert_array_equal(again["reversals"], source.dataset["reversals"])

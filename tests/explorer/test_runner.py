@@ -170,7 +170,7 @@ def test_compiling_is_announced_to_all_who_wait(setup: Setup, monkeypatch: pytes
 
 def test_the_files_make_what_is_seen(source: Source, setup: Setup, opened: xr.Dataset, tmp_path: Path) -> None:
     cell = cell_at(source, setup, mu=3, b=2, n0=1)
-    state = State("mu", "b", "reversals", {"n0": 1}, (cell,))
+    state = State("mu", "b", "reversals", {"n0": 1}, cells=(cell,))
     saved = tmp_path / "saved.nc"
     saved.write_bytes(export.netcdf(source, "x=mu", state, [whole(setup, cell)]))
     with xr.open_dataset(saved, decode_times=False) as part:
