@@ -248,20 +248,29 @@ const sweep = (() => {
 
   // ---- the dark page
 
-  /** Take over what was chosen last, or else what the system wants; Bokeh takes its colours from the style sheet. */
-  function theme() {
+  /** What the visitor chose last, kept if told; a browser may refuse to remember anything for a notebook's frame. */
+  function preferred(choice) {
+    try {
+      if (choice) localStorage.setItem("theme", choice)
+      return localStorage.getItem("theme")
+    } catch {
+      return choice
+    }
+  }
+
+  /** Take over a choice, or else what the system wants; Bokeh takes its colours from the style sheet. */
+  function theme(choice) {
     const wanted = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"
-    document.documentElement.dataset.theme = localStorage.getItem("theme") ?? wanted
+    document.documentElement.dataset.theme = choice ?? wanted
     for (const model of window.Bokeh?.documents[0]?.all_models ?? []) Bokeh.index.find_one(model)?.request_repaint?.()
   }
 
   function turn() {
-    localStorage.setItem("theme", document.documentElement.dataset.theme === "dark" ? "light" : "dark")
-    theme()
+    theme(preferred(document.documentElement.dataset.theme === "dark" ? "light" : "dark"))
   }
 
-  theme()
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", theme)
+  theme(preferred())
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => theme(preferred()))
 
   // ---- address, downloads, pictures
 
