@@ -57,7 +57,7 @@ def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, 
     (words,) = said
     assert words.startswith(f"running the code of {folder / 'pendulum.py'} (SHA-256 ")
     index = {"damping": 1, "torque": 2}
-    curve = runner.run(setup, {**setup.base, **source.parameters_at(tuple(setup.base), index)})
+    *_, curve = runner.run(setup, {**setup.base, **source.parameters_at(tuple(setup.base), index)})
     for name in ("reversals", "t_stop", "spin_final"):
         assert curve.dataset[name].item() == source.dataset[name].isel(index).item()
     assert len(curve.reversals) == curve.dataset["reversals"] > 5
