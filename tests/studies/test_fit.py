@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -194,6 +194,27 @@ def test_friction_that_hardly_slips_is_known_by_its_slope_alone(write: Write) ->
     assert "speed and mu are known only together" in found.attrs["undetermined"]
     ratio = (found.value[0] / found.value[1]).item()
     assert ratio == pytest.approx(0.6, rel=0.1)
+
+
+UPRIGHT: dict[str, Any] = {"x0": 0.0, "y0": 0.0, "mu": 0.3, "speed": 0.5}
+
+
+def test_a_couple_is_known_in_units_of_the_inertia_that_it_slows_down(write: Write) -> None:
+    """The spin of a body that does not rattle falls as exp(-sigma t / Izz), by hand."""
+    times = np.arange(0, 2, 1 / 60)
+    film = Film(times, noisy(5 * np.exp(-1e-3 / 1.7e-3 * times), 0.02))
+    ranges = {"sigma": [5e-4, 2e-3], "Izz": [1.5e-3, 1.8e-3]}
+    found = sweep.fit(write(STONE), film, list(ranges), **ranges, **UPRIGHT)
+    assert "Izz and sigma are known only together" in found.attrs["undetermined"]
+    assert (found.value[0] / found.value[1]).item() == pytest.approx(1e-3 / 1.7e-3, rel=0.02)
+
+
+def test_a_steady_spin_cannot_be_told_from_the_bias_of_a_gyroscope(write: Write) -> None:
+    times = np.arange(0, 2, 1 / 60)
+    film = Film(times, noisy(np.full(len(times), 5.3), 0.02), what="gyroscope")
+    found = sweep.fit(write(STONE), film, ["n0", "film_bias"], n0=[4.5, 5.5], **UPRIGHT)
+    assert "film_bias and n0 are known only together" in found.attrs["undetermined"]
+    assert found.value.sum().item() == pytest.approx(5.3, abs=0.01)
 
 
 def test_the_command_writes_what_runs_the_fitted_body(
