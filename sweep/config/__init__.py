@@ -151,7 +151,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         integrator=_integrator(values, model, numbers if physics.units == SI and rattleback else {}),
         measure=tuple(measures.default(model) if values.measure is None else values.measure),
         max_failed_fraction=values.max_failed_fraction,
-        picture=tuple(values.picture or ()),
+        picture=_pictures(values, source),
         verify=values.verify or 0.0,
         refine=values.refine,
         cases=columns,
@@ -172,6 +172,12 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     user_models.try_out(config)
     _refuse(source, islice(cross_checks.of_all_cells(config), 1))
     return config
+
+
+def _pictures(values: Any, source: document.Document) -> tuple[str, ...]:
+    """The variables to be drawn; those of a file are not of what is measured in place of its measurements."""
+    other = ("measure",) in source.arguments and ("picture",) not in source.arguments
+    return () if other else tuple(values.picture or ())
 
 
 def _samples(until: float | None) -> int:

@@ -56,6 +56,13 @@ def test_pictures_are_no_part_of_what_a_run_is() -> None:
     assert load_config(named.document()).picture == ("spin_mean",)
 
 
+def test_pictures_of_a_file_are_set_aside_where_something_else_is_measured() -> None:
+    asked = load_config({"friction": {"mu": [20, 60]}, "measure": ["cycles", "reversals"], "picture": ["cycle_mean"]})
+    assert load_config(asked, {"measure": ["reversals"]}).picture == ()
+    assert load_config(asked, {"measure": ["reversals"], "picture": ["status"]}).picture == ("status",)
+    assert load_config(asked, {"mu": [20, 70]}).picture == ("cycle_mean",)
+
+
 @pytest.mark.parametrize(
     ("named", "said"),
     [
