@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from math import ceil
 from pathlib import Path
 
@@ -29,9 +30,10 @@ from sweep.interrupt import deferred
 from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.results import dataset
 from sweep.results.provenance import provenance
-from sweep.studies.misfit import Minimum, Problem
+from sweep.studies.misfit import Ask, Minimum, Problem, minimise
 from sweep.studies.search import require_certain, require_simulated
 from sweep.studies.sensor import UNKNOWNS, of_film
+from sweep.studies.together import together
 from sweep.variables import Variable
 
 _TIME = Variable("float64", "1", "time since the film began, in sqrt(c/g)")
@@ -125,7 +127,8 @@ def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
     cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
     places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:KEPT]]]
     for number, instants in enumerate(horizons, start=1):
-        minima = _different(sorted((problem.minimise(place, instants) for place in places), key=lambda m: m.misfit))
+        found = together([partial(minimise, place=place, instants=instants) for place in places], problem.answers)
+        minima = _different(sorted(found, key=lambda each: each.misfit))
         note(f"film up to {problem.film.time[instants - 1]:.4g}, {number} of {len(horizons)}: minima: {len(minima)}")
         places = [each.place for each in minima]
     return minima
@@ -161,7 +164,7 @@ def _intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> 
         limits, lower = _profiles(problem, best, note, stops=restart < _RESTARTS)
         if lower is None:
             break
-        best = problem.minimise(lower.place, len(problem.film.time))
+        (best,) = together([partial(minimise, place=lower.place, instants=len(problem.film.time))], problem.answers)
         note(f"a lower minimum: {best.misfit:.6g}")
     return best, limits, restart > 1
 
@@ -169,19 +172,20 @@ def _intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> 
 def _profiles(
     problem: Problem, best: Minimum, note: Callable[[str], None], *, stops: bool
 ) -> tuple[Array, Minimum | None]:
-    """The ends of all intervals, shape (levels, 2, free), or, if it `stops` there, a minimum that is lower."""
-    limits = np.full((len(LEVELS), 2, len(problem.free)), np.nan)
-    for i, name in enumerate(problem.free):
-        for level, allowed in enumerate(LEVELS.values()):
-            for side, sign in enumerate((-1, 1)):
-                limits[level, side, i], lower = _end(problem, best, i, sign, allowed)
-                if lower and stops:
-                    return limits, lower
-        note(f"interval of {name}: {problem.trajectories} trajectories so far")
-    return limits, None
+    """The ends of all intervals, shape (levels, 2, free), or, if that `stops` it, a minimum that is lower."""
+    ends = [
+        partial(_end, problem=problem, best=best, i=i, sign=sign, allowed=allowed)
+        for allowed in LEVELS.values() for sign in (-1, 1) for i in range(len(problem.free))
+    ]  # fmt: skip
+    found = together(ends, problem.answers, lambda end: stops and end[1] is not None)
+    note(f"intervals: {problem.trajectories} trajectories so far")
+    lower = min((each for _, each in found if each), key=lambda each: each.misfit, default=None)
+    if lower and stops:
+        return np.empty(0), lower
+    return np.reshape([end for end, _ in found], (len(LEVELS), 2, len(problem.free))), None
 
 
-def _end(problem: Problem, best: Minimum, i: int, sign: int, allowed: float) -> tuple[float, Minimum | None]:
+def _end(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int, allowed: float) -> tuple[float, Minimum | None]:
     """Where one parameter leaves its interval, and a lower minimum if one is met on the way."""
     variance, covariance = _variance(problem, best), _covariance(problem, best)
     size = np.sqrt(max(covariance[i, i], 1e-30))
@@ -191,7 +195,7 @@ def _end(problem: Problem, best: Minimum, i: int, sign: int, allowed: float) -> 
         end = float(np.clip(best.place[i] + sign * reach, 0, 1))
         start = np.clip(best.place + along * (end - best.place[i]), 0, 1)
         start[i] = end
-        found = problem.minimise(start, len(problem.film.time), i)
+        found = minimise(ask, start, len(problem.film.time), i)
         above = (found.misfit - best.misfit) / variance
         if above < -0.01 * allowed:
             return end, found

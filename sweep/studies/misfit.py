@@ -1,14 +1,14 @@
 """How far trajectories are from a film: the misfit, a sum of squares of (computed - seen) / error, and its minima.
 
-SciPy minimises.  A trajectory and its neighbours on both sides, the columns of the Jacobian, are one batch of lanes and
-take the same steps: the misfit is as smooth as the motion, where steps that adapt would leave minima of their own
-(Creswell et al. 2024, doi 10.1098/rsif.2023.0369).
+SciPy minimises, from several places side by side.  A trajectory and its neighbours on both sides, the columns of the
+Jacobian, take the same steps: the misfit is as smooth as the motion, where steps that adapt would leave minima of their
+own (Creswell et al. 2024, doi 10.1098/rsif.2023.0369).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,6 @@ from sweep.interrupt import point
 from sweep.kernels.measures.misfit import Film
 from sweep.kernels.methods import PLAIN, automatic_step
 from sweep.kernels.samples import sampled
-from sweep.models.model import Columns
 from sweep.models.theory.linear import fastest_motion
 from sweep.studies.sensor import UNKNOWNS, seen_by
 
@@ -32,7 +31,7 @@ _SAMPLES = 8.0
 # of seven reversals in 5 s, which amplify errors, ended at ten times the misfit.
 _NEAR = 1e-4
 
-# As long as no parameter moves by more than this share of its range, the step stays.
+# Places that round to the same multiples of this share of the ranges have the same step: that of the first one.
 _STEADY = 0.02
 
 # A body that lifts off, or a run that diverges, misses every value by this many times the largest one.
@@ -55,6 +54,19 @@ class Minimum(NamedTuple):
     """Of the residuals with respect to the place, shape (instants, free)."""
 
 
+class Question(NamedTuple):
+    """Residuals that a search asks for."""
+
+    places: Array
+    """Close together: their trajectories take the same steps, shape (cells, free)."""
+    instants: int
+    """How many of the film, from the first on."""
+
+
+Ask = Callable[[Question], Array]
+"""Answers a question: the residuals, shape (cells, instants)."""
+
+
 @dataclass
 class Problem:
     """A film, and the trajectories that are to reproduce it."""
@@ -65,6 +77,8 @@ class Problem:
     """The free parameters, those of `sweep.studies.sensor` too, and the ends of the ranges in which they are sought."""
     trajectories: int = 0
     """How many were computed."""
+    _steps: dict[tuple[float, ...], float] = field(default_factory=dict)
+    """Steps by rounded places."""
 
     def __post_init__(self) -> None:
         """Choose the instants at which trajectories are sampled: those of an even film are among them."""
@@ -77,7 +91,6 @@ class Problem:
         frames = np.diff(self.film.time)
         frame = float(np.median(frames[frames > 0]))
         self.interval = frame / np.ceil(frame * _SAMPLES * fastest)
-        self._known = np.full(len(self.free), np.inf), 0.0
         self.error = np.ones(len(self.film.time)) if self.film.error is None else self.film.error
 
     def values(self, places: Array) -> Array:
@@ -95,15 +108,20 @@ class Problem:
         """The free parameters at places of shape (cells, free), by name."""
         return {name: np.ascontiguousarray(each) for name, each in zip(self.free, self.values(places).T, strict=True)}
 
-    def curves(self, places: Array, times: Array) -> Array:
-        """What a film would see of the trajectories at `places`, shape (cells, times); NaN if one is lost before."""
+    def curves(self, places: Array, times: Array, steps: Array | None = None) -> Array:
+        """What a film would see of the trajectories at `places`, shape (cells, times); NaN if one is lost before.
+
+        Without `steps`, of shape (cells,), each takes its automatic one.
+        """
         model, columns, found = self.config.equations, self.columns(places), self._found(places)
         self.trajectories += len(places)
         count = int(np.ceil((times[-1] + self.free.get("film_delay", (0, 0))[1]) / self.interval)) + 4
         spins, possible = np.full((len(places), count), np.nan), np.flatnonzero(~model.impossible(columns))
         columns, theirs = ({name: v[possible] for name, v in each.items()} for each in (columns, found))
-        steps, seen = self._steps(places[possible], columns), seen_by(model, self.film, columns, theirs)
-        spins[possible] = sampled(model, columns, steps, self.interval, count, *seen)
+        steps = automatic_step(PLAIN, model, columns, _TOLERANCE)[0] if steps is None else steps[possible]
+        spins[possible] = sampled(
+            model, columns, steps, self.interval, count, *seen_by(model, self.film, columns, theirs)
+        )
         point()
         curves = np.full((len(places), len(times)), np.nan)
         delay, bias = (found.get(name, np.zeros(len(places))) for name in ("film_delay", "film_bias"))
@@ -112,47 +130,56 @@ class Problem:
             curves[i] = (spline.antiderivative() if self.film.what == "heading" else spline)(times + delay[i]) + bias[i]
         return curves
 
-    def _steps(self, places: Array, columns: Columns) -> Array:
-        """The automatic steps, or near a place at which that is known its own: the bounds of a body take 40 ms."""
-        if np.abs(places - self._known[0]).max(initial=0) > _STEADY:
-            steps, _ = automatic_step(PLAIN, self.config.equations, columns, _TOLERANCE)
-            if np.ptp(places, axis=0).max() > _STEADY:
-                return steps
-            self._known = places[0], float(steps.min())
-        return np.full(len(places), self._known[1])
-
-    def residuals(self, places: Array, instants: int) -> Array:
+    def residuals(self, places: Array, instants: int, steps: Array | None = None) -> Array:
         """(computed - seen) / error at the first `instants` of the film, shape (cells, instants)."""
         seen, error = self.film.value[:instants], self.error[:instants]
-        away = self.curves(places, self.film.time[:instants]) - seen
+        away = self.curves(places, self.film.time[:instants], steps) - seen
         if self.film.what == "heading":  # no film tells where a heading counts from
             away -= np.average(away, axis=1, weights=error**-2.0)[:, None]
         return np.where(np.isnan(away), _LOST * np.abs(seen).max(), away) / error
 
-    def minimise(self, place: Array, instants: int, fixed: int | None = None) -> Minimum:
-        """The minimum near a place, over all parameters but the `fixed` one."""
-        moved = np.array([i for i in range(len(place)) if i != fixed], int)
-        known: dict[bytes, tuple[Array, Array]] = {}
+    def answers(self, questions: Sequence[Question]) -> Iterator[Array]:
+        """The residuals that searches ask for, all of which see as much of the film."""
+        steps = [np.full(len(each.places), self._step(each.places)) for each in questions]
+        places, (instants,) = [each.places for each in questions], {each.instants for each in questions}
+        found = self.residuals(np.concatenate(places), instants, np.concatenate(steps))
+        return iter(np.split(found, np.cumsum([len(each) for each in places[:-1]])))
 
-        def look(some: Array) -> tuple[Array, Array]:
-            if (key := some.tobytes()) not in known:
-                known.clear()
-                at = place.copy()
-                at[moved] = some
-                steps = _NEAR * np.eye(len(place))
-                found = self.residuals(np.concatenate([at[None], at + steps, at - steps]), instants)
-                ahead, behind = found[1 : len(place) + 1], found[len(place) + 1 :]
-                known[key] = found[0], (ahead - behind).T / (2 * _NEAR)
-            return known[key]
+    def _step(self, places: Array) -> float:
+        """The least automatic step of bodies close together, or of the first that were as close: it takes 5 ms."""
+        key = tuple(np.round(places[0] / _STEADY).tolist())
+        if np.isinf(self._steps.get(key, np.inf)):
+            model, columns = self.config.equations, self.columns(places)
+            possible = ~model.impossible(columns)
+            columns = {name: values[possible] for name, values in columns.items()}
+            self._steps[key] = float(automatic_step(PLAIN, model, columns, _TOLERANCE)[0].min(initial=np.inf))
+        return self._steps[key]
 
-        if not len(moved):
-            away, jacobian = look(place[moved])
-            return Minimum(place, float(np.sum(away**2)), jacobian)
-        inside = np.clip(place[moved], 1e-9, 1 - 1e-9)
-        found = least_squares(
-            lambda some: look(some)[0], inside, lambda some: look(some)[1][:, moved], bounds=(0, 1), x_scale="jac",
-            max_nfev=_MOST_STEPS, ftol=_ENOUGH, xtol=_ENOUGH, gtol=_FLAT,
-        )  # fmt: skip
-        end = place.copy()
-        end[moved] = found.x
-        return Minimum(end, float(2 * found.cost), look(found.x)[1])
+
+def minimise(ask: Ask, place: Array, instants: int, fixed: int | None = None) -> Minimum:
+    """The minimum near a place, over all parameters but the `fixed` one."""
+    moved = np.array([i for i in range(len(place)) if i != fixed], int)
+    known: dict[bytes, tuple[Array, Array]] = {}
+
+    def look(some: Array) -> tuple[Array, Array]:
+        if (key := some.tobytes()) not in known:
+            known.clear()
+            at = place.copy()
+            at[moved] = some
+            steps = _NEAR * np.eye(len(place))
+            found = ask(Question(np.concatenate([at[None], at + steps, at - steps]), instants))
+            ahead, behind = found[1 : len(place) + 1], found[len(place) + 1 :]
+            known[key] = found[0], (ahead - behind).T / (2 * _NEAR)
+        return known[key]
+
+    if not len(moved):
+        away, jacobian = look(place[moved])
+        return Minimum(place, float(np.sum(away**2)), jacobian)
+    inside = np.clip(place[moved], 1e-9, 1 - 1e-9)
+    found = least_squares(
+        lambda some: look(some)[0], inside, lambda some: look(some)[1][:, moved], bounds=(0, 1), x_scale="jac",
+        max_nfev=_MOST_STEPS, ftol=_ENOUGH, xtol=_ENOUGH, gtol=_FLAT,
+    )  # fmt: skip
+    end = place.copy()
+    end[moved] = found.x
+    return Minimum(end, float(2 * found.cost), look(found.x)[1])

@@ -55,7 +55,9 @@ _AZIMUTHS, _SHARES = 12, 9
 
 
 def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Array, Array]]:
-    """Attitudes that a body may reach: normals u, shape (cells, 3), with bounds on the normal force R, shape (cells,).
+    """Attitudes that a body may reach, for more and more tilted ones.
+
+    Yields normals u, shape (azimuths, cells, 3), with bounds on the normal force R, shape (azimuths, cells).
 
     A body tilts at most until the height of G takes up the whole energy at the start, E0.  If it tilts towards the
     azimuth ψ at the rate φ', then R - g <= r'' φ'², where r is the height of G at the tilt φ above that at rest, and
@@ -66,41 +68,45 @@ def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Array, Arra
     """
     constants, g = record(surface).of(columns), rigid_body.gravity(columns)
     E0, J = _energy_start(columns, surface), rigid_body.matrix(rigid_body.inertia(columns))
-    for psi in np.linspace(0, np.pi, _AZIMUTHS, endpoint=False):
-        cos, sin = np.cos(psi), np.sin(psi)
+    psi = np.linspace(0, np.pi, _AZIMUTHS, endpoint=False)[:, None]
+    cos, sin = np.cos(psi), np.sin(psi)
 
-        def height(phi: Array, cos: float = cos, sin: float = sin) -> Array:
-            """The height of G above that at rest, if the body is tilted by φ."""
-            return np.asarray(surface.elevation(cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi), constants))
+    def height(phi: Array) -> Array:
+        """The height of G above that at rest, if the body is tilted by φ."""
+        return np.asarray(surface.elevation(cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi), constants))
 
-        # The largest tilt that the energy allows, by bisection; heights grow with the tilt, at least at first.
-        low, high = np.zeros_like(E0), np.full_like(E0, 1.5)
-        for _ in range(40):
-            middle = (low + high) / 2
-            within = g * height(middle) < E0
-            low, high = np.where(within, middle, low), np.where(within, high, middle)
-        axis = np.array([-sin, cos, 0.0])
-        for share in np.linspace(0, 1, _SHARES):
-            phi, d = high * share, 1e-4
-            r, ahead, behind = height(phi), height(phi + d), height(phi - d)
-            slope, bend = (ahead - behind) / (2 * d), (ahead - 2 * r + behind) / d**2
-            u = np.stack([cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi)], axis=-1)
-            tt, tu, uu = (np.einsum("...i,...ij,...j->...", p, J, q) for p, q in ((axis, axis), (axis, u), (u, u)))
-            square = 2 * np.maximum(E0 - g * r, 0) / (tt - tu**2 / uu + slope**2)
-            yield u, g + np.maximum(bend, 0) * square
+    # The largest tilt that the energy allows, by bisection; heights grow with the tilt, at least at first.
+    low, high = np.zeros((_AZIMUTHS, E0.size)), np.full((_AZIMUTHS, E0.size), 1.5)
+    for _ in range(40):
+        middle = (low + high) / 2
+        within = g * height(middle) < E0
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    axis = np.concatenate([-sin, cos, 0 * sin], axis=-1)[:, None]
+    for share in np.linspace(0, 1, _SHARES):
+        phi, d = high * share, 1e-4
+        r, ahead, behind = height(phi), height(phi + d), height(phi - d)
+        slope, bend = (ahead - behind) / (2 * d), (ahead - 2 * r + behind) / d**2
+        u = np.stack([cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi)], axis=-1)
+        tt, tu, uu = (_product(p, J, q) for p, q in ((axis, axis), (axis, u), (u, u)))
+        square = 2 * np.maximum(E0 - g * r, 0) / (tt - tu**2 / uu + slope**2)
+        yield u, g + np.maximum(bend, 0) * square
+
+
+def _product(p: Array, matrix: Array, q: Array) -> Array:
+    """Pᵀ M q, of vectors of shape (..., cells, 3) and matrices of shape (cells, 3, 3)."""
+    return np.asarray(np.einsum("...i,...ij,...j->...", p, matrix, q))
 
 
 def _hardest_press(columns: Columns, surface: Surface) -> Array:
     """Bound on the normal force over the trajectory, per unit mass, shape (cells,)."""
-    return np.asarray(np.max([R for _, R in _attitudes(columns, surface)], axis=0))
+    return np.asarray(np.max([R for _, R in _attitudes(columns, surface)], axis=(0, 1)))
 
 
 def hardest_turn(columns: Columns, surface: Surface) -> Array:
     """Bound on R uᵀ J⁻¹ u over the trajectory, shape (cells,): the decay of the spin per unit of its resistance."""
     inverse = rigid_body.matrix(rigid_body.inverse(rigid_body.inertia(columns)))
-    return np.asarray(
-        np.max([R * np.einsum("...i,...ij,...j->...", u, inverse, u) for u, R in _attitudes(columns, surface)], axis=0)
-    )
+    found = [R * _product(u, inverse, u) for u, R in _attitudes(columns, surface)]
+    return np.asarray(np.max(found, axis=(0, 1)))
 
 
 def strongest_grip(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
@@ -112,12 +118,12 @@ def strongest_grip(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
     inverse = rigid_body.matrix(rigid_body.inverse(rigid_body.inertia(columns)))
     worst = np.zeros_like(columns["a"])
     for u, R in _attitudes(columns, surface):
-        _, point, _, _ = surface.contact(u[:, 0], u[:, 1], 0.0, 0.0, 0.0, constants)
+        _, point, _, _ = surface.contact(u[..., 0], u[..., 1], 0.0, 0.0, 0.0, constants)
         x_p = np.stack(point, axis=-1)
-        X = np.cross(np.eye(3), x_p[:, None, :])
-        G = X @ inverse @ np.swapaxes(X, 1, 2)
+        X = np.cross(np.eye(3), x_p[..., None, :])
+        G = X @ inverse @ np.swapaxes(X, -1, -2)
         # One eigenvalue is zero, along x_p; the larger of the others follows from the traces of G and G².
-        trace, squares = np.trace(G, axis1=1, axis2=2), (G * G).sum(axis=(1, 2))
+        trace, squares = np.trace(G, axis1=-2, axis2=-1), (G * G).sum(axis=(-1, -2))
         largest = 0.5 * (trace + np.sqrt(np.maximum(2 * squares - trace**2, 0)))
-        worst = np.maximum(worst, R * (1 + largest))
+        worst = np.maximum(worst, (R * (1 + largest)).max(axis=0))
     return worst
