@@ -31,12 +31,8 @@ def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
     if not set(NEEDED) <= set(dataset.data_vars):
         return []
     counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in NEEDED})
-    # With one width for all cells, lines between two of distant counts are evenly apart.  Of every fifth cell of
-    # configs/mu_b.yaml at n0 = 0.05, they give 16 % of the others another count, and 23 % with the cells' own widths.
-    both = counts.more + counts.fewer
-    width = np.median(both[np.isfinite(both)]) if np.isfinite(both).any() else None
     words = "from here on so many reversals, by the margins of the cells"
-    curves = {level: list(contours(counts.distance(level, width), x, y, corners=True)) for level in counts.levels()}
+    curves = {level: list(contours(counts.distance(level), x, y, corners=True)) for level in counts.levels()}
     return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]
 
 

@@ -95,11 +95,14 @@ def test_margins_are_those_of_cells_that_settle() -> None:
 
 
 def test_distances_are_of_the_level_asked_for() -> None:
+    """Counts take as much spin as cells with them, 0.4 and 0.7, or where there is none as all cells do, 0.55."""
     counts = Counts(
         np.array([2.0, 3.0, 5.0]), np.array([0.1, np.nan, 0.2]), np.array([0.3, 0.4, 0.5]), np.ones(3, bool)
     )
-    np.testing.assert_allclose(counts.distance(3), [-0.1, 0.4, 0.5 + 2 * 0.7])
-    np.testing.assert_allclose(counts.distance(4), [-0.5, np.nan, 0.5 + 0.7])
+    np.testing.assert_allclose(counts.distance(2), [0.3, 0.4 + 0.4, 0.5 + 0.55 + 0.55 + 0.4])
+    np.testing.assert_allclose(counts.distance(3), [-0.1, 0.4, 0.5 + 0.55 + 0.55])
+    np.testing.assert_allclose(counts.distance(4), [-0.1 - 0.55, np.nan, 0.5 + 0.55])
+    np.testing.assert_allclose(counts.distance([6, 7, 7]), [-0.1 - 2 * 0.55 - 0.7, np.nan, -0.2])
     assert list(counts.levels()) == [3, 4, 5]
 
 
