@@ -30,7 +30,7 @@ from sweep.explorer.patterns import TILES
 from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.explorer.state import Colours
 from sweep.grid import Array
-from sweep.plots import labels, levels, marks
+from sweep.plots import labels, marks, places
 from sweep.plots.description import Map
 from sweep.plots.scales import Scale
 
@@ -129,7 +129,7 @@ class MapFigure:
         for name, source in self._lines.items():
             parts = [points for line in part.lines if line.name == name for points in line.parts]
             source.data = {"xs": [self._x.place(x) for x, _ in parts], "ys": [self._y.place(y) for _, y in parts]}
-        numbers = list(levels.numbers(part.lines, part.x, part.y))
+        numbers = list(places.numbers(part.lines, part.x, part.y))
         self._numbers.data = {
             "x": [self._x.place(x) for x, _, _ in numbers],
             "y": [self._y.place(y) for _, y, _ in numbers],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from io import BytesIO
 from math import log
 from string import ascii_lowercase
@@ -11,6 +11,7 @@ from textwrap import fill
 from typing import Any, Literal
 
 import matplotlib as mpl
+import numpy as np
 import xarray as xr
 from matplotlib import _mathtext
 from matplotlib.artist import Artist
@@ -18,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
+from matplotlib.text import Text
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sweep.axis import Axis
@@ -94,16 +96,16 @@ class Picture(Figure):
         self._style: dict[Any, Any] = {name: mpl.rcParams[name] for name in _STYLE}
 
     def draw(self, renderer: RendererBase) -> None:
-        with self._drawing():
+        with self.drawing():
             super().draw(renderer)
 
     def savefig(self, *args: Any, **kwargs: Any) -> None:
         """Save it as any figure of matplotlib, in the style in which it was drawn."""
-        with self._drawing():
+        with self.drawing():
             super().savefig(*args, **kwargs)
 
     @contextmanager
-    def _drawing(self) -> Iterator[None]:
+    def drawing(self) -> Iterator[None]:
         """The style of the figure, while it is drawn."""
         usual = _mathtext.SHRINK_FACTOR  # of subscripts, for which matplotlib has no setting
         _mathtext.SHRINK_FACTOR = max(usual, min(_SMALLEST / self._legend_size, 1.0))
@@ -155,6 +157,13 @@ class Picture(Figure):
         for letter, axes in zip(ascii_lowercase, panels if len(panels) > 1 else [], strict=False):
             axes.annotate(letter, (0, 1), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points",
                           ha="right", va="bottom", weight="bold")  # fmt: skip
+
+
+def extent(text: Text) -> Array:
+    """Width and height of a text in pixels, as it will be drawn."""
+    figure = text.get_figure(root=True)
+    with figure.drawing() if isinstance(figure, Picture) else nullcontext():
+        return np.asarray(text.get_window_extent().size)
 
 
 def page() -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,10 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import LogLocator
 
 from sweep.axis import Axis
-from sweep.plots import labels, levels
+from sweep.grid import Array
+from sweep.plots import labels, places
 from sweep.plots.description import Map
+from sweep.plots.figure import RATIO, extent
 from sweep.plots.scales import Scale
 from sweep.plots.theory import Line
 
@@ -25,6 +26,10 @@ _STYLES: dict[str, dict[str, Any]] = {
     "boundary": {"linestyle": "-", "linewidth": 0.6},
 }
 
+_LAID_OUT = 0.9
+"""The least size of a map, relative to that which it has before the figure is laid out; its height is then told by
+its width."""
+
 
 def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
     """Draw the lines of a map; returns their entries for the legend.
@@ -33,25 +38,23 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
     ----------
     labelled : whether there is room for symbols at the lines
     """
-    box, over_n0 = axes.axis(), "n0" in (shown.x.name, shown.y.name)
+    box = axes.axis()
     for line in shown.lines:
         style = _STYLES[line.name]
         for part in line.parts:
             axes.plot(*part, color="black", path_effects=_halo(2 * style["linewidth"]), gid=line.name, **style)
     axes.axis(box)
-    for line in shown.lines:
-        # Over n0 the lines of n_c1 are too close to those of n_c2 for a symbol of their own.
-        if labelled and line.symbol and line.name != "boundary" and not (over_n0 and line.name == "n_c1"):
-            _label(axes, shown, line)
     if labelled:
-        number(axes, shown.lines, shown.x, shown.y)
+        _symbols(axes, shown, number(axes, shown.lines, shown.x, shown.y))
     return {line.name: entry(line.name, line.words) for line in shown.lines}
 
 
-def number(axes: Axes, drawn: Iterable[Line], x: Axis, y: Axis) -> None:
-    """Write the counts that begin on boundaries into the lines themselves."""
-    for at_x, at_y, count in levels.numbers(drawn, x, y):
+def number(axes: Axes, drawn: list[Line], x: Axis, y: Axis) -> list[places.Number]:
+    """Write the counts that begin on boundaries into the lines themselves; returns where."""
+    written = list(places.numbers(drawn, x, y))
+    for at_x, at_y, count in written:
         axes.annotate(count, (at_x, at_y), size="small", ha="center", va="center", path_effects=_halo(2))
+    return written
 
 
 def draw_contours(axes: Axes, shown: Map, scale: Scale) -> None:
@@ -84,21 +87,19 @@ def _halo(width: float) -> list[AbstractPathEffect]:
     return [withStroke(linewidth=width, foreground="white")]
 
 
-def _label(axes: Axes, shown: Map, line: Line) -> None:
-    """The symbol of a critical spin beside its line, on the side of the larger spins or on the roomier one."""
-    x, y = max(line.parts, key=lambda part: len(part[0]))
-    inside = (shown.x.edges[0] <= x) & (x <= shown.x.edges[-1]) & (shown.y.edges[0] <= y) & (y <= shown.y.edges[-1])
-    points = np.stack([x, y], axis=1)[inside]
-    path = (axes.transData + axes.transAxes.inverted()).transform(points)
-    length = np.cumsum(np.hypot(*np.diff(path, axis=0, prepend=path[:1]).T))
-    # The lines of n_c1 and n_c2 are farthest apart near the ends that are closer to the middle.
-    shares = np.searchsorted(length, length[-1] * np.array([0.125, 0.875] if line.name == "n_c1" else [0.6]))
-    k = min(shares, key=lambda share: float(np.hypot(*(path[share] - 0.5))))
-    outwards = 1 if "⁺" in line.symbol else -1
-    if shown.y.name == "n0":
-        place: dict[str, Any] = {"xytext": (0, 4 * outwards), "ha": "center", "va": "bottom" if outwards > 0 else "top"}
-    else:
-        if shown.x.name != "n0":
-            outwards = 1 if (path[k, 0] < 0.5) == (line.name == "n_c2") else -1  # n_c1 beyond n_c2
-        place = {"xytext": (4 * outwards, 0), "ha": "left" if outwards > 0 else "right", "va": "center"}
-    axes.annotate(labels.in_maths(line.symbol), points[k], textcoords="offset points", path_effects=_halo(2), **place)
+def _symbols(axes: Axes, shown: Map, written: list[places.Number]) -> None:
+    """Write the symbols of critical spins beside their lines, where there is room."""
+    words = {line.symbol: labels.in_maths(line.symbol) for line in shown.lines if line.name != "boundary"}
+    size = _LAID_OUT * axes.bbox.width * np.array([1, RATIO])
+
+    def half_size(of: str) -> Array:
+        text = axes.text(0, 0, of)
+        found = extent(text) / size / 2
+        text.remove()
+        return found
+
+    halves = {symbol: half_size(of) for symbol, of in words.items()}
+    in_points = size * 72 / axes.get_figure(root=True).dpi  # type: ignore[union-attr]
+    for symbol, at, middle in places.symbols(shown.lines, shown.x, shown.y, written, halves):
+        axes.annotate(words[symbol], tuple(at), xycoords="axes fraction", xytext=tuple((middle - at) * in_points),
+                      textcoords="offset points", ha="center", va="center", path_effects=_halo(2))  # fmt: skip

@@ -1,0 +1,123 @@
+"""Where counts and symbols stand on the lines of a map."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.transforms import Bbox
+from support.figures import made
+
+from sweep.axis import Axis
+from sweep.plots import picture, places
+from sweep.plots.theory import Line, Points
+
+MU = Axis("mu", np.geomspace(1, 100, 21))
+B = Axis("b", np.linspace(0, 1, 21))
+
+
+def across(b: float, first: int = 0, last: int = 21) -> Points:
+    """A part of a line at this b, from one value of mu to another."""
+    return MU.values[first:last], np.full(last - first, b)
+
+
+def numbers(*lines: list[Points]) -> list[tuple[float, float, str]]:
+    """The numbers on boundaries of one reversal, two, and so on, of these parts."""
+    return list(places.numbers([Line("boundary", "", parts, f"{k}") for k, parts in enumerate(lines, 1)], MU, B))
+
+
+def test_a_number_is_in_the_middle_of_its_line() -> None:
+    assert numbers([across(0.3)]) == [(MU.values[10], 0.3, "1")]
+
+
+def test_numbers_of_close_lines_are_apart() -> None:
+    found = numbers(*([across(b)] for b in np.linspace(0.5, 0.51, 8)))
+    assert [count for *_, count in found] == list("12345678")
+    places = np.sort(np.log(np.array([mu for mu, *_ in found])) / np.log(100))
+    assert np.diff(places).min() > 0.06
+
+
+def test_small_parts_have_no_number_beside_large_ones() -> None:
+    island = across(0.8, 5, 8)
+    assert numbers([across(0.3), island, across(0.6)]) == [(MU.values[10], 0.3, "1"), (MU.values[10], 0.6, "1")]
+    assert numbers([island]) == [(MU.values[6], 0.8, "1")]
+
+
+def test_no_number_is_on_the_edge_of_a_map() -> None:
+    edge = (np.full(21, MU.edges[-1]), B.values)
+    assert [count for *_, count in numbers([edge], [across(0.3)])] == ["2"]
+
+
+def test_a_line_without_room_has_no_number() -> None:
+    assert [count for *_, count in numbers([across(0.3)], [across(0.3, 10, 12)])] == ["1"]
+
+
+def test_other_lines_have_no_number() -> None:
+    assert not list(places.numbers([Line("n_c2", "", [across(0.3)], "n_c2⁺")], MU, B))
+
+
+def test_a_number_keeps_off_lines_of_theory_if_it_can() -> None:
+    middle = Line("best", "", [(np.full(2, MU.values[10]), B.edges[[0, -1]])])
+    boundary = Line("boundary", "", [across(0.3)], "1")
+    ((at, *_),) = places.numbers([middle, boundary], MU, B)
+    assert at in (MU.values[9], MU.values[11])
+    along = Line("best", "", [across(0.3)])
+    assert list(places.numbers([along, boundary], MU, B)) == [(MU.values[10], 0.3, "1")]
+
+
+def symbols(*lines: Line, written: tuple[places.Number, ...] = (), half: float = 0.03) -> dict[str, np.ndarray]:
+    """The middles of the symbols of lines, as shares of the map."""
+    halves = {line.symbol: np.array([half, half]) for line in lines}
+    return {symbol: middle for symbol, _, middle in places.symbols(list(lines), MU, B, written, halves)}
+
+
+def test_a_symbol_stands_beside_its_line_where_most_room_is() -> None:
+    found = symbols(Line("n_c1", "", [across(0.3)], "n_c1"), Line("n_c2", "", [across(0.36)], "n_c2"))
+    heights = {symbol: B.edges[0] + middle[1] * np.ptp(B.edges) for symbol, middle in found.items()}
+    assert 0.2 < heights["n_c1"] < 0.3 - 0.03
+    assert 0.36 + 0.03 < heights["n_c2"] < 0.46
+
+
+def test_a_symbol_keeps_off_the_numbers() -> None:
+    line = Line("n_c1", "", [across(0.5)], "n_c1")
+    (free,) = symbols(line).values()
+    written = tuple((mu, b, "1") for mu in MU.values[:11] for b in (0.4, 0.45, 0.55, 0.6))
+    (found,) = symbols(line, written=written).values()
+    assert free[0] == pytest.approx(0.5, abs=0.1)
+    assert found[0] > 0.55
+
+
+def test_no_symbol_stands_beyond_another_line() -> None:
+    lines = [Line("n_c1", "", [across(0.99)], "n_c1"), Line("n_c2", "", [across(0.985)], "n_c2")]
+    assert symbols(*lines).keys() == {"n_c2"}
+
+
+def test_a_symbol_without_room_is_left_out() -> None:
+    close = [Line("n_c2", "", [across(b)], "n_c2") for b in (0.46, 0.54)]
+    assert symbols(Line("n_c1", "", [across(0.5)], "n_c1"), *close, half=0.03).keys() == {"n_c2"}
+
+
+def test_a_line_that_leaves_the_map_has_its_symbol_within() -> None:
+    far = Line("n_c1", "", [(MU.values, np.geomspace(0.4, 1e9, 21)), (np.full(2, np.nan), np.full(2, 0.5))], "n_c1")
+    (middle,) = symbols(far).values()
+    assert (np.abs(middle - 0.5) < 0.47).all()
+
+
+@pytest.mark.parametrize("width", [None, "85mm"])
+@pytest.mark.parametrize("over", ["b", "n0"])
+def test_nothing_that_is_written_on_a_map_lies_on_something_else(width: str | None, over: str) -> None:
+    one = made(n0=np.linspace(-0.1, 0.1, 21)).isel(b=0) if over == "n0" else made()
+    one = one.assign(margin_more=one.spin_final * 0 + 0.5, margin_fewer=one.spin_final * 0 + 0.5)
+    figure = picture.plot(one, width=width)
+    figure.draw_without_rendering()
+    for axes in (each for each in figure.axes if each.get_label() == ""):
+        boxes = {text.get_text(): text.get_window_extent() for text in axes.texts if text.get_weight() != "bold"}
+        assert sum("mathrm{c" in words for words in boxes) >= {"n0": 4, "b": 1}[over]
+        assert not any(Bbox.intersection(*pair) for pair in combinations(boxes.values(), 2))
+        for box in (box for words, box in boxes.items() if "mathrm" in words):
+            assert axes.bbox.x0 < box.x0 < box.x1 < axes.bbox.x1
+            assert axes.bbox.y0 < box.y0 < box.y1 < axes.bbox.y1
+            theory = [line for line in axes.lines if line.get_gid() != "boundary"]
+            paths = [line.get_transform().transform_path(line.get_path()) for line in theory]
+            assert not any(path.intersects_bbox(box, filled=False) for path in paths)
