@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
@@ -59,6 +61,23 @@ def test_a_clip_lasts_as_asked_and_moves(tmp_path: Path) -> None:
             clip.seek(i)
             frames.append(np.asarray(clip.convert("L"), float))
     assert np.abs(frames[0] - frames[-1]).max() > 50
+
+
+def test_ffmpeg_is_given_all_frames_of_a_film(tmp_path: Path) -> None:
+    """A stand-in for ffmpeg, which not every machine has, writes down what it is told and how much it is given."""
+    program = tmp_path / "ffmpeg"
+    program.write_text(
+        f"#!{sys.executable}\nimport sys\nfrom pathlib import Path\n"
+        "Path(sys.argv[-1]).write_text(' '.join([*sys.argv, str(len(sys.stdin.buffer.read()))]))\n"
+    )
+    program.chmod(0o755)
+    with mpl.rc_context({"animation.ffmpeg_path": str(program)}):
+        animation.animate(turning(3), tmp_path / "clip.mp4", begin=2, end=4, speed=10)
+    told = (tmp_path / "clip.mp4").read_text().split()
+    width, height = map(int, told[told.index("-s") + 1].split("x"))
+    assert (width % 2, height % 2) == (0, 0)  # or its usual codec refuses them
+    assert told[told.index("-framerate") + 1] == "20"
+    assert int(told[-1]) == 5 * width * height * 4
 
 
 def test_the_first_reversal_fills_the_clip() -> None:
