@@ -51,6 +51,7 @@ autodoc_preserve_defaults = True
 html_theme = "furo"
 html_title = "sweep"
 html_static_path = ["_static"]
+html_css_files = ["narrow.css"]
 html_show_copyright = False
 html_copy_source = False
 mathjax_path = "mathjax/tex-svg-full.js"

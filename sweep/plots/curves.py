@@ -36,6 +36,9 @@ _STYLES: dict[str, dict[str, Any]] = {
 _ROOM = 6.0
 """Points along the axis for each mark of full size."""
 
+_BELOW = 0.03
+"""Room below zero, relative to that above."""
+
 
 def draw(panels: Panels, limits: Limits | None = None) -> Picture:
     """The variables over the one long axis, in a panel for each value of the others."""
@@ -112,6 +115,7 @@ def _form_factor(axes: Axes, chosen: xr.Dataset) -> Line2D:
     )
     twin.set_ylabel("L(f)", color="0.4")
     twin.tick_params(colors="0.4")
-    twin.set_ylim(bottom=0)
-    axes.set_ylim(bottom=0)
+    for each in (axes, twin):  # the same zero, and marks there are whole
+        top = each.get_ylim()[1]
+        each.set_ylim(-_BELOW * top, top)
     return line

@@ -129,7 +129,7 @@ def draw_beside(
     for panels, of_one in zip(each, maps, strict=True):
         for panel, shown in zip(panels.each, of_one, strict=True):
             axes = figure.add_subplot(grid[next(places)])
-            entries |= _map(axes, shown[name], scale, alone=True, labelled=False, contours=contours)
+            entries |= _map(axes, shown[name], scale, alone=True, labelled=width >= _SMALL, contours=contours)
             words = [_name(panels.dataset), title(panels.dataset, panel)]
             axes.set_title(", ".join(filter(None, words)))
             _label_axes(axes, panels.dataset, shown[name])

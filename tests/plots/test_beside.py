@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support.cli import invoke, refused
-from support.figures import constants, entries
+from support.figures import constants, entries, made
 
 import sweep
 from sweep.plots import picture
@@ -22,6 +22,12 @@ def two(small: xr.Dataset) -> list[xr.Dataset]:
     other["reversals"] = other["reversals"] + 7
     other["status"] = xr.full_like(other["status"], 2)
     return [one, other.assign_coords(delta=0.5)]
+
+
+def test_maps_side_by_side_have_symbols_if_they_are_large() -> None:
+    for number, told in ((2, True), (8, False)):
+        figure = sweep.plot([made()] * number, x="b", y="mu", figsize=(7, 6))
+        assert any("c2" in text.get_text() for text in figure.axes[0].texts) == told
 
 
 def test_one_scale_and_axes_of_their_own(two: list[xr.Dataset]) -> None:

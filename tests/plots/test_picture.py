@@ -336,3 +336,13 @@ def test_draws_any_number_of_axes(small: xr.Dataset, selection: dict[str, int]) 
 def test_a_notebook_shows_a_map_before_pyplot_is_imported(small: xr.Dataset) -> None:
     shown = sweep.plot(small)._repr_png_()
     assert shown.startswith(b"\x89PNG")
+
+
+def test_marks_of_zeros_are_whole() -> None:
+    one = made().isel(mu=0)
+    figure = picture.plot(one.assign(form_factor=one.b / 10))
+    figure.draw_without_rendering()
+    axes, twin = figure.axes
+    zero, other = (each.transData.transform((5, 0))[1] for each in (axes, twin))
+    assert zero == pytest.approx(other)
+    assert zero - 5 / 2 * figure.dpi / 72 > axes.bbox.y0  # markers of 5 points
