@@ -52,11 +52,12 @@ def test_a_figure_for_print_is_as_wide_as_asked_and_can_be_read(kind: str, width
     assert all(axes.get_window_extent().width > 0.3 * figure.bbox.width / 3 for axes in panels)
 
 
-def test_no_text_in_a_file_for_print_is_smaller_than_6_points(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", [*KINDS.values(), {"histogram": True}], ids=str)
+def test_no_text_in_a_file_for_print_is_smaller_than_6_points(kind: dict[str, Any], tmp_path: Path) -> None:
     with mpl.rc_context({"pdf.compression": 0}):
-        picture.plot(made(n0=[0.02]), width="85mm", output=tmp_path / "map.pdf")
+        picture.plot(made(n0=[0.02, 0.05]), width="85mm", output=tmp_path / "map.pdf", **kind)
     sizes = {float(size) for size in re.findall(rb"/F\S+ ([\d.]+) Tf", (tmp_path / "map.pdf").read_bytes())}
-    assert len(sizes) >= 3  # with subscripts
+    assert len(sizes) >= (4 if kind == KINDS["maps"] else 2)  # with subscripts
     assert min(sizes) >= 6
 
 
