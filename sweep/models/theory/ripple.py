@@ -65,10 +65,11 @@ def ripple_free(of: Rocking, H: Array, P: Array, I3: Array) -> tuple[Array, ...]
     """K11, K12, K21 and K22, each of shape (bodies,), for the forms H of M and P of u and M, shape (bodies, 2, 2)."""
     B11, B12, B21, B22, C11, C12, C21, C22 = of
     B, C = matrix(B11, B12, B21, B22), matrix(C11, C12, C21, C22)
-    minus_squares, e = np.linalg.eig(B @ C)
+    # Both are real, since rocking without friction keeps its energy.  NumPy 2.5 returns them as complex numbers.
+    minus_squares, e = (values.real for values in np.linalg.eig(B @ C))
     # A body that is round about one axis has one mode only, and no slower period to average over.
-    round_ = np.asarray((minus_squares.real >= 0).any(axis=1))
-    squares = np.where(round_[:, None], 1.0, -minus_squares.real)
+    round_ = np.asarray((minus_squares >= 0).any(axis=1))
+    squares = np.where(round_[:, None], 1.0, -minus_squares)
     e[round_] = np.eye(2)
     nu = np.sqrt(squares)
     f = np.linalg.inv(B) @ e * nu[:, None, :]
@@ -77,7 +78,7 @@ def ripple_free(of: Rocking, H: Array, P: Array, I3: Array) -> tuple[Array, ...]
     mixed = np.divide(2 * h[:, 0, 1], apart, out=np.zeros_like(apart), where=np.abs(apart) > _APART * squares[:, 0])
     kappa = matrix(h[:, 0, 0] / (2 * nu[:, 0]), mixed * nu[:, 0], -mixed * nu[:, 1], h[:, 1, 1] / (2 * nu[:, 1]))
     kappa[round_] = 0
-    K = (np.linalg.inv(np.swapaxes(e, 1, 2)) @ kappa @ np.linalg.inv(f) - P).real / I3[:, None, None]
+    K = (np.linalg.inv(np.swapaxes(e, 1, 2)) @ kappa @ np.linalg.inv(f) - P) / I3[:, None, None]
     return K[:, 0, 0], K[:, 0, 1], K[:, 1, 0], K[:, 1, 1]
 
 
