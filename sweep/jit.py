@@ -1,6 +1,7 @@
 """All Numba options of the project, and the on-disk cache that makes compiled kernels safe to reuse.
 
-Numba takes half a second to import, so it is imported when the first function is to be compiled.
+Numba takes half a second to import, so it is imported when the first function is to be compiled.  This module alone
+looks inside Numba (`tests/test_numba.py` lists what for); all others keep to its public names.
 """
 
 from __future__ import annotations
@@ -126,7 +127,7 @@ def full_width() -> Any:
     """
     if INTERPRETED:
         return lambda: None
-    from numba.core import types
+    from numba import types
     from numba.extending import intrinsic
 
     load_numba()
