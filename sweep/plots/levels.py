@@ -5,7 +5,6 @@ From the dataset alone, and without any library that draws.
 
 from __future__ import annotations
 
-import numpy as np
 import xarray as xr
 
 from sweep.axis import Axis, contours
