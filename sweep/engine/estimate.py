@@ -11,7 +11,7 @@ from sweep.config import Config
 from sweep.config.user_models import explained
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import BATCH
-from sweep.engine.plan import Choice, choose, kernels
+from sweep.engine.plan import Choice, choose, needed
 from sweep.grid import Array, Grid
 from sweep.kernels.build import compile_seconds, missing
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
@@ -40,10 +40,10 @@ def estimate(config: Config) -> str:
     sample = grid.sample(_SAMPLE)
     share = grid.size / sample.size
     with explained(config.origin):
-        chosen = [each for each in choose(config, sample) if len(each.cells)]
+        chosen = tuple(each for each in choose(config, sample) if len(each.cells))
         steps = [np.ceil(config.integrator.patient.t_end / each.step) for each in chosen]
         seconds = sum(map(nominal_seconds, _works(config, chosen, steps, share)))
-        compiling = compile_seconds(missing(kernels(config)))
+        compiling = compile_seconds(missing(needed(config, chosen)))
     total = sum(each.sum() for each in steps) * share
     numbers = sum(len(each.cells) * len(each.kernel.layout.names) for each in chosen)
     bytes_a_cell = np.dtype(float).itemsize * numbers / sample.size
@@ -59,7 +59,7 @@ def estimate(config: Config) -> str:
     )
 
 
-def _works(config: Config, chosen: list[Choice], steps: list[Array], share: float) -> Iterator[Array]:
+def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share: float) -> Iterator[Array]:
     """The work for each cell, in steps of dopri5 alone: for each method, and for the cells run again to verify it."""
     relative = 1.0 if config.equations.name in MODELS else _GENERAL
     relative *= math.prod(each.cost for each in chosen[0].kernel.measurements)

@@ -135,14 +135,20 @@ class Plan:
         ]
 
 
-def plan(config: Config, *grids: Grid) -> Plan:
+def plan(config: Config, *grids: Grid, paths: bool = False) -> Plan:
     """Give each cell of `grids`, by default all cells of `config`, its method, step, limits and start.
 
-    Kernels that no cache holds are compiled first.
+    What these cells need and no cache holds is compiled first; `paths` as of `sweep.kernels.build.build`.
     """
     grids = grids or (Grid.of(config),)
-    build(kernels(config))
-    return fill(config, grids, choose(config, *grids))
+    chosen = choose(config, *grids)
+    build(needed(config, chosen), paths)
+    return fill(config, grids, chosen)
+
+
+def needed(config: Config, chosen: tuple[Choice, ...]) -> list[Kernel]:
+    """The kernels that run the cells of `chosen`, and that verify some of them."""
+    return [*(each.kernel for each in chosen), *([kernel_of(methods.PLAIN, config)] if config.verify else [])]
 
 
 def kernels(config: Config) -> list[Kernel]:

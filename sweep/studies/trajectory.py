@@ -22,7 +22,7 @@ from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
 from sweep.engine.executor import STEP_SECONDS
-from sweep.engine.plan import kernels, plan
+from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.engine.work import Work
@@ -30,7 +30,6 @@ from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import threads
 from sweep.kernels import path
-from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
@@ -147,8 +146,7 @@ def trajectory(
 
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
     """`trajectory` of all cells of `chosen`."""
-    build(kernels(chosen), paths=True)
-    job = plan(chosen)
+    job = plan(chosen, paths=True)
     (part,), (grid,) = job.parts, job.grids
     kernel, images, columns = part.kernel, part.images, grid.columns()
     t_end, settles, began = chosen.integrator.t_end, chosen.integrator.stop_when_settled, time.perf_counter()
