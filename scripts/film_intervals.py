@@ -37,14 +37,14 @@ FREE = ("mu", "omega3", "roll", "pitch")
 
 
 def spins(config: sweep.Config, law: str, times: np.ndarray) -> np.ndarray | None:
-    """The spins of the one body of `config`, or None if it lifts off."""
+    """The spins of the one body of `config`, or None if it lifts off or topples."""
     columns, model = Grid.of(config).columns(), config.equations
     p = {name: float(value[0]) for name, value in columns.items()}
     start = np.array(model.start(columns))[:, 0]
     # DOP853 took three times as many evaluations for most bodies, and minutes for stiff ones.
     y = solve_ivp(lambda _, y: newton.derivative(y, p, law)[0], (0, times[-1]), start, "LSODA", times,
                   rtol=1e-9, atol=1e-12).y  # fmt: skip
-    if y.shape[1] < len(times) or any(newton.derivative(state, p, law)[1] <= 0 for state in y.T[::10]):
+    if y.shape[1] < len(times) or not all(newton.derivative(state, p, law)[1] > 0 for state in y.T[::10]):
         return None
     return np.asarray(np.sum(y[2:5] * [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], axis=0))
 
