@@ -72,6 +72,8 @@ _TIED = 0.98
 def fit(config: Config, film: str | Path | Film, free: Sequence[str], reporter: Reporter | None = None) -> xr.Dataset:
     """As `sweep.api.fit`; a film may have been read already."""
     film = film if isinstance(film, Film) else read(film)
+    if not np.isfinite(film.rows).all():
+        raise fault_of("the film holds a value that is no number; leave out such instants")
     theirs = of_film(film)
     config = _one_body(config, free, theirs)
     note, began = (reporter or Reporter()).note, time.perf_counter()

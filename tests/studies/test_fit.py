@@ -237,6 +237,13 @@ def test_the_command_writes_what_runs_the_fitted_body(
         Source(written)
 
 
+@pytest.mark.parametrize("laws", [(), ("viscous", "coulomb")])
+def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: tuple[str, ...]) -> None:
+    film = Film(np.arange(3.0), np.array([0.05, np.nan, 0.05]))
+    with pytest.raises(ConfigError, match="no number; leave out such instants"):
+        sweep.fit(write(SCENE), film, ["mu"], n0=0.05, laws=laws, progress=False)
+
+
 @pytest.mark.parametrize(
     ("free", "overrides", "words"),
     [
