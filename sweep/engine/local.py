@@ -71,11 +71,14 @@ def run_batch(
     began = time.perf_counter() - (left.seconds if left else 0)
     work, twice = Work(left.tables if left else None), config.integrator.estimate_errors
     first = _FIRST if twice else 1.0
+    # Through `work`, which calls it, `save` would keep itself and the images of the batch alive until Python looks for
+    # cycles: 629 MiB for 10⁶ cells in place of 370.
+    kept = work.kept
 
     def save() -> None:
         # Images are saved only between two chunks: anywhere else an interrupt may find half of them advanced.
         if store:
-            store.save_running(Running(list(batch), work.kept, time.perf_counter() - began))
+            store.save_running(Running(list(batch), kept, time.perf_counter() - began))
 
     def running() -> None:
         save()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,8 +16,9 @@ from support.kernels import images, kernel
 from support.runs import Stop, same_numbers
 
 import sweep
-from sweep.engine import executor
+from sweep.engine import executor, local
 from sweep.engine.plan import plan
+from sweep.engine.work import Work
 from sweep.kernels.kernel import Kernel
 
 Write = Callable[..., Path]
@@ -103,3 +106,21 @@ def test_chunks_are_kept_short(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(chunks) > 20
     assert max(chunks) <= 1.01 * executor.CHUNK_SECONDS
     assert np.median(chunks) > 0.9 * executor.CHUNK_SECONDS
+
+
+def test_the_images_of_a_batch_go_with_it(monkeypatch: pytest.MonkeyPatch, write: Write) -> None:
+    """Not when Python looks for cycles: the images of several batches take hundreds of MiB."""
+    made: list[weakref.ref[Work]] = []
+
+    class Watched(Work):
+        def __init__(self, *given: Any) -> None:
+            super().__init__(*given)
+            made.append(weakref.ref(self))
+
+    monkeypatch.setattr(local, "Work", Watched)
+    gc.disable()
+    try:
+        sweep.run(write(), t_end=20)
+        assert [reference() for reference in made] == [None]
+    finally:
+        gc.enable()
