@@ -7,18 +7,21 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import dask
 import distributed
 import pytest
 import xarray as xr
 from support import ROOT
 from support.cli import invoke
 from support.kernels import threads
+from support.runs import Stop, same_numbers
 from support.same import contents
 
 import sweep
@@ -35,7 +38,9 @@ start: {n0: [0.02, 0.05, 0.07]}
 integrator: {t_end: 100}
 verify: 0.01
 """
-TILES = 5
+TILES, SMALL_TILES = 5, 20
+
+Fault = Callable[[distributed.Client, distributed.LocalCluster], None]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -104,38 +109,103 @@ def test_workers_of_a_scheduler_give_the_same_files(
     assert contents(tmp_path) == by_threads
 
 
-class KillAWorker(Reporter):
-    """When the first tile is back, kills the one that has most of the others."""
+def completed(local: distributed.LocalCluster) -> int:
+    """How many tiles workers have finished since the log was cleared, any of them more than once included."""
+    log = local.scheduler.transition_log
+    moves = [(start, end) for key, start, end, *_ in log if str(key).startswith("_work")]
+    return moves.count(("processing", "memory"))
 
-    def __init__(self, client: distributed.Client) -> None:
-        self.client, self.killed = client, list[int]()
+
+class AtFirst(Reporter):
+    """When the first tile is back, does something."""
+
+    def __init__(self, act: Callable[[], object]) -> None:
+        self.act, self.done = act, False
 
     def chunk(self, progress: Progress) -> None:  # noqa: ARG002
-        if not self.killed:
+        if not self.done:
+            self.done = True
             time.sleep(0.1)  # into the next
-            tiles = self.client.processing()
-            busiest = max(tiles, key=lambda worker: len(tiles[worker]))
-            self.killed.append(self.client.run(os.getpid)[busiest])
-            os.kill(self.killed[0], signal.SIGKILL)
+            self.act()
+
+
+def signal_busiest(number: int) -> Fault:
+    """A fault that sends a signal to the worker that has most of the tiles."""
+
+    def send(client: distributed.Client, local: distributed.LocalCluster) -> None:  # noqa: ARG001
+        tiles = client.processing()
+        busiest = max(tiles, key=lambda worker: len(tiles[worker]))
+        os.kill(client.run(os.getpid)[busiest], number)
+
+    return send
+
+
+def add_one(client: distributed.Client, local: distributed.LocalCluster) -> None:  # noqa: ARG001
+    local.scale(3)
+
+
+def leave_none(client: distributed.Client, local: distributed.LocalCluster) -> None:  # noqa: ARG001
+    local.scale(0)
+    threading.Timer(1.0, local.scale, [2]).start()
 
 
 @pytest.mark.campaign
-def test_a_killed_worker_costs_only_its_tile(
+@pytest.mark.parametrize(
+    ("fault", "lost"),
+    # With a worker go results that had not been fetched yet: up to all that it was sent ahead.
+    [(signal_busiest(signal.SIGKILL), AHEAD), (signal_busiest(signal.SIGSTOP), AHEAD), (add_one, 0),
+     (leave_none, 2 * AHEAD)],
+    ids=["killed", "hung", "new", "none for a second"],
+)  # fmt: skip
+def test_workers_that_come_go_hang_and_lag_cost_only_their_tiles(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Fault, lost: int
+) -> None:
+    """One worker of two is slow from the beginning; the fault comes with the first tile."""
+    monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: cells // SMALL_TILES)
+    expected = sweep.run(config)
+    with (
+        dask.config.set({"distributed.scheduler.worker-ttl": "15s"}),
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
+        ) as local,
+        distributed.Client(local) as client,
+    ):
+        client.wait_for_workers(2)
+        client.run(slow_down, workers=list(client.scheduler_info(n_workers=-1)["workers"])[:1])
+        reporter = AtFirst(lambda: fault(client, local))
+        found = sweep.run(config, tmp_path, reporter=reporter, cluster=Cluster(client))
+        assert reporter.done
+        assert SMALL_TILES <= completed(local) <= SMALL_TILES + lost
+    same_numbers(found, expected)
+
+
+def slow_down() -> None:
+    """Make a worker take a fifth of a second longer for each tile."""
+    import time
+
+    from sweep.engine import cluster
+
+    run = cluster.run_batch
+    cluster.run_batch = lambda *given: [time.sleep(0.2), *run(*given)][1:]
+
+
+@pytest.mark.campaign
+def test_a_run_resumed_on_a_cluster_computes_what_is_missing(
     config: Path,
     tmp_path: Path,
     client: distributed.Client,
     local: distributed.LocalCluster,
     by_threads: dict[str, bytes],
 ) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(config, tmp_path, reporter=Stop(1), cluster=Cluster(client))
+    there = len(list(tmp_path.glob("tiles.checkpoint/0*.npz")))
+    while any(client.processing().values()):
+        time.sleep(0.05)
     local.scheduler.transition_log.clear()
-    reporter = KillAWorker(client)
-    sweep.run(config, tmp_path, reporter=reporter, cluster=Cluster(client))
+    sweep.run(config, tmp_path, cluster=Cluster(client))
+    assert completed(local) == TILES - there < TILES
     assert contents(tmp_path) == by_threads
-    assert reporter.killed
-    moves = [(start, end) for key, start, end, *_ in local.scheduler.transition_log if str(key).startswith("_work")]
-    # With the worker go results that had not been fetched yet: on a busy machine up to all that it was sent ahead, and
-    # none if it was idle just then.
-    assert TILES <= moves.count(("processing", "memory")) <= TILES + AHEAD
 
 
 @pytest.mark.campaign
