@@ -93,6 +93,12 @@ def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take longer to draw than small runs."""
+    monkeypatch.setattr("sweep.engine.run._draw", lambda *_: None)
+
+
+@pytest.fixture
 def write(tmp_path: Path) -> Callable[..., Path]:
     """Writes a configuration, by default a sweep of twelve cells, and returns its path."""
 

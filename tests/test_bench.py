@@ -1,7 +1,5 @@
 """The bench: its error measure, its sections for every method, and that the hard cases catch planted bugs."""
 
-from __future__ import annotations
-
 import csv
 import re
 import subprocess
@@ -24,7 +22,7 @@ from sweep.bench.whole import PLACES
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
 from sweep.models import MODELS
-from sweep.report.direct import Ends, make_kernel, simulate, standard
+from sweep.report.direct import Ends, make_kernel, simulate
 from sweep.report.rows import states
 
 
@@ -238,9 +236,3 @@ def test_hard_cases_hold_and_a_planted_bug_fails_each(monkeypatch: pytest.Monkey
             assert not any(row.holds for row in hard.rows(case)), (name, case.names)
         runs.clear()
         planted.clear()
-
-
-def test_a_method_of_the_registry_runs_the_hard_cases(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, "twin", replace(METHODS["dopri5"], name="twin", code=9))
-    rows = list(hard.rows(hard.Case(["short"], standard(), 20.0)))
-    assert [(row.source, row.holds) for row in rows] == [("dopri5", True), ("adams", True), ("twin", True)]

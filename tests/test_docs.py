@@ -9,8 +9,6 @@ campaigns alone.
 What a page shows as output is made when the pages are built, by ```{code-cell} and ```{console}.
 """
 
-from __future__ import annotations
-
 import pkgutil
 import re
 import shlex

@@ -1,7 +1,5 @@
 """What Python may hand in, what it is told, and what it gets back."""
 
-from __future__ import annotations
-
 import sys
 import types
 from collections.abc import Callable
@@ -13,12 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from support import Write
 from support.runs import same_numbers
 
 import sweep
 from sweep.config import ConfigError, load_config
-
-Write = Callable[..., Path]
 
 TEXT = "name: quick\nmodel: averaged\nbody: {b: [2, 3]}\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
 SAID = {
@@ -73,10 +70,6 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "misspelt": ({"t_edn": 3}, "t_edn: unknown key (did you mean integrator.t_end?); the keys here are name, model"),
     "of the integrator": ({"t_end": -1}, "t_end: must be .inf or a number > 0 and <= 1e+12, not -1"),
     "a section": ({"friction": {}}, "friction.mu: missing; give a finite number >= 0"),
-    "a measurement": ({"measure": ["reversal"]}, "measure[0]: must be reversals, energy_error"),
-    "a measurement alone": ({"measure": "reversals"}, "measure: must be a list of reversals"),
-    "a model": ({"model": "no_slip"}, "model: must be slip, noslip"),
-    "a method": ({"method": "dopri"}, "method: must be dopri5, adams or auto, not 'dopri' (did you mean dopri5?)"),
 }  # fmt: skip
 
 

@@ -1,7 +1,5 @@
 """What `sweep.jit` takes from inside Numba, which may go with any of its versions: `pyproject.toml` bounds these."""
 
-from __future__ import annotations
-
 import ast
 import operator
 from pkgutil import resolve_name

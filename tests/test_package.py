@@ -1,7 +1,5 @@
 """The package as a user installs it: a wheel in a fresh environment, every verb run from another folder."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

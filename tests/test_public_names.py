@@ -1,7 +1,5 @@
 """What `import sweep` offers: functions that no module of theirs hides, and modules that no function hides."""
 
-from __future__ import annotations
-
 import ast
 import doctest
 import importlib

@@ -1,7 +1,5 @@
 """The report of the paper's numbers, and that any wrong coefficient shows in it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

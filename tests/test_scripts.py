@@ -1,7 +1,5 @@
 """What the scripts share, of which no other test makes use: the scripts themselves need hours or tools of others."""
 
-from __future__ import annotations
-
 import importlib
 from math import sqrt
 

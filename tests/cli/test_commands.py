@@ -1,26 +1,22 @@
 """The commands run, info and plot: what they write, say and return."""
 
-from __future__ import annotations
-
 import io
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import netCDF4
 import pytest
 import xarray as xr
 from rich.console import Console
+from support import Write
 from support.cli import invoke, refused
 from support.runs import same_numbers
 
 import sweep
 from sweep.jit import Cached, compiling
 from sweep.progress import Terminal
-
-Write = Callable[..., Path]
 
 
 def test_command_writes_dataset_and_maps(write: Write, tmp_path: Path, small: xr.Dataset) -> None:

@@ -1,7 +1,5 @@
 """The commands `body` and `examples`: what they write runs as it is, and what they refuse is one line."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

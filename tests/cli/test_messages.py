@@ -1,16 +1,14 @@
 """What commands say: what was meant, what was written and kept, and nothing more than one line when one is enough."""
 
-from __future__ import annotations
-
 import io
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from rich.console import Console
+from support import Write
 from support.cli import invoke
 from support.runs import Stop
 
@@ -19,8 +17,6 @@ from sweep.config import load_config
 from sweep.config.document import parse_value
 from sweep.engine.reporter import Progress
 from sweep.progress import Terminal
-
-Write = Callable[..., Path]
 
 TEXT = "name: quick\nmodel: averaged\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
 

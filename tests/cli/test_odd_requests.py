@@ -1,12 +1,10 @@
 """Odd requests: each ends in an answer, or in one line that says what is allowed."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from support import Write
 from support.cli import invoke
 
 import sweep
@@ -14,7 +12,6 @@ from sweep.cli import main
 from sweep.kernels.status import DIVERGED
 from sweep.studies.trajectory import trajectory
 
-Write = Callable[..., Path]
 TEXT = "name: odd\nfriction: {mu: 60}\nintegrator: {t_end: 30}\n"
 
 

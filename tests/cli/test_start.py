@@ -1,19 +1,14 @@
 """How a command starts: it loads nothing that it does not need, and Ctrl-C is one line from the beginning on."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support import ROOT, SMALL
-
-Write = Callable[..., Path]
+from support import ROOT, SMALL, Write
 
 HEAVY = {"numba", "llvmlite", "xarray", "pandas", "netCDF4", "dask", "distributed", "matplotlib", "scipy", "pint"}
 """Each takes from a tenth of a second to a whole one."""

@@ -1,7 +1,5 @@
 """The bodies in `configs/`: their numbers are what their first lines say, and they turn the way they should."""
 
-from __future__ import annotations
-
 import re
 import runpy
 from math import pi

@@ -1,7 +1,5 @@
 """What a configuration says, and how it is read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,13 +9,11 @@ import pandas
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from support import ROOT, SMALL
+from support import ROOT, SMALL, Write
 
 from sweep import ConfigError, load_config
 from sweep.config.values import Range
 from sweep.grid import Grid
-
-Write = Callable[..., Path]
 
 
 def test_settings_replace_the_files_values(write: Write) -> None:

@@ -1,7 +1,5 @@
 """A new surface or law of friction is its record alone: what the configuration and labels know stands there."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """A user's model in a configuration: where it is found, when its code runs, and what is said of a broken one."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import sys

@@ -1,7 +1,5 @@
 """Bodies, friction and starts beyond the paper: the model that runs them, their units and what their numbers mean."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,18 +1,13 @@
 """What is said of a configuration that cannot be run."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support import SMALL
+from support import SMALL, Write
 from support.cli import invoke, refused
 from support.physics import MOMENTS, stone
 
 from sweep import ConfigError, load_config
-
-Write = Callable[..., Path]
 
 
 def small(old: str, new: str) -> str:

@@ -1,7 +1,5 @@
 """Runs in other processes: the same files as by threads, whatever happens to the workers."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """What a dry run promises: every run of every cell is counted, and compiling."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -4,8 +4,6 @@ Whatever happens, the same command goes on and ends in the files of an undisturb
 files that a run left is in `test_damage`.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random
@@ -315,14 +313,6 @@ def refused(result: tuple[int, str], *words: str) -> None:
     assert all(word in said for word in words), said
     assert "Traceback" not in said
     assert len(said.splitlines()) == 1, said
-
-
-def test_a_file_that_finds_no_room_is_reported(runs: Runs, undisturbed: dict[str, bytes]) -> None:
-    """The dataset; a disk that is full for any other file is below."""
-    refused(runs.finish("--quiet", room=30_000), "small.nc", "cannot be written: File too large")
-    Watch(runs.out, undisturbed).look()
-    assert not list(runs.out.rglob(".*"))
-    assert runs.complete() == undisturbed
 
 
 @pytest.mark.campaign

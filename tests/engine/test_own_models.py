@@ -1,7 +1,5 @@
 """Runs of a user's model: killed and resumed, in other processes, and never from what another file has left."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

@@ -1,9 +1,7 @@
 """Refined runs: which nodes are simulated, what is inferred of the others, and the run around it."""
 
-from __future__ import annotations
-
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ import pytest
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import Write
 from support.cli import invoke
 from support.runs import in_sittings, same_numbers
 
@@ -22,8 +21,6 @@ from sweep.engine.cluster import connected
 from sweep.engine.local import Done
 from sweep.engine.refinement import UNKNOWN, missing, sources
 from sweep.results.dataset import STATUSES
-
-Write = Callable[..., Path]
 
 
 def refine(full: np.ndarray, depth: int, refined: tuple[int, ...] | None = None) -> tuple[np.ndarray, np.ndarray]:

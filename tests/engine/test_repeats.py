@@ -1,18 +1,14 @@
 """Cells that fail: no failure is false, true ones have their time, and the rest stays."""
 
-from __future__ import annotations
-
 import csv
-from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
-from support import ROOT, STANDARD, adaptive, columns, newton
+from support import ROOT, STANDARD, Write, adaptive, columns, newton
 from support.kernels import threads
-from support.runs import same_numbers
+from support.runs import run_cells, same_numbers
 
 import sweep
 from sweep.engine import local, repeats
@@ -20,9 +16,6 @@ from sweep.engine.reporter import Progress, Reporter
 from sweep.kernels import methods
 from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, TIME_LIMIT, TOPPLED
-
-Write = Callable[..., Path]
-Cells = Callable[..., xr.Dataset]
 
 THIN = {"a": 50.0, "b": 1.01, "c": 1.0, "delta": 0.5, "mu": 200.0, "n0": 0.05}
 """A body whose normal force rises to hundreds for a moment; with too long a step it seems to be a paradox."""
@@ -43,39 +36,25 @@ MIXED = (*ENDS.values(), MISSES, THIN, {}, {"n0": 0.02}, ENDS[TOPPLED] | {"n0": 
 """Cells that fail truly, fail falsely, miss their tolerance, or need no repeat."""
 
 
-@pytest.fixture
-def cells(tmp_path: Path) -> Cells:
-    """Runs cells given by their parameters, along the dimension `case`."""
-
-    def run(bodies: Iterable[Mapping[str, float]], output: Path | None = None, **settings: Any) -> xr.Dataset:
-        rows = [",".join(STANDARD), *(",".join(map(repr, (STANDARD | dict(body)).values())) for body in bodies)]
-        (tmp_path / "cells.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
-        (tmp_path / "cells.yaml").write_text("name: cells\ncases: cells.csv\n", encoding="utf-8")
-        options = {key: settings.pop(key) for key in ("reporter",) if key in settings}
-        return sweep.run(tmp_path / "cells.yaml", output, **options, **settings)
-
-    return run
-
-
 @pytest.mark.parametrize("method", ["adams", "dopri5"])
-def test_true_failures_have_their_time(cells: Cells, method: str) -> None:
-    found = cells(ENDS.values(), method=method, t_end=50.0)
+def test_true_failures_have_their_time(method: str) -> None:
+    found = run_cells(ENDS.values(), method=method, t_end=50.0)
     expected = [newton.end(**end, t_end=50.0)[0] for end in ENDS.values()]
     assert found.status.values.tolist() == list(ENDS)
     np.testing.assert_allclose(found.t_stop, expected, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("method", ["adams", "dopri5"])
-def test_a_false_paradox_is_gone_on_from(cells: Cells, method: str) -> None:
-    found = cells([THIN], method=method, t_end=2.5)
+def test_a_false_paradox_is_gone_on_from(method: str) -> None:
+    found = run_cells([THIN], method=method, t_end=2.5)
     expected = adaptive.spin(columns(**THIN), 2.5)
     assert (int(found.status[0]), float(found.t_stop[0])) == (TIME_LIMIT, 2.5)
     assert float(found.spin_final[0]) == pytest.approx(expected, abs=1e-5)
     assert float(found.energy_error[0]) < 1e-4
 
 
-def test_a_false_paradox_at_strong_friction(cells: Cells) -> None:
-    found = cells([STIFF], method="adams", t_end=14.5)
+def test_a_false_paradox_at_strong_friction() -> None:
+    found = run_cells([STIFF], method="adams", t_end=14.5)
     assert (int(found.status[0]), float(found.t_stop[0])) == (TIME_LIMIT, 14.5)
     assert float(found.spin_final[0]) == pytest.approx(adaptive.spin(columns(**STIFF), 14.5, "Radau"), abs=1e-7)
 
@@ -85,28 +64,28 @@ VIOLENT = {"b": 3.0, "mu": 200.0, "n0": 3.0, "x0": 5.0, "y0": 0.01}
 
 
 @pytest.mark.parametrize("method", ["adams", "dopri5"])
-def test_a_failure_is_confirmed_however_long_the_whole_run_would_be(cells: Cells, method: str) -> None:
-    found = cells([VIOLENT], method=method, t_end=400.0)
+def test_a_failure_is_confirmed_however_long_the_whole_run_would_be(method: str) -> None:
+    found = run_cells([VIOLENT], method=method, t_end=400.0)
     assert (int(found.status[0]), float(found.t_stop[0])) == (LIFT_OFF, 0.0)
 
 
-def test_failures_on_the_way_of_a_run_that_is_too_long(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failures_on_the_way_of_a_run_that_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is repeated to where it failed; a false one is not called a failure of the body."""
-    expected = cells(ENDS.values(), method="dopri5", t_end=50.0)
+    expected = run_cells(ENDS.values(), method="dopri5", t_end=50.0)
     monkeypatch.setattr(repeats, "MOST_STEPS", 2 * 50.0 / float(expected.step.max()))
-    found = cells(ENDS.values(), method="dopri5", t_end=5000.0)
+    found = run_cells(ENDS.values(), method="dopri5", t_end=5000.0)
     assert found.status.values.tolist() == list(ENDS)
     np.testing.assert_allclose(found.t_stop, expected.t_stop, rtol=0, atol=1e-6)
     lengthen(monkeypatch, 50)
     monkeypatch.setattr(repeats, "MOST_STEPS", 1e4)
-    false = cells([THIN], method="dopri5", t_end=100.0)
+    false = run_cells([THIN], method="dopri5", t_end=100.0)
     assert int(false.status[0]) == DIVERGED
     assert float(false.t_stop[0]) < 100.0
 
 
-def test_without_a_second_look_both_would_be_paradoxes(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_second_look_both_would_be_paradoxes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local, "decide_failures", lambda *_: None)
-    found = cells([THIN, STIFF], method="adams", t_end=14.5)
+    found = run_cells([THIN, STIFF], method="adams", t_end=14.5)
     assert found.status.values.tolist() == [PARADOX, PARADOX]
 
 
@@ -121,7 +100,7 @@ def lengthen(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
     monkeypatch.setattr("sweep.engine.plan.methods.automatic_step", long_step)
 
 
-def test_one_run_is_not_believed(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_run_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a run has met, the next one has to meet the same."""
     claims = iter([PARADOX, LIFT_OFF, TOPPLED] * 3)
 
@@ -130,22 +109,22 @@ def test_one_run_is_not_believed(cells: Cells, monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setattr(repeats, "approach", claim)
     lengthen(monkeypatch, 50)
-    found = cells([THIN], method="dopri5", t_end=1.0)
+    found = run_cells([THIN], method="dopri5", t_end=1.0)
     assert int(found.status[0]) == TIME_LIMIT
     assert len(list(claims)) < 8  # more than one was made
 
 
-def test_a_fixed_step_stays(cells: Cells) -> None:
-    found = cells([MISSES, THIN, ENDS[TOPPLED]], method="adams", step=0.2, t_end=100.0)
+def test_a_fixed_step_stays() -> None:
+    found = run_cells([MISSES, THIN, ENDS[TOPPLED]], method="adams", step=0.2, t_end=100.0)
     np.testing.assert_allclose(found.step, 0.2, rtol=2e-3)
     assert set(found.step_rule.values.tolist()) == {FIXED}
     assert found.status.values.tolist() == [TIME_LIMIT, DIVERGED, TOPPLED]
     assert float(found.t_stop[2]) == pytest.approx(1.9815107, abs=1e-3)  # as near as its step allows
 
 
-def test_a_true_failure_at_a_fixed_step(cells: Cells) -> None:
-    found = cells(ENDS.values(), method="dopri5", step=5e-5, t_end=50.0)
-    automatic = cells(ENDS.values(), method="dopri5", t_end=50.0)
+def test_a_true_failure_at_a_fixed_step() -> None:
+    found = run_cells(ENDS.values(), method="dopri5", step=5e-5, t_end=50.0)
+    automatic = run_cells(ENDS.values(), method="dopri5", t_end=50.0)
     assert found.status.values.tolist() == list(ENDS)
     np.testing.assert_allclose(found.t_stop, automatic.t_stop, rtol=0, atol=1e-6)
     np.testing.assert_allclose(found.step, 5e-5, rtol=1e-4)
@@ -154,26 +133,26 @@ def test_a_true_failure_at_a_fixed_step(cells: Cells) -> None:
 @pytest.mark.parametrize(
     ("body", "step"), [({"b": 2.8, "mu": 100.0, "n0": 0.02}, 0.4), ({"b": 2.0, "mu": 100.0, "n0": 0.1}, 0.2)]
 )
-def test_no_energy_error_above_a_hundredth_without_a_failure(cells: Cells, body: dict[str, float], step: float) -> None:
-    found = cells([body], method="adams", step=step, t_end=400.0)
+def test_no_energy_error_above_a_hundredth_without_a_failure(body: dict[str, float], step: float) -> None:
+    found = run_cells([body], method="adams", step=step, t_end=400.0)
     assert float(found.energy_error[0]) > 0.01
     assert (int(found.status[0]), float(found.t_stop[0])) == (DIVERGED, 400.0)
 
 
 @pytest.mark.parametrize("method", ["adams", "auto"])
 @pytest.mark.parametrize("size", [1, 3])
-def test_tiles_and_threads_do_not_touch_the_numbers(
-    cells: Cells, monkeypatch: pytest.MonkeyPatch, size: int, method: str
-) -> None:
+def test_tiles_and_threads_do_not_touch_the_numbers(monkeypatch: pytest.MonkeyPatch, size: int, method: str) -> None:
     settings = {"method": method, "t_end": 30.0, "tolerance": 1e-9}
-    whole = cells(MIXED, **settings)
+    whole = run_cells(MIXED, **settings)
     assert {TIME_LIMIT, *ENDS} <= set(whole.status.values.tolist())
     assert REPEAT in whole.step_rule
     monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: size)  # noqa: ARG005
     monkeypatch.setattr("sweep.engine.local.BATCH", 2 * size)
     with threads(1):
-        same_numbers(cells(MIXED, **settings), whole)
-    same_numbers(cells(MIXED[::-1], **settings).isel(case=slice(None, None, -1)).assign_coords(case=whole.case), whole)
+        same_numbers(run_cells(MIXED, **settings), whole)
+    same_numbers(
+        run_cells(MIXED[::-1], **settings).isel(case=slice(None, None, -1)).assign_coords(case=whole.case), whole
+    )
 
 
 class Stops(Reporter):
@@ -192,11 +171,9 @@ class Stops(Reporter):
 
 @pytest.mark.usefixtures("short_chunks")
 @pytest.mark.parametrize("name", ["decide_failures", "keep_tolerance"])
-def test_an_interrupt_while_cells_are_repeated(
-    cells: Cells, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
+def test_an_interrupt_while_cells_are_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     settings = {"method": "adams", "t_end": 30.0}
-    whole, stops, again = cells(MIXED, **settings), Stops(), getattr(local, name)
+    whole, stops, again = run_cells(MIXED, **settings), Stops(), getattr(local, name)
 
     def repeat(*arguments: Any) -> Any:
         stops.repeating = True
@@ -207,9 +184,9 @@ def test_an_interrupt_while_cells_are_repeated(
     monkeypatch.setattr(local, name, repeat)
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
-        cells(MIXED, out, reporter=stops, **settings)
+        run_cells(MIXED, out, reporter=stops, **settings)
     assert [path.name for path in out.iterdir()] == ["cells.checkpoint"]
-    same_numbers(cells(MIXED, out, reporter=stops, **settings), whole)
+    same_numbers(run_cells(MIXED, out, reporter=stops, **settings), whole)
     # A failure is reported only when it is certain, and no progress is taken back.
     assert stops.stopped
     failed, done = ([getattr(progress, name) for progress in stops.seen] for name in ("failed", "done"))
@@ -217,9 +194,9 @@ def test_an_interrupt_while_cells_are_repeated(
     assert max(failed) == failed[-1] == int(np.isin(whole.status, list(ENDS)).sum())
 
 
-def test_a_trajectory_is_that_of_the_run(cells: Cells, write: Write) -> None:
+def test_a_trajectory_is_that_of_the_run(write: Write) -> None:
     for body in (ENDS[PARADOX], THIN):
-        found = cells([body], method="dopri5", t_end=3.0)
+        found = run_cells([body], method="dopri5", t_end=3.0)
         series = sweep.trajectory(sweep.load_config(write("integrator: {t_end: 3, method: dopri5}\n"), STANDARD | body))
         for name in ("status", "t_stop", "step", "step_rule", "spin_final", "energy_error"):
             np.testing.assert_array_equal(series[name].values, found[name].values)
@@ -229,12 +206,12 @@ def test_a_trajectory_is_that_of_the_run(cells: Cells, write: Write) -> None:
 
 
 @pytest.mark.parametrize("method", ["adams", pytest.param("dopri5", marks=pytest.mark.campaign)])
-def test_300_wide_cells_end_as_they_truly_do(cells: Cells, method: str) -> None:
+def test_300_wide_cells_end_as_they_truly_do(method: str) -> None:
     with (ROOT / "data" / "reference_wide.csv").open(encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
     bodies = [{name: float(row[name]) for name in STANDARD} for row in rows]
     # Failures are decided before errors are estimated, which takes dopri5 minutes at strong friction.
-    found = cells(bodies, method=method, t_end=400.0, stop_when_settled=False, estimate_errors=method == "adams")
+    found = run_cells(bodies, method=method, t_end=400.0, stop_when_settled=False, estimate_errors=method == "adams")
     ends = {"time_limit": TIME_LIMIT, "toppled": TOPPLED}
     np.testing.assert_array_equal(found.status, [ends[row["end"]] for row in rows])
     np.testing.assert_allclose(found.t_stop, [float(row["t_end"]) for row in rows], rtol=0, atol=2e-6)

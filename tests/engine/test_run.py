@@ -1,17 +1,14 @@
 """Whole runs: from a configuration to numbers, however they are cut into tiles, chunks and sittings."""
 
-from __future__ import annotations
-
 import gc
 import weakref
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import SMALL
+from support import SMALL, Write
 from support.kernels import images, kernel
 from support.runs import Stop, same_numbers
 
@@ -20,8 +17,6 @@ from sweep.engine import executor, local
 from sweep.engine.plan import plan
 from sweep.engine.work import Work
 from sweep.kernels.kernel import Kernel
-
-Write = Callable[..., Path]
 
 
 def test_cases(write: Write, tmp_path: Path, small: xr.Dataset) -> None:

@@ -1,14 +1,11 @@
 """The method of each cell by its cost, and a run that checks itself."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import SMALL, columns
+from support import SMALL, Write, columns
 from support.cli import invoke
 from support.runs import in_sittings, same_numbers
 
@@ -20,8 +17,6 @@ from sweep.engine.plan import plan
 from sweep.engine.work import Work
 from sweep.kernels import methods
 from sweep.models import MODELS
-
-Write = Callable[..., Path]
 
 MIXED = """\
 friction: {mu: [1.0, 60, 1000]}
@@ -59,9 +54,7 @@ def test_auto_resumes_from_a_checkpoint(write: Write, tmp_path: Path) -> None:
     same_numbers(found, sweep.run(file))
 
 
-def test_a_fixed_step_needs_a_method(write: Write) -> None:
-    with pytest.raises(ConfigError, match=r"2:28: integrator\.step: must be auto with method: auto"):
-        sweep.load_config(write("friction: {mu: 60}\nintegrator: {method: auto, step: 0.01}\n"))
+def test_a_model_without_a_stiff_form_has_one_method(write: Write) -> None:
     averaged = sweep.load_config(write("model: averaged\nfriction: {mu: 60}\nintegrator: {method: auto}\n"))
     assert [part.method for part in plan(averaged).parts] == ["dopri5"]
 

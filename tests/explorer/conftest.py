@@ -1,7 +1,5 @@
 """A small sweep with cells of many kinds, for the explorer."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The explorer and a dataset of a user's model: its code runs only if the user names it, and only if it is the same."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Trajectories behind the page: the sweep's own numbers, the newest request first, and files that make them again."""
 
-from __future__ import annotations
-
 import re
 import threading
 from collections.abc import Iterator

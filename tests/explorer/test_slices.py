@@ -1,7 +1,5 @@
 """Slices of a dataset: the same numbers as xarray's own selection, whatever the axes, and what is told of a cell."""
 
-from __future__ import annotations
-
 from itertools import permutations
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The address of the explorer: what is written there opens the same page, and nothing else gets through."""
 
-from __future__ import annotations
-
 from urllib.parse import parse_qs
 
 import pytest

@@ -5,13 +5,9 @@ It raises `Violation` where the input was neither accepted nor properly refused.
 of each kind with hypothesis, and among the campaigns many.
 """
 
-from __future__ import annotations
-
-import json
 import os
 import warnings
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -25,11 +21,8 @@ from sweep.cli import main
 from sweep.cli.faults import of_option
 from sweep.cli.options import cells_of, loaded
 from sweep.config import ConfigError, load_config
-from sweep.config.document import parse_value
 from sweep.config.schema import PATHS
 from sweep.parameters import PARAMETERS
-from sweep.results.checkpoint import Checkpoint
-from sweep.results.identity import Identity
 from sweep.results.store import StoreError
 from sweep.studies.trajectory import choose
 
@@ -122,19 +115,6 @@ def setting(random: Random, folder: Path) -> bool:
     if config is not None:
         _round_trip(config, folder)
     return config is not None
-
-
-def value(random: Random, folder: Path) -> bool:  # noqa: ARG001
-    """The text of a single value."""
-    text = random.choice(ODD)
-    for _ in range(random.randrange(3)):
-        text = random.choice((f"[{text}, {random.choice(ODD)}]", f"{{a: {text}}}", text + random.choice(ODD)))
-    data = damage(random, text.encode()) if random.random() < 0.5 else text.encode()
-    found: list[Any] = []
-    _refused(lambda: found.append(parse_value(data.decode("utf-8", "surrogateescape"), "--set x")), "--set x")
-    if found:
-        json.dumps(found)  # plain data, whatever was written
-    return bool(found)
 
 
 LEAVES = (
@@ -238,54 +218,6 @@ def dry_run(random: Random, folder: Path) -> bool:
     return _invoke(folder, "run", str(file), "--dry-run", "--output", str(folder / "out"))
 
 
-IDENTITY = Identity("name: x\n", "0" * 16, "1" * 16, "sweep 0")
-
-
-def identity(random: Random, folder: Path) -> bool:
-    """The identity of a checkpoint."""
-    checkpoint = folder / "x.checkpoint"
-    checkpoint.mkdir(exist_ok=True)
-    odd = (None, 1, [], {}, "", "x", "\x1b[2J")
-    content: Any = asdict(IDENTITY)
-    if random.random() < 0.7:
-        content[random.choice(("config", "config_hash", "source_hash", "more"))] = random.choice(odd)
-    if random.random() < 0.2:
-        content.pop(random.choice(list(content)))
-    data = json.dumps(random.choice((content, content, content, content, *odd))).encode()
-    if random.random() < 0.4:
-        data = random.choice((damage(random, data), b"[" * 100_000, b"9" * 5000))
-    (checkpoint / "identity.json").write_bytes(data)
-    return _refused(lambda: Checkpoint(checkpoint, IDENTITY, lambda _: None), str(checkpoint)) is not None
-
-
-def archive(random: Random, folder: Path) -> bool:
-    """A tile or the unfinished images of a checkpoint; damaged ones are dropped."""
-    checkpoint = folder / "y.checkpoint"
-    checkpoint.mkdir(exist_ok=True)
-    (checkpoint / "identity.json").write_text(json.dumps(asdict(IDENTITY)), encoding="utf-8")
-    name = random.choice(("000000.npz", "running.npz", "1abc.npz", "7.npz", "1_0.npz"))
-    arrays: dict[str, Any] = {"status": np.ones(4, np.int64), "tiles": np.arange(2), "seconds": np.array(1.5)}
-    if random.random() < 0.5:
-        odd = (np.array("x"), np.zeros((2, 2)), np.array(1), np.array([], np.int64), np.array([0, 0]), np.array([1.5]))
-        arrays[random.choice(sorted(arrays))] = random.choice(odd)
-    path = checkpoint / name
-    with path.open("wb") as stream:
-        np.savez(stream, **arrays)
-    if random.random() < 0.7:
-        path.write_bytes(damage(random, path.read_bytes()))
-    kept = Checkpoint(checkpoint, IDENTITY, lambda _: None)
-    running = kept.load_running()
-    if running is not None:
-        tiles, tables, seconds = running
-        if not (
-            tiles and all(type(i) is int for i in tiles) and isinstance(seconds, float) and isinstance(tables, dict)
-        ):
-            raise Violation(f"invalid images accepted: {running!r:.300}")
-    accepted = bool(kept.done) or running is not None
-    path.unlink(missing_ok=True)
-    return accepted
-
-
 def foreign(random: Random, folder: Path) -> bool:
     """A dataset of another program, whose variables may have the same names as ours."""
     names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step", "verified_cell",
@@ -328,6 +260,5 @@ def foreign(random: Random, folder: Path) -> bool:
 
 
 KINDS: dict[str, Callable[[Random, Path], bool]] = {
-    kind.__name__: kind
-    for kind in (yaml_tree, yaml_bytes, setting, value, mapping, at, table, dry_run, identity, archive, foreign)
+    kind.__name__: kind for kind in (yaml_tree, yaml_bytes, setting, mapping, at, table, dry_run, foreign)
 }

@@ -1,7 +1,5 @@
 """Text that is nearly a configuration, and bytes that are nearly a file."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import Any
 

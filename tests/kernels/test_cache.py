@@ -1,7 +1,5 @@
 """Compiled kernels are found again by later processes, and never after an edit of what they are made of."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The regularity of reversals, against their times."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import sweep

@@ -1,7 +1,5 @@
 """Traced derivatives of right-hand sides, against complex steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The approach to a failure, against SciPy on the equations derived another way."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support import columns, newton

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import columns
+from support import Write, columns
 from support.kernels import finish, images_of, kernel
 
 import sweep
@@ -23,8 +21,6 @@ from sweep.kernels.runge_kutta import RungeKuttaKernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models.ladder import noslip
 from sweep.models.model import SPIN, Model, stack, take
-
-Write = Callable[..., Path]
 
 
 class Constants(NamedTuple):

@@ -1,14 +1,11 @@
 """The misfit to a film as a measurement: against trajectories by other code, and in runs of all kinds."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support import adaptive, columns
+from support import Write, adaptive, columns
 from support.cli import invoke
 from support.kernels import threads
 from support.runs import in_sittings, same_numbers
@@ -21,8 +18,6 @@ from sweep.explorer.slices import Source
 from sweep.models.ladder import slip
 from sweep.models.model import take
 from sweep.results.store import StoreError
-
-Write = Callable[..., Path]
 
 TEXT = """\
 name: film

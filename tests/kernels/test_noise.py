@@ -1,17 +1,11 @@
 """Late reversals, which round-off makes come too early: lifted by adams, and said of a cell where it does."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
-from support import columns
+from support import Write, columns
 from support.kernels import images, kernel, run
 
 import sweep
-from sweep import ConfigError
 from sweep.kernels.adams import stretches
 from sweep.kernels.measures import noise
 from sweep.kernels.methods import automatic_step
@@ -21,7 +15,6 @@ from sweep.models.stiff import slip as stiff_slip
 from sweep.models.stiff.modes import _rocking
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
-Write = Callable[..., Path]
 
 # Time and number of the last reversal at b = 3, n0 = 0.05, in double-double arithmetic.
 LAST = {200.0: (9, 12914.14), 188.0: (9, 18719.15), 180.0: (9, 29032.53), 176.0: (9, 41315.4), 140.0: (7, 15880.39)}
@@ -89,14 +82,6 @@ def test_growth_is_that_of_the_model() -> None:
         np.testing.assert_allclose(fitted, rates.real.T, atol=0.03 * largest)
 
 
-def test_only_what_is_asked_for_is_measured(write: Write) -> None:
-    for method in ("adams", "dopri5"):
-        assert not set(noise.NoiseLimited().quantities) & set(kernel(method, measure=["reversals"]).layout.names)
-    assert "noise_limited" not in sweep.run(write(), measure=["reversals"])
-    with pytest.raises(ConfigError, match="measured with the reversals; add reversals"):
-        sweep.load_config(write(), {"measure": ["noise_limited"]})
-
-
 def test_the_dataset_flags_cells_limited_by_round_off(write: Write) -> None:
     for method, flags in (("dopri5", [1, 0]), ("adams", [0, 0])):
         text = f"friction: {{mu: [200, 60]}}\nintegrator: {{method: {method}, t_end: 13000}}\n"
@@ -105,12 +90,3 @@ def test_the_dataset_flags_cells_limited_by_round_off(write: Write) -> None:
         assert found.attrs["flag_meanings"] == "firm noise_limited"
         assert list(found.attrs["flag_values"]) == [0, 1]
         assert found.values.tolist() == flags
-
-
-def test_growth_coefficients_do_not_depend_on_other_cells() -> None:
-    """What a cell's rates are fitted with does not depend on its company."""
-    body = columns(n0=[0.01, 0.05, 0.1], mu=[60.0, 60.0, 200.0])
-    together = noise.growth_coefficients(body)
-    for i in range(3):
-        alone = noise.growth_coefficients({name: values[i : i + 1] for name, values in body.items()})
-        np.testing.assert_array_equal(alone[..., 0], together[..., i])

@@ -1,18 +1,12 @@
 """The times of the first K reversals: the measurement that proves the layout, from the kernel to the file."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
+from support import Write
 
 import sweep
 from sweep import ConfigError
-
-Write = Callable[..., Path]
 
 TEXT = """\
 name: times

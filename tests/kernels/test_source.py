@@ -1,7 +1,5 @@
 """A debugger stops in the equations, and the source of a kernel says what it is bound to."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Start-up of the stiff method, against dopri5 that resolves the layer throughout."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support import columns

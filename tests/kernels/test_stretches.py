@@ -1,7 +1,5 @@
 """Stretches without events: what the modes of a tiny rattle carry on is what steps would give."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

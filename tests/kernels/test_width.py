@@ -1,7 +1,5 @@
 """Loops over lanes are vectorised as widely as the CPU can, and the width changes no bit."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

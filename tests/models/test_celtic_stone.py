@@ -1,7 +1,5 @@
 """The Celtic stone of Borisov and Mamaev, against their equations in M and γ, and against what is known of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """Any body and any law of friction, against equations derived another way, and against limits that are known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any

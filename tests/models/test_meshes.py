@@ -1,7 +1,5 @@
 """Solids inside triangles: against the same shapes integrated in another way, in both kinds of STL files."""
 
-from __future__ import annotations
-
 import runpy
 from collections.abc import Callable
 from math import pi

@@ -1,7 +1,5 @@
 """Analytic and linear predictions against published numbers, other derivations and limits."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

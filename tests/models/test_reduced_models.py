@@ -1,16 +1,12 @@
 """The approximations of the full model: derivations, conserved quantities, limits, symmetry."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import columns
+from support import Write, columns
 from support.kernels import finish, images, kernel, spin
 
 import sweep
@@ -22,8 +18,6 @@ from sweep.models.ladder import averaged, effective
 from sweep.models.model import stack, take
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.rocking import slower_period
-
-Write = Callable[..., Path]
 
 small, quick = st.floats(-0.3, 0.3), st.floats(-0.5, 0.5)
 

@@ -1,8 +1,6 @@
 """The reversal time of Garcia and Hubbard: against eigenvalues, an integration of the three-variable equations, a
 limit, symmetries, and the cases in which there is none."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

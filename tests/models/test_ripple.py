@@ -1,7 +1,5 @@
 """The ripple-free spin against a numerical derivation, and on rattles that ripple."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The general equations beside those that SymPy derives by Kane's method."""
 
-from __future__ import annotations
-
 import runpy
 
 import pytest

@@ -1,7 +1,5 @@
 """The full model against a second derivation and its energy balance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

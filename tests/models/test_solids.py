@@ -1,7 +1,5 @@
 """Solids: their inertia against integrals over their volume, and errors against a sample of measurements."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Critical spins and stable ranges of a model, against growth rates, other codes and the limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Moving pictures of trajectories."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Maps of several datasets side by side."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

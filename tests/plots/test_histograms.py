@@ -1,7 +1,5 @@
 """Histograms of the cells, and lines of equal value over maps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where counts change between the cells of a map."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

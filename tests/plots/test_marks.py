@@ -1,7 +1,5 @@
 """Which kind each cell of a dataset is of, and the words for it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

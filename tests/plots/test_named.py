@@ -1,7 +1,5 @@
 """The pictures that a configuration names, which a run draws."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

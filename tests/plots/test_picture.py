@@ -1,7 +1,5 @@
 """What the pictures of a dataset contain, told by the artists of the figures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

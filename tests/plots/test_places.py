@@ -1,7 +1,5 @@
 """Where counts and symbols stand on the lines of a map."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

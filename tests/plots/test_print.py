@@ -1,7 +1,5 @@
 """Figures for print, in a style of the user's own, and in axes of the user's own."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What can be drawn of a dataset, and what it is about, is the same for pictures and the explorer; nothing is run."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

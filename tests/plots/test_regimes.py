@@ -1,7 +1,5 @@
 """Regimes of motion by their thresholds, and the first reversal beside its prediction; nothing is simulated."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The lines of theory over maps and curves, beside the formulas and eigenvalues of the bodies that they pass."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,14 +1,12 @@
 """The figures of single trajectories and of critical spins, and what is said of their files."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from support import Write
 from support.cli import invoke, refused
 from support.figures import constants, entries
 
@@ -16,7 +14,6 @@ from sweep.plots import picture
 from sweep.plots.panels import in_lines
 from sweep.results.dataset import VARIABLES
 
-Write = Callable[..., Path]
 SERIES = ("contact_x", "contact_y", "v0_rate_1", "slip_rate_1", "energy", "dissipated")
 CRITICAL = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
 

@@ -1,16 +1,13 @@
 """What a dataset holds: labels, units, where its numbers come from; and that it is written whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import stat
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import ROOT
+from support import ROOT, Write
 from support.runs import same_numbers
 
 import sweep
@@ -18,8 +15,6 @@ from sweep.results.dataset import STATUSES, VARIABLES
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
 from sweep.results.writing import replacing
-
-Write = Callable[..., Path]
 
 
 def test_dataset_is_labelled(small: xr.Dataset) -> None:

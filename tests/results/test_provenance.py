@@ -1,7 +1,5 @@
 """What decides the numbers of a run: every source that a run imports, and nothing that only asks for them or shows."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

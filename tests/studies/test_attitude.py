@@ -1,7 +1,5 @@
 """How the bodies of trajectories turn and travel over the table, beside an independent derivation and integrator."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

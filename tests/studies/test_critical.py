@@ -1,16 +1,12 @@
 """Critical spins: the eigenvalues against simulation, and n_c2 against runs."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import wide_bodies
+from support import Write, wide_bodies
 from support.cli import invoke
 from support.kernels import kernel
 
@@ -25,7 +21,6 @@ from sweep.results.dataset import REASONS
 from sweep.results.summary import describe
 from sweep.studies.critical import critical
 
-Write = Callable[..., Path]
 STANDARD = "name: standard\nfriction: {mu: 75}\nintegrator: {t_end: 12000}\n"
 NAMES = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
 

@@ -1,16 +1,12 @@
 """Films as phones and trackers write them, and what is wrong with others."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support import Write
 
 from sweep.config import ConfigError, film
-
-Write = Callable[..., Path]
 
 TIMES = np.arange(20) / 10
 SPINS = np.cos(TIMES)

@@ -1,8 +1,6 @@
 """Fits to films that another code has made, and their intervals."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, get_args
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
-from support import adaptive, columns, newton
+from support import Write, adaptive, columns, newton
 from support.cli import invoke
 
 import sweep
@@ -26,8 +24,6 @@ from sweep.models.model import stack, take
 from sweep.results.store import StoreError
 from sweep.studies.fit import _horizons
 from sweep.studies.misfit import Problem
-
-Write = Callable[..., Path]
 
 SCENE = "name: scene\nfriction: {mu: [30, 100]}\nstart: {n0: [0.03, 0.07], x0: 0.01, y0: 0.01}\n"
 STONE = """\

@@ -1,19 +1,15 @@
 """Sobol indices: of a function whose indices are published, by SciPy's own estimate, and by brute force of a scene."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy
+from support import Write
 from support.cli import invoke, refused
 
 import sweep
 from sweep.studies.indices import designed, sobol, with_intervals
-
-Write = Callable[..., Path]
 
 SCENE = """\
 name: scene

@@ -1,15 +1,12 @@
 """Laws of friction compared by films that another derivation has made."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
-from support import newton
+from support import Write, newton
 from support.cli import invoke
 
 import sweep
@@ -17,8 +14,6 @@ from sweep.config import ConfigError
 from sweep.grid import Grid
 from sweep.kernels.measures.misfit import Film
 from sweep.studies.laws import compare
-
-Write = Callable[..., Path]
 
 STONE = """\
 name: stone

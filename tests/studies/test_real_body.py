@@ -1,17 +1,11 @@
 """Critical spins of a real body: by the eigenvalues of the general equations, and by simulation with them."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support import Write
 
 import sweep
 from sweep.config import ConfigError
-
-Write = Callable[..., Path]
 
 STONE = """\
 units: SI

@@ -3,8 +3,6 @@
 Whatever happens, the same command goes on and finds the very same spins.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import signal

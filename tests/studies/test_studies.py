@@ -1,20 +1,17 @@
 """Single trajectories."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.interpolate import CubicSpline
+from support import Write
 
 import sweep
 from sweep import ConfigError
 from sweep.plots.trajectories import reversal_times
 
-Write = Callable[..., Path]
 STANDARD = "name: standard\nfriction: {mu: [60, 75]}\nintegrator: {t_end: 1500}\n"
 
 

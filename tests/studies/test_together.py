@@ -1,7 +1,5 @@
 """Searches side by side are answered in batches, end together where one was enough, and never wait for ever."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

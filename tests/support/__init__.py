@@ -1,13 +1,15 @@
 """What tests of several rooms share: the paper's standard case, a small sweep, kernels, commands, processes."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 ROOT = Path(__file__).parent.parent.parent
+
+Write = Callable[..., Path]
+"""The fixture `write`: writes a configuration, by default a sweep of twelve cells, and returns its path."""
 
 STANDARD = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 60.0, "n0": 0.05, "x0": 0.01, "y0": 0.01}
 """The standard case of Takano (2011)."""

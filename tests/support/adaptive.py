@@ -1,7 +1,5 @@
 """The slip model by SciPy's adaptive DOP853: another integrator, with steps and errors of its own."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

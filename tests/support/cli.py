@@ -1,7 +1,5 @@
 """The command line, called without a process of its own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from click.testing import CliRunner, Result

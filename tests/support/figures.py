@@ -1,7 +1,5 @@
 """What can be read in a figure, and a run to draw."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Nothing is solved by hand, and mass, gravity and couples enter as they are.  The laws are written as functions of |v|.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 

@@ -4,22 +4,15 @@ A fork server imports `warm` once; a command then starts within milliseconds, so
 killed in a minute.  They are processes of their own, with all the files, locks and signals of one.
 """
 
-from __future__ import annotations
-
 import ctypes
 import faulthandler
 import multiprocessing
 import os
-import resource
 import sys
-from collections.abc import Mapping
-from importlib import metadata
 from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
-
-import numba
 
 from sweep.cli import main
 from sweep.engine import executor, local
@@ -43,16 +36,12 @@ def command(
     arguments: list[str],
     log: Path,
     *,
-    room: int | None = None,
-    versions: Mapping[str, str] | None = None,
     unprivileged: bool = False,
 ) -> None:
     """Run `sweep ARGUMENTS`, its output in `log`, with many tiles, groups and checkpoints.
 
     Parameters
     ----------
-    room : bytes that a file may have
-    versions : of packages, in the place of the true ones
     unprivileged : bound by the permissions of files even as root
     """
     # A lock that numba makes would outlive a killed process, were it not of this method.
@@ -64,14 +53,8 @@ def command(
     executor.CHUNK_SECONDS = 0.004
     engine_run.tile_size = lambda cells: TILE  # noqa: ARG005
     local.BATCH = 2 * TILE
-    if versions:
-        true_version = metadata.version
-        metadata.version = lambda name: versions.get(name) or true_version(name)
-        numba.__version__ = versions.get("numba", numba.__version__)
     if unprivileged:
         _drop_capabilities()
-    if room is not None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
     main(arguments)
 
 

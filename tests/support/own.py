@@ -1,7 +1,5 @@
 """The files of `docs/how-to/bring-a-model.md`: a user's model, a law of friction, and their configurations."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

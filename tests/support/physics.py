@@ -1,7 +1,5 @@
 """Bodies of any shape and friction, as parameters and as a configuration."""
 
-from __future__ import annotations
-
 KANE_LEVINSON = {
     "a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 1.0, "gravity": 9.81,
     "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5,

@@ -1,7 +1,5 @@
 """Pictures beside those that the pages show."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import matplotlib.image as mpimg

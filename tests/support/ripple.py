@@ -1,7 +1,5 @@
 """The ripple-free spin found a second way: numerically, from a rolling body, in the eigenbasis of its rocking."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sweep.models.ladder import noslip

@@ -1,12 +1,13 @@
 """Runs that are interrupted, and whether two came to the same numbers."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
 import sweep
+from support import STANDARD
 from sweep.engine.reporter import Progress, Reporter
 
 
@@ -24,6 +25,13 @@ class Stop(Reporter):
 
     def note(self, message: str) -> None:
         self.notes.append(message)
+
+
+def run_cells(bodies: Iterable[Mapping[str, float]], output: Path | None = None, **settings: Any) -> xr.Dataset:
+    """A run of the standard case with some parameters replaced in each cell, along the dimension `case`."""
+    rows = [STANDARD | dict(body) for body in bodies]
+    config = {"name": "cells", "cases": {name: [row[name] for row in rows] for name in STANDARD}}
+    return sweep.run(config, output, **settings)
 
 
 def in_sittings(chunks: int, config: Path, output: Path) -> tuple[xr.Dataset, int, Stop]:

@@ -1,7 +1,5 @@
 """Whether two runs left the same files: byte for byte, but for what tells the time."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 
