@@ -81,7 +81,10 @@ def test_the_wackelstein_is_kuypers() -> None:
     assert int(found["reversals"][0]) == 1
 
 
-@pytest.mark.parametrize(("name", "reverses"), [("plastic_toy", 4.0), ("pebble", 4.0), ("wooden", -4.0)])
+@pytest.mark.parametrize(
+    ("name", "reverses"),
+    [("plastic_toy", 4.0), ("pebble", 4.0), pytest.param("wooden", -4.0, marks=pytest.mark.campaign)],
+)
 def test_which_way_a_body_reverses(name: str, reverses: float) -> None:
     fixed = {"sigma": 5e-6} if name == "wooden" else {"mu": 0.3}
     found = sweep.run(ROOT / "configs" / f"{name}.yaml", n0=[reverses, -reverses], t_end=6.0, **fixed)

@@ -171,7 +171,9 @@ ODD = (b"null", b"[]", b'"x"', b"{}", b'{"config": 1}', b"[" * 100_000, b"9" * 5
 """Files of JSON, or nearly, that are no identities."""
 
 
-@pytest.mark.parametrize("how", [*(name for name in DAMAGES if name not in ("removed", "another's")), *ODD], ids=repr)
+@pytest.mark.parametrize(
+    "how", [*(name for name in DAMAGES if name not in ("removed", "another's")), *ODD], ids=lambda how: str(how)[:20]
+)
 def test_a_damaged_identity_is_refused(config: Path, out: Path, how: str | bytes) -> None:
     file = out / "small.checkpoint" / "identity.json"
     file.write_bytes(how) if isinstance(how, bytes) else DAMAGES[how](file)

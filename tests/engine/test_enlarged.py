@@ -1,8 +1,5 @@
 """A run that has grown simulates only what is missing, and ends with the dataset of a run of all cells at once."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +7,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from support import ROOT
+from support import ROOT, Write
 from support.runs import Stop, same_numbers
 
 import sweep
@@ -19,19 +16,13 @@ from sweep.engine.enlarged import reason_against, taken_over
 from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
 from sweep.results.provenance import identify
 
-Write = Callable[..., Path]
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 BODY = "name: small\nbody: {a: 10.0, b: [2.0, 3.0, 5.0], delta: 0.03}\n"
 ONE = BODY + "friction: {mu: [40, 60]}\nstart: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}\nintegrator: {t_end: 3000}\n"
 MORE = ONE.replace("[2.0, 3.0, 5.0]", "[1.5, 2.0, 3.0, 5.0]").replace("[40, 60]", "[40, 50, 60]")
 LATER = MORE.replace("3000", "6000")
 CASES = BODY.replace("b: [2.0, 3.0, 5.0], ", "") + "cases: cases.csv\nstart: {x0: 0.01, y0: 0.01}\n"
-
-
-@pytest.fixture(autouse=True)
-def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They take longer to draw than these runs."""
-    monkeypatch.setattr("sweep.engine.run._draw", lambda *_: None)
 
 
 def grown(write: Write, output: Path, *texts: str, **options: Any) -> tuple[xr.Dataset, list[str]]:
@@ -54,11 +45,14 @@ def test_a_grown_run_is_the_run_of_all_at_once(write: Write, tmp_path: Path, tex
     same_numbers(found, sweep.run(write(text)))
 
 
+MEASURED = "measure: [reversals, {reversal_times: 3}]\n"
+
+
 def test_a_run_grows_whose_measurement_has_a_setting(write: Write, tmp_path: Path) -> None:
-    measure = "measure: [reversals, {reversal_times: 3}]\n"
-    found, (note,) = grown(write, tmp_path / "out", ONE + measure, MORE + measure)
+    first, more = (text.replace("{t_end", "{method: dopri5, t_end") + MEASURED for text in (ONE, MORE))
+    found, (note,) = grown(write, tmp_path / "out", first, more)
     assert note.startswith("12 of 24 cells are taken over")
-    same_numbers(found, sweep.run(write(MORE + measure)))
+    same_numbers(found, sweep.run(write(more)))
 
 
 def test_a_single_cell_runs_on(write: Write, tmp_path: Path) -> None:
@@ -213,7 +207,8 @@ def test_a_scene_does_not_grow_into_another(write: Write, tmp_path: Path) -> Non
 
 
 def test_a_further_measurement_needs_all_cells(write: Write, tmp_path: Path) -> None:
-    fewer, more = (ONE + f"measure: [reversals{more}]\n" for more in ("", ", first_reversal"))
+    text = ONE.replace("{t_end", "{method: dopri5, t_end")
+    fewer, more = (text + f"measure: [reversals{more}]\n" for more in ("", ", first_reversal"))
     found, (note,) = grown(write, tmp_path / "out", fewer, more)
     assert note.startswith("0 of 12 cells are taken over")
     same_numbers(found, sweep.run(write(more)))

@@ -1,25 +1,18 @@
 """The estimated errors of spins, beside true ones, and the repeats that they cause."""
 
-from __future__ import annotations
-
 import csv
-from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
-from typing import Any
+from functools import partial
 
 import numpy as np
 import pytest
-import xarray as xr
 from support import ROOT, STANDARD
-from support.runs import same_numbers
+from support.kernels import default_measures
+from support.runs import run_cells, same_numbers
 
-import sweep
 from sweep.engine import errors
 from sweep.kernels import methods
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.status import TIME_LIMIT
-
-Cells = Callable[..., xr.Dataset]
 
 BODY = {"b": 2.8, "mu": 100.0, "n0": 0.02}
 
@@ -48,17 +41,7 @@ SPINS = np.array(
 """Spins of `BODY` and `WIDE` at t = 400, by SciPy's DOP853: `support.adaptive.spin`, half a minute of work."""
 
 
-@pytest.fixture
-def cells(tmp_path: Path) -> Cells:
-    """Runs cells given by their parameters to t = 400, along the dimension `case`."""
-
-    def run(bodies: Iterable[Mapping[str, float]], **settings: Any) -> xr.Dataset:
-        rows = [",".join(STANDARD), *(",".join(map(repr, (STANDARD | dict(body)).values())) for body in bodies)]
-        (tmp_path / "cells.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
-        (tmp_path / "cells.yaml").write_text("name: cells\ncases: cells.csv\n", encoding="utf-8")
-        return sweep.run(tmp_path / "cells.yaml", **{"t_end": 400.0, "stop_when_settled": False, **settings})
-
-    return run
+cells = partial(run_cells, t_end=400.0, stop_when_settled=False)
 
 
 @pytest.fixture
@@ -69,7 +52,7 @@ def long_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(("method", "step"), [("dopri5", 0.01), ("adams", 0.05)])
-def test_estimates_are_near_true_errors(cells: Cells, method: str, step: float) -> None:
+def test_estimates_are_near_true_errors(method: str, step: float) -> None:
     found = cells([BODY, *WIDE], method=method, step=step)
     ratio = found.spin_error.values / np.abs(found.spin_final.values - SPINS)
     assert np.all((ratio > 0.1) & (ratio < 20)), ratio
@@ -77,9 +60,9 @@ def test_estimates_are_near_true_errors(cells: Cells, method: str, step: float) 
 
 
 @pytest.mark.usefixtures("long_steps")
-def test_a_missed_tolerance_is_repeated(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is measured."""
-    for measure in (["reversals", "energy_error"], ["reversals"]):
+    for measure in (default_measures("slip"), ["reversals"]):
         repeated = cells([BODY], method="adams", measure=measure)
         assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8
         assert float(repeated.spin_error[0]) < 1e-8
@@ -91,7 +74,7 @@ def test_a_missed_tolerance_is_repeated(cells: Cells, monkeypatch: pytest.Monkey
     assert int(once.step_rule[0]) == MISSED
 
 
-def test_spins_alike_by_chance_are_not_believed(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_spins_alike_by_chance_are_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Here run and companion are both off by 7e-5, and their spins differ by 1e-7."""
     body = {"a": 10.3419, "b": 1.03272, "c": 0.75863, "delta": 0.201271}
     start = {"mu": 31.895, "n0": 0.123607, "x0": 0.683495, "y0": 0.00321463}
@@ -103,14 +86,14 @@ def test_spins_alike_by_chance_are_not_believed(cells: Cells, monkeypatch: pytes
     assert abs(float(cells([body | start], method="adams", tolerance=1e-6).spin_final[0]) - true) > 1e-5
 
 
-def test_what_nobody_asked_for_is_not_run(cells: Cells, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_nobody_asked_for_is_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(errors, "companions", None)
     found = cells([BODY], method="adams", estimate_errors=False)
     assert not {"spin_error", "sensitive"} & set(found)
     assert int(found.status[0]) == TIME_LIMIT
 
 
-def test_a_chaotic_cell_says_so(cells: Cells) -> None:
+def test_a_chaotic_cell_says_so() -> None:
     """It would count otherwise from another start, and no step is short enough for it."""
     found = cells([CHAOTIC, BODY], t_end=10_000)
     assert found.step_rule.values[0] == MISSED
@@ -118,7 +101,7 @@ def test_a_chaotic_cell_says_so(cells: Cells) -> None:
     assert found.sensitive.values.tolist() == [1, 0]
 
 
-def test_a_cell_alone_has_the_same_error(cells: Cells) -> None:
+def test_a_cell_alone_has_the_same_error() -> None:
     bodies = [BODY, CHAOTIC, WIDE[0]]
     together = cells(bodies)
     for i, body in enumerate(bodies):
@@ -127,7 +110,7 @@ def test_a_cell_alone_has_the_same_error(cells: Cells) -> None:
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
-def test_wide_cells_keep_the_tolerance_or_say_so(cells: Cells, tolerance: float) -> None:
+def test_wide_cells_keep_the_tolerance_or_say_so(tolerance: float) -> None:
     with (ROOT / "data" / "reference_wide.csv").open(encoding="utf-8") as table:
         rows = [row for row in csv.DictReader(table) if row["end"] == "time_limit"]
     found = cells([{name: float(row[name]) for name in STANDARD} for row in rows], method="adams", tolerance=tolerance)

@@ -1,26 +1,18 @@
 """Cells run until their counts are final, if no end of the time is given."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
-from support import ROOT
+from support import ROOT, Write
 from support.runs import in_sittings, same_numbers
 
 import sweep
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 
-Write = Callable[..., Path]
-
 SCENE = """\
 cases: cells.csv
 body: {a: 10.0, delta: 0.03}
 start: {n0: 0.05, x0: 0.01, y0: 0.01}
-measure: [reversals, margin, energy_error]
 """
 CELLS = "mu,b\n106.09,2.322\n130,9.8\n75,3\n"
 """The first reverses once more after t = 30 000, the second is nearly round, the third settles early."""
@@ -44,9 +36,10 @@ def test_a_cell_goes_on_if_a_reversal_can_be_foreseen(run: xr.Dataset, write: Wr
 
 def test_to_have_paused_changes_no_count(run: xr.Dataset, write: Write) -> None:
     """The time of the late reversal is not firm: its rattle grows from round-off."""
-    whole = sweep.run(write(SCENE), t_end=1e6, method="adams")
-    np.testing.assert_array_equal(run.reversals[[0, 2]], whole.reversals[[0, 2]])
-    np.testing.assert_allclose(run.margin_more[[0, 2]], whole.margin_more[[0, 2]], rtol=1e-4)
+    write(CELLS.replace("130,9.8\n", ""), "cells.csv")
+    whole = sweep.run(write(SCENE), t_end=1e6, method="adams", estimate_errors=False)
+    np.testing.assert_array_equal(run.reversals[[0, 2]], whole.reversals)
+    np.testing.assert_allclose(run.margin_more[[0, 2]], whole.margin_more, rtol=1e-4)
 
 
 @pytest.mark.usefixtures("short_chunks")

@@ -1,13 +1,11 @@
 """Sweeps in which some bodies cannot be: their cells have a status, cost nothing and harm no neighbour."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from support import Write
 from support.runs import Stop, same_numbers
 
 import sweep
@@ -20,7 +18,7 @@ from sweep.kernels.status import IMPOSSIBLE
 from sweep.plots.marks import blank, legend, marks
 from sweep.results.summary import failed_fraction, summarize
 
-Write = Callable[..., Path]
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 TEXT = """\
 name: edge
@@ -32,11 +30,6 @@ integrator: {t_end: 300}
 """With b = 0.9 and offset = 0 the body falls over; with offset = 1 the centre of mass lies on the surface."""
 
 GONE = np.array([[True, False, True], [False, False, True], [False, False, True]])
-
-
-@pytest.fixture(autouse=True)
-def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.engine.run._draw", lambda *_: None)
 
 
 @pytest.fixture

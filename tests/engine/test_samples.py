@@ -1,8 +1,5 @@
 """Samples of distributions: drawn as SciPy's quantiles say, run as cases, counted as probabilities."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from scipy import stats
+from support import Write
 from support.cli import invoke, refused
 from support.runs import Stop, same_numbers
 
@@ -23,8 +21,6 @@ from sweep.grid import CASE, SAMPLE, Grid
 from sweep.kernels.status import LIFT_OFF, SETTLED
 from sweep.parameters import START
 from sweep.results.probabilities import interval, probabilities
-
-Write = Callable[..., Path]
 
 SCENE = """\
 name: finger
@@ -112,8 +108,8 @@ def test_intervals_of_random_samples_hold_as_often_as_they_say() -> None:
     assert ((low <= 0.3) & (high >= 0.3)).mean() == pytest.approx(0.95, abs=0.02)
 
 
-def test_more_samples_take_over_the_fewer(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.engine.run._draw", lambda *_: None)
+@pytest.mark.usefixtures("no_pictures")
+def test_more_samples_take_over_the_fewer(write: Write, tmp_path: Path) -> None:
     more, reporter = SCENE.replace("32", "48"), Stop(10**6)
     sweep.run(write(SCENE), tmp_path)
     found = sweep.run(write(more), tmp_path, reporter=reporter)

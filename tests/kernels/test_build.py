@@ -1,18 +1,16 @@
 """Kernels are compiled in processes of their own, side by side, and only what the cache lacks."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from support import ROOT
+from support import ROOT, Write
 from support.kernels import kernel, threads
 
 import sweep
@@ -21,7 +19,6 @@ from sweep.jit import Cached, showing
 from sweep.kernels import build as builder
 from sweep.kernels.build import build
 
-Write = Callable[..., Path]
 AUTO = "body: {b: [2, 3]}\nfriction: {mu: [1, 1000]}\nintegrator: {method: auto, t_end: 10}\nname: auto\n"
 """Its cells need both methods."""
 
@@ -141,7 +138,7 @@ def test_processes_end_with_the_one_that_started_them(
     assert told[1:] == ["interrupted: no cells finished and kept; the same command resumes the run"][: len(told) - 1]
 
 
-@pytest.mark.parametrize("folder", ["a file in its place", "none at all"])
+@pytest.mark.parametrize("folder", ["none at all", pytest.param("a file in its place", marks=pytest.mark.campaign)])
 def test_without_a_cache_a_run_compiles_for_itself(folder: str, write: Write, tmp_path: Path) -> None:
     """The averaged model: its kernel compiles fastest."""
     (tmp_path / "cache").write_text("", encoding="utf-8")

@@ -1,7 +1,5 @@
 """The margins of counts, and what is made of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -13,7 +11,6 @@ SCENE = {
     "body": {"a": 10.0, "b": 3.0, "delta": 0.03},
     "friction": {"mu": 82.0},
     "start": {"n0": 0.05, "x0": 0.01, "y0": 0.01},
-    "measure": ["reversals", "energy_error", "margin"],
     "integrator": {"t_end": 20_000.0},
 }
 """The fourth reversal begins near mu = 82.3."""

@@ -4,8 +4,6 @@ A kernel takes from five seconds (dopri5) to forty (adams) to compile.  So tests
 default unless they are about another set, and take their kernels from here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -19,7 +17,7 @@ from sweep.kernels import measures
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import make_kernel
-from sweep.models import MODELS
+from sweep.models import MODELS, find
 from sweep.models.theory import stability
 
 
@@ -27,11 +25,11 @@ def kernel(
     method: str = "dopri5", model: str = "slip", measure: Iterable[str] | None = None, tolerance: float = TOLERANCE
 ) -> Kernel:
     """The kernel of a run with these settings; by default, with the measurements that a run takes by default."""
-    return make_kernel(method, MODELS[model], default_measures(model) if measure is None else measure, tolerance)
+    return make_kernel(method, find(model), default_measures(model) if measure is None else measure, tolerance)
 
 
 def default_measures(model: str) -> tuple[str, ...]:
-    return measures.default(MODELS[model])
+    return measures.default(find(model))
 
 
 def images(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **parameters: Any) -> np.ndarray:
