@@ -1,7 +1,5 @@
 """Each change of the table in `docs/explanation/layout.md` is made, in a copy of the package, in the files it names."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -97,8 +95,23 @@ assert other["t_twin"].attrs["long_name"].count("once more")
         {},
         {"sweep/kernels/tableau.py": [("TABLEAUS = (DOPRI5,)", RK4)]},
         f"""
-one, other = (sweep.run({SCENE}, method=method, step=0.05)["spin_final"].item() for method in ("dopri5", "rk4"))
-assert 0 < abs(one - other) < 1e-6, (one, other)
+import numpy as np
+from sweep.bench.section import colour, marker
+from sweep.results.dataset import VARIABLES
+
+def run(**settings):
+    found = sweep.run({SCENE}, mu=20.0, n0=0.1, t_end=400, measure=[], stop_when_settled=False, **settings)
+    return float(found.spin_final), float(found.step)
+
+exact, _ = run(method="dopri5", step=0.02)
+errors = [abs(run(method="rk4", step=step)[0] - exact) for step in (0.8, 0.4, 0.2)]
+assert np.allclose(np.diff(np.log2(errors)), -4, atol=0.1), errors
+(loose, long), (tight, short) = (run(method="rk4", tolerance=tolerance) for tolerance in (1e-6, 1e-10))
+assert abs(loose - exact) < 1e-6
+assert abs(tight - exact) < 1e-10
+assert abs(long / short - 10) < 0.2  # the fourth root of the ratio of the tolerances
+assert VARIABLES["method"].flags[9] == "rk4"
+assert colour("rk4") and marker("rk4")
 """,
     ),
     "a model": Change(

@@ -48,11 +48,8 @@ class Runs:
         """A process that runs it."""
         asked = ["run", str(self.config), "--output", str(self.out), *arguments]
         log = self.out.parent / f"{self.out.name}.log{len(self.started)}"
-        process = nursery.context().Process(target=nursery.command, args=(asked, log), kwargs=settings)
-        process.start()
-        process.log = log
-        self.started.append(process)
-        return process
+        self.started.append(nursery.start(asked, log, **settings))
+        return self.started[-1]
 
     def finish(self, *arguments: str, **settings: Any) -> tuple[int, str]:
         """Exit code and output of a process that runs it."""

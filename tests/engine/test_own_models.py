@@ -16,7 +16,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from support import ROOT, newton, nursery, own
 from support.own import FADING, PENDULUM
-from support.runs import same_numbers
+from support.runs import Stop, same_numbers
 from support.same import contents
 
 import sweep
@@ -85,9 +85,7 @@ def test_pictures_and_summaries_take_its_words(folder: Path) -> None:
 
 def strike(config: Path, out: Path, moment: str) -> bool:
     """Start the command, and kill it at a moment; False if it ended before."""
-    log = out.parent / f"{out.name}.log"
-    process = nursery.context().Process(target=nursery.command, args=(["run", str(config), "--output", str(out)], log))
-    process.start()
+    process = nursery.start(["run", str(config), "--output", str(out)], out.parent / f"{out.name}.log")
     images = out / "tippe_top.checkpoint" / "running.npz"
     left = images.stat().st_mtime_ns if images.exists() else 0
 
@@ -102,7 +100,7 @@ def strike(config: Path, out: Path, moment: str) -> bool:
         os.kill(process.pid, signal.SIGKILL)
     process.join(120)
     killed = process.exitcode == -signal.SIGKILL
-    assert killed or process.exitcode == 0, log.read_text(encoding="utf-8")
+    assert killed or process.exitcode == 0, process.log.read_text(encoding="utf-8")
     process.close()
     return killed
 
@@ -139,20 +137,12 @@ def test_another_file_goes_on_with_nothing(folder: Path, more: dict[str, Any]) -
 def test_a_larger_run_of_the_same_file_takes_its_cells_over(few: xr.Dataset, folder: Path) -> None:
     (folder / "moved").mkdir()
     (folder / "pendulum.py").rename(folder / "moved" / "same.py")
-    notes = Notes()
+    reporter = Stop(10**9)
     more = FEW | {"torque": [0.5, 1.0, 1.2, 1.4, 1.5]}
-    larger = sweep.run(folder / "pendulum.yaml", folder, model="moved/same.py", reporter=notes, **more)
-    assert any(note.startswith("12 of 15 cells are taken over") for note in notes.said)
-    assert notes.said[0].startswith("running the code of ")
+    larger = sweep.run(folder / "pendulum.yaml", folder, model="moved/same.py", reporter=reporter, **more)
+    assert any(note.startswith("12 of 15 cells are taken over") for note in reporter.notes)
+    assert reporter.notes[0].startswith("running the code of ")
     same_numbers(larger.sel(torque=few["torque"]), few)
-
-
-class Notes(sweep.engine.reporter.Reporter):  # type: ignore[name-defined]
-    def __init__(self) -> None:
-        self.said = list[str]()
-
-    def note(self, message: str) -> None:
-        self.said.append(message)
 
 
 def test_kernels_depend_on_what_the_file_says_not_on_where_it_lies(folder: Path) -> None:

@@ -1,26 +1,24 @@
 """What holds for both methods: the same bits in any company, exact rest and scale, tolerances, vector instructions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import pytest
 from support import columns
-from support.kernels import finish, images, kernel, run, spin, threads
+from support.kernels import finish, images, run, spin, threads
+from support.kernels import kernel as make
 
-from sweep.kernels import measures
 from sweep.kernels.adams import start_up
 from sweep.kernels.adams.step import HISTORY, names
 from sweep.kernels.codegen import compile_lanes
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES
-from sweep.kernels.methods import METHODS, automatic_step, make_kernel
+from sweep.kernels.methods import METHODS, automatic_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
-from sweep.models import MODELS, find
+from sweep.models import MODELS
 from sweep.models.stiff.slip import PAPER_FORM
 
-KERNELS = {method: kernel(method) for method in METHODS}
+KERNELS = {method: make(method) for method in METHODS}
 each_method = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 
 FLYING = np.arange(45) % 5 == 3
@@ -166,7 +164,7 @@ def assembly(function: Any, *arguments: Any) -> str:
                            for model in ("slip", "slip+viscous+sigma"))],
 )  # fmt: skip
 def test_the_loop_over_lanes_is_vector_instructions(method: str, model: str) -> None:
-    made: Any = make_kernel(method, find(model), measures.default(find(model)))
+    made: Any = make(method, model)
     found = assembly(made._make_run_block(), np.zeros(len(made.layout.names) * LANES))
     # Twelve square roots and divisions a step of dopri5; the stiff method has a scalar loop as well, for a history that
     # overlaps the group, which it never does.

@@ -1,18 +1,11 @@
 """A tableau refuses any mistyped entry, knows its own stability, and is all that another method needs."""
 
-from __future__ import annotations
-
-import json
-import subprocess
-import sys
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
 import pytest
 from scipy.integrate import RK45
-from support import ROOT
 
 from sweep.kernels.methods import METHODS
 from sweep.kernels.tableau import DOPRI5, trees
@@ -48,51 +41,6 @@ def shifted(row: tuple[Fraction, ...], *changes: int) -> tuple[Fraction, ...]:
 def test_refuses_a_wrong_entry(wrong: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         replace(DOPRI5, **wrong)
-
-
-ANOTHER = """
-import json
-from fractions import Fraction as F
-from sweep.kernels import tableau
-tableau.TABLEAUS += (tableau.Tableau(
-    name="rk4", code=2, summary="the classical formula", order=4,
-    a=((F(1, 2),), (F(0), F(1, 2)), (F(0), F(0), F(1))),
-    b=(F(1, 6), F(1, 3), F(1, 3), F(1, 6)), c=(F(0), F(1, 2), F(1, 2), F(1)),
-    real_stability=2.7853, phase=0.3, layer_error=0.1),)
-
-import sweep
-from sweep.bench.section import colour, marker
-from sweep.kernels.methods import METHODS
-from sweep.results.dataset import VARIABLES
-
-scene = {"model": "averaged", "friction": {"mu": 20}, "start": {"n0": 0.1}, "measure": []}
-def run(**settings):
-    found = sweep.run(scene, t_end=400, stop_when_settled=False, **settings)
-    return float(found.spin_final), float(found.step)
-exact, _ = run(method="dopri5", step=0.02)
-print(json.dumps({
-    "errors": [abs(run(method="rk4", step=step)[0] - exact) for step in (0.8, 0.4, 0.2)],
-    "automatic": [run(method="rk4", tolerance=tolerance) for tolerance in (1e-6, 1e-10)],
-    "exact": exact,
-    "codes": VARIABLES["method"].flags,
-    "drawn": [colour("rk4"), marker("rk4")],
-    "known": [*METHODS],
-}))
-"""
-
-
-def test_another_method_is_one_record() -> None:
-    """It runs, converges at its order and keeps the tolerance; configuration, datasets and bench know it."""
-    done = subprocess.run([sys.executable, "-c", ANOTHER], cwd=ROOT, capture_output=True, text=True, check=True)
-    found = json.loads(done.stdout)
-    assert np.diff(np.log2(found["errors"])) == pytest.approx(-4, abs=0.1)
-    (loose, long), (tight, short) = found["automatic"]
-    assert abs(loose - found["exact"]) < 1e-6
-    assert abs(tight - found["exact"]) < 1e-10
-    assert long / short == pytest.approx(10, rel=0.02)  # the fourth root of the ratio of the tolerances
-    assert found["codes"] == {"0": "dopri5", "1": "adams", "2": "rk4"}
-    assert "rk4" in found["known"]
-    assert all(found["drawn"])
 
 
 def test_the_codes_of_methods_are_those_of_old_datasets() -> None:

@@ -47,12 +47,8 @@ def start(config: Path, tmp_path: Path) -> Iterator[Callable[..., Any]]:
 
     def start_process(verb: str, *arguments: str) -> Any:
         asked = [verb, str(config), *arguments, "--output", str(tmp_path / "out")]
-        log = tmp_path / f"log{len(started)}"
-        process = nursery.context().Process(target=nursery.command, args=(asked, log))
-        process.start()
-        process.log = log
-        started.append(process)
-        return process
+        started.append(nursery.start(asked, tmp_path / f"log{len(started)}"))
+        return started[-1]
 
     yield start_process
     for process in started:

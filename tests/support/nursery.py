@@ -32,6 +32,14 @@ def context() -> Any:
     return started
 
 
+def start(arguments: list[str], log: Path, **settings: Any) -> Any:
+    """A process of `command`, which knows its `log`."""
+    process = context().Process(target=command, args=(arguments, log), kwargs=settings)
+    process.start()
+    process.log = log
+    return process
+
+
 def command(
     arguments: list[str],
     log: Path,
