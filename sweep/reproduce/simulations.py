@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from scipy.ndimage import median_filter
 
-from sweep.config import Config, Integrator, Values
+from sweep.config import Config, load_config
 from sweep.engine.run import run
-from sweep.grid import Array
 from sweep.kernels.measures import possible
 from sweep.models import MODELS, TIERS
 from sweep.models.ladder import analytic
-from sweep.parameters import PARAMETERS
 from sweep.plots.trajectories import draw_spin
 from sweep.report.direct import standard
 from sweep.report.rows import Section, against, states
@@ -23,24 +22,25 @@ from sweep.reproduce.rows import against_paper
 from sweep.studies.trajectory import trajectory
 
 
-def configure(model: str = "slip", t_end: float = 30_000.0, measure: Any = ("reversals",), **parameters: Any) -> Config:
-    """The paper's standard case at μ = 60 with some parameters replaced; arrays are axes."""
-    values = {name: p.default for name, p in PARAMETERS.items() if name in TIERS[model].parameters}
-    if "mu" in values:
-        values["mu"] = 60.0
-    chosen = {}
-    for name, value in (values | {n: v for n, v in parameters.items() if n in values}).items():
-        numbers = tuple(np.atleast_1d(np.asarray(value, float)).tolist())
-        chosen[name] = Values(numbers, np.ndim(value) > 0, list(numbers))
-    order = sorted(chosen, key=lambda n: ("mu", "b", "n0").index(n) if n in ("mu", "b", "n0") else 3)
-    return Config(
-        name="reproduce",
-        model=model,
-        parameters={n: chosen[n] for n in order},
-        integrator=Integrator(t_end=t_end),
-        measure=tuple(m for m in measure if m in possible(TIERS[model])),
-        max_failed_fraction=1.0,
-    )
+def configure(
+    model: str = "slip", t_end: float = 30_000.0, measure: Sequence[str] = ("reversals",), **parameters: Any
+) -> Config:
+    """The paper's standard case at μ = 60 with those parameters replaced that the model has; arrays are axes."""
+    tier = TIERS[model]
+    settings = {
+        "name": "reproduce",
+        "model": model,
+        "friction": {"mu": 60.0},
+        "integrator": {"t_end": t_end},
+        "measure": [name for name in measure if name in possible(tier)],
+        "verify": 0.0,
+        "max_failed_fraction": 1.0,
+    }
+    return load_config(settings, {name: values for name, values in parameters.items() if name in tier.parameters})
+
+
+def _figure(width: float, height: float) -> Figure:
+    return Figure(figsize=(width, height), dpi=100, layout="constrained")
 
 
 def slip_ratio() -> Section:
@@ -48,17 +48,14 @@ def slip_ratio() -> Section:
     both = trajectory(configure(t_end=400.0), mu=[100, 200])
     section = Section("Is dv_p/dt small compared with dv_0/dt?")
     for i, mu in enumerate((100, 200)):
-        figure = Figure(figsize=(8, 3), dpi=100, layout="constrained")
+        figure = _figure(8, 3)
         for axes, component in zip(figure.subplots(1, 2), (1, 2), strict=True):
             # Starting without slip makes it jump once; the figures show the amplitudes after that.
             late = both.isel(trajectory=i, time=both["time"].values > 1.0)
             v0, vp = late[f"v0_rate_{component}"], late[f"slip_rate_{component}"]
             ratio = float(np.sqrt((vp**2).mean() / (v0**2).mean()))
-            section.rows.append(
-                against_paper(
-                    f"slip_ratio_{mu}", f"amplitude (rms) of v̇_p{component} over v̇_0{component}, μ = {mu}", ratio
-                )
-            )
+            what = f"amplitude (rms) of v̇_p{component} over v̇_0{component}, μ = {mu}"
+            section.rows.append(against_paper(f"slip_ratio_{mu}", what, ratio))
             axes.plot(late["time"], v0, linewidth=0.5, label=f"v̇_0{component}")
             axes.plot(late["time"], vp, linewidth=0.5, label=f"v̇_p{component}")
             axes.legend(fontsize=7)
@@ -70,7 +67,7 @@ def slip_ratio() -> Section:
 def critical_spins() -> Section:
     """Fig. nc21pm: below n_c1 the rattle decays, above n_c2 the spin reverses."""
     section = Section("Spins below, between and above the critical ones, μ = 75")
-    figure = Figure(figsize=(8, 6.5), dpi=100, layout="constrained")
+    figure = _figure(8, 6.5)
     for axes, starts in zip(figure.subplots(2, 1), ((0.0015, 0.003, 0.005), (-0.006, -0.015, -0.025)), strict=True):
         three = trajectory(configure(measure=("reversals", "energy_error"), t_end=8000.0), mu=75, n0=starts, every=2.0)
         draw_spin(axes, three)
@@ -79,15 +76,8 @@ def critical_spins() -> Section:
             rattle = one["energy"] - 0.5 * 21.8 * one["spin"] ** 2
             early, peak = float(rattle[:40].mean()), float(rattle[40:].max())
             found = (peak > 3 * early, int(one["reversals"]) > 0)
-            section.rows.append(
-                states(
-                    f"n0 = {n0:g}",
-                    "nc21pm",
-                    _behaviour(grows, reverses),
-                    _behaviour(*found),
-                    found == (grows, reverses),
-                )
-            )
+            words = _behaviour(grows, reverses), _behaviour(*found)
+            section.rows.append(states(f"n0 = {n0:g}", "nc21pm", *words, found == (grows, reverses)))
     section.figures.append(("nc21pm: (a) positive, (b) negative start spin", figure))
     return section
 
@@ -99,7 +89,7 @@ def _behaviour(grows: bool, reverses: bool) -> str:
 def friction() -> Section:
     """Fig. mu601000: counts at three frictions, and the approach to rolling."""
     section = Section("From three reversals to rolling")
-    figure = Figure(figsize=(8, 6.5), dpi=100, layout="constrained")
+    figure = _figure(8, 6.5)
     top, bottom = figure.subplots(2, 1)
     three = trajectory(configure(), mu=[60, 130, 200], every=3.0)
     draw_spin(top, three.sel(time=slice(0, 6000)), critical=False)
@@ -113,15 +103,8 @@ def friction() -> Section:
     distance = [_distance(rough.isel(trajectory=i), rolling.isel(trajectory=0), 400.0) for i in range(3)]
     closer = distance[0] > distance[1] > distance[2]
     found = ", ".join(f"{d:.2g}" for d in distance)
-    section.rows.append(
-        states(
-            "largest difference from no-slip, t < 400, μ = 500, 1000, 1500",
-            "mu601000 (b)",
-            "falls with μ",
-            found,
-            closer,
-        )
-    )
+    what = "largest difference from no-slip, t < 400, μ = 500, 1000, 1500"
+    section.rows.append(states(what, "mu601000 (b)", "falls with μ", found, closer))
     tail = three["spin"][0].sel(time=slice(5700, 6000)).values
     found = f"relative variation of {np.ptp(tail) / abs(tail[-1]):.1g} over 5700 < t < 6000"
     constant = bool(np.ptp(tail) < 1e-3 * abs(tail[-1]))
@@ -132,42 +115,32 @@ def friction() -> Section:
 
 def _distance(one: xr.Dataset, other: xr.Dataset, until: float) -> float:
     times = np.arange(0, until, 0.25)
-    spins = [
-        np.interp(times, d["time"], d["spin"]) for d in (each.dropna("time", subset=["spin"]) for each in (one, other))
-    ]
-    return float(np.abs(spins[0] - spins[1]).max())
+    ours, theirs = (each["spin"].dropna("time").interp(time=times) for each in (one, other))
+    return float(np.abs(ours - theirs).max())
 
 
 def count_against_friction() -> Section:
     """Fig. nrvsmu: predicted and simulated reversals against μ."""
     maps = run(configure(mu=np.arange(20, 201, 2.0)))
-    ours, theirs, mu = (
-        maps["reversals"].values.astype(int),
-        maps["reversals_predicted"].values.astype(int),
-        maps["mu"].values,
-    )
+    ours, theirs = (maps[name].values.astype(int) for name in ("reversals", "reversals_predicted"))
+    mu = maps["mu"].values
     apart = np.flatnonzero(np.abs(ours - theirs) > 1)
     limit = float(mu[apart[0] - 1]) if len(apart) else float(mu[-1])
     rough = mu > 70
     larger = float((theirs >= ours)[rough].mean())
     low, high = (float((ours == theirs)[part].mean()) for part in (~rough, rough))
-    figure = Figure(figsize=(7, 3.6), dpi=100, layout="constrained")
+    figure = _figure(7, 3.6)
     axes = figure.subplots()
     axes.plot(mu, theirs, "s", fillstyle="none", label="n_r:ap, predicted")
     axes.plot(mu, ours, "x", label="n_r:ex, simulated")
     axes.set(xlabel="μ", ylabel="n_r")
     axes.legend()
     section = Section("Reversals against friction", figures=[("nrvsmu", figure)])
+    remark = f"equal in {low:.0%} of the cells up to μ = 70, in {high:.0%} beyond"
+    share = f"in {larger:.0%} of the cells"
     section.rows = [
-        against_paper(
-            "agree_up_to",
-            "counts agree within one up to μ =",
-            limit,
-            f"equal in {low:.0%} of the cells up to μ = 70, in {high:.0%} beyond",
-        ),
-        states(
-            "beyond μ = 70, n_ap >= n_ex", "nrvsmu", "n_ap is larger", f"in {larger:.0%} of the cells", larger > 0.95
-        ),
+        against_paper("agree_up_to", "counts agree within one up to μ =", limit, remark),
+        states("beyond μ = 70, n_ap >= n_ex", "nrvsmu", "n_ap is larger", share, larger > 0.95),
     ]
     return section
 
@@ -176,7 +149,7 @@ def count_against_shape() -> Section:
     """Figs. vsb and lf: reversals against b, beside the form factor."""
     b = np.linspace(1.2, 9.8, 87)
     maps = run(configure(mu=np.array([100.0, 200.0]), b=b))
-    figure = Figure(figsize=(7, 6), dpi=100, layout="constrained")
+    figure = _figure(7, 6)
     top, bottom = figure.subplots(2, 1, sharex=True)
     section = Section("Reversals against shape", figures=[("vsb and lf: counts and form factor against b", figure)])
     factor = analytic.form_factor(standard(b=b))
@@ -184,32 +157,20 @@ def count_against_shape() -> Section:
     for i, mu in enumerate((100, 200)):
         count = maps["reversals"].values[i].astype(float)
         top.plot(b, count, "x", label=f"μ = {mu}")
-        smooth = _running_median(count, 9)
+        smooth = median_filter(count, 9, mode="nearest")
         found = float(b[smooth == smooth.max()].mean())
         predicted = maps["reversals_predicted"].values[i]
         peak = float(b[predicted == predicted.max()].mean())
-        section.rows.append(
-            against(
-                f"best b, simulated, μ = {mu}",
-                "vsb",
-                best,
-                found,
-                1.8,
-                "«similar to the form factor»",
-                f"the paper's own n_r is largest at b = {peak:.1f}: besides L(f) it contains |sin θ cos θ|, "
-                "and θ depends on b too",
-            )
+        remark = (
+            f"the paper's own n_r is largest at b = {peak:.1f}: besides L(f) it contains |sin θ cos θ|, "
+            "and θ depends on b too"
         )
         likeness = float(np.corrcoef(smooth, factor)[0, 1])
-        section.rows.append(
-            states(
-                f"n_r against b resembles L(f), μ = {mu}",
-                "vsb",
-                "similar",
-                f"correlation {likeness:.2f}",
-                likeness > 0.7,
-            )
-        )
+        said, what = f"correlation {likeness:.2f}", f"n_r against b resembles L(f), μ = {mu}"
+        section.rows += [
+            against(f"best b, simulated, μ = {mu}", "vsb", best, found, 1.8, "«similar to the form factor»", remark),
+            states(what, "vsb", "similar", said, likeness > 0.7),
+        ]
     top.set_ylabel("n_r:ex")
     top.legend()
     bottom.plot(b, factor)
@@ -218,33 +179,18 @@ def count_against_shape() -> Section:
     return section
 
 
-def _running_median(values: Array, width: int) -> Array:
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))
-
-
 def ladder() -> Section:
     """How good each reduced model is: its counts, reversal times and cost beside the full model's."""
     mu, b = np.linspace(20, 200, 19), np.linspace(1.5, 9.0, 16)
     measure = ("reversals", "first_reversal")
     maps = {}
     for name in (*MODELS, "analytic"):
-        config = configure(name, t_end=15_000.0, measure=measure, mu=mu, b=b)
-        tiny = {n: replace(v, numbers=v.numbers[:1]) for n, v in config.parameters.items()}
-        run(replace(config, parameters=tiny, integrator=Integrator(t_end=10.0)))  # compiles
-        maps[name] = run(config)
+        run(configure(name, t_end=10.0, measure=measure, mu=mu[:1], b=b[:1]))  # compiles
+        maps[name] = run(configure(name, t_end=15_000.0, measure=measure, mu=mu, b=b))
     full = maps["slip"]
-    lines = [
-        [
-            "model",
-            "equal counts",
-            "within one",
-            "error of the first reversal (median)",
-            "error of the last reversal (median)",
-            "trajectories/s",
-        ]
-    ]
-    figure = Figure(figsize=(12, 3.6), dpi=100, layout="constrained")
+    errors = (f"error of the {which} reversal (median)" for which in ("first", "last"))
+    lines = [["model", "equal counts", "within one", *errors, "trajectories/s"]]
+    figure = _figure(12, 3.6)
     panels = figure.subplots(1, 3, sharey=True)
     for name, axes in zip(("effective", "averaged", "analytic"), panels, strict=True):
         off = maps[name]["reversals"].astype(int) - full["reversals"].astype(int)
@@ -253,9 +199,8 @@ def ladder() -> Section:
     panels[0].set_ylabel("μ")
     figure.colorbar(mesh, ax=list(panels), label="count minus that of the full model")
     for name, one in maps.items():
-        lines.append(
-            [name, *_agreement(one, full), f"{one.attrs['trajectories_per_second']:.3g}" if name in MODELS else "—"]
-        )
+        speed = f"{one.attrs['trajectories_per_second']:.3g}" if name in MODELS else "—"
+        lines.append([name, *_agreement(one, full), speed])
     caption = (
         "19 × 16 cells, μ = 20 … 200, b = 1.5 … 9, n0 = 0.05, t < 15 000; no-slip: 16 cells, which never stop reversing"
     )
@@ -263,18 +208,13 @@ def ladder() -> Section:
 
 
 def _agreement(one: xr.Dataset, full: xr.Dataset) -> list[str]:
-    if "mu" in one.dims:
-        off = abs(one["reversals"].astype(int) - full["reversals"].astype(int)).values
-        shares = [f"{(off == 0).mean():.1%}", f"{(off <= 1).mean():.1%}"]
-    else:
-        shares = ["—", "—"]
-    times = []
-    for name in ("t_first_reversal", "t_last_reversal"):
-        if name not in one or (name == "t_last_reversal" and "mu" not in one.dims):
-            times.append("—")
-            continue
-        relative = abs(one[name] / full[name] - 1)
-        if "mu" in one.dims:
-            relative = relative.where(one["reversals"] == full["reversals"])
-        times.append(f"{float(relative.median()):.1%}")
-    return [*shares, *times]
+    """Shares of equal counts and of those within one, and the errors of the reversals' times where counts are equal."""
+    if "mu" not in one.dims:  # it reverses for ever
+        first = abs(one["t_first_reversal"] / full["t_first_reversal"] - 1)
+        return ["—", "—", f"{float(first.median()):.1%}", "—"]
+    off = abs(one["reversals"].astype(int) - full["reversals"].astype(int))
+    times = [
+        f"{float(abs(one[name] / full[name] - 1).where(off == 0).median()):.1%}" if name in one else "—"
+        for name in ("t_first_reversal", "t_last_reversal")
+    ]
+    return [f"{float((off == 0).mean()):.1%}", f"{float((off <= 1).mean()):.1%}", *times]
