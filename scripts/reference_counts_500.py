@@ -10,7 +10,7 @@ eighth state.  Each cell is integrated in double precision, then from a start 1e
 two disagree on the time of the last reversal, it grew out of round-off, and 80-bit arithmetic takes over.  That delays
 the reversal, and may not be enough: `noise_limited`.
 
-    python scripts/reference_counts_500.py sweep/bench/data/reference_counts_500.csv
+    python scripts/reference_counts_500.py data/reference_counts_500.csv
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import pytest
 from support.cli import invoke
 
 from sweep.bench import hard, precision, report
-from sweep.bench.reference import Spins, read_counts, read_spins, spin_errors, whole_steps
+from sweep.bench.reference import Spins, read_spins, spin_errors, whole_steps
 from sweep.bench.section import BenchSection, Spread
 from sweep.bench.stopwatch import stopwatch
 from sweep.bench.timing import Effort, Work, in_turn
@@ -38,9 +38,6 @@ def test_references_are_read_by_model_and_body() -> None:
     assert list(spins["slip"].times) == list(np.arange(25, 401, 25))
     assert [two().name(i) for i in (0, 1)] == ["μ = 60", "μ = 100, n0 = -0.05"]
     assert [spins["noslip"].name(i) for i in (0, 2)] == ["standard", "b = 2, n0 = -0.05"]
-    counts = read_counts()
-    assert (len(counts.firm), counts.firm.sum()) == (500, 499)
-    assert (counts.columns["mu"][1], counts.reversals[1]) == (50.8202, 3)
 
 
 @pytest.mark.campaign
@@ -90,16 +87,12 @@ from sweep.kernels.methods import METHODS
 
 METHODS["twin"] = replace(METHODS["dopri5"], name="twin", code=9)  # before anybody has read the registry
 
-from sweep.bench import counts, hard, reference, report
+from sweep.bench import hard, reference, report
 from sweep.bench.timing import Effort
 
-spins, cells = reference.read_spins(), reference.read_counts()
+spins = reference.read_spins()
 bodies = {model: found.select(np.array([2, 3])) for model, found in spins.items()}
-few = np.flatnonzero(cells.reversals == 3)[:7]
 reference.read_spins = lambda: {m: reference.Spins(s.columns, s.times[:2], s.spins[:, :2]) for m, s in bodies.items()}
-counts.read_counts = lambda: reference.Counts(
-    {name: values[few] for name, values in cells.columns.items()}, cells.reversals[few], cells.firm[few]
-)
 hard.cases = lambda: [hard.Case(["short"], hard.standard(), 20.0)]
 effort = Effort(
     trajectories=4, repeats=1, tolerances=(1e-5, 1e-6, 1e-7, 1e-8), rungs=2, sizes=(16,), ends=(50,), frictions=(10,),
@@ -124,7 +117,7 @@ def test_a_tiny_run_has_every_section_for_every_method(tmp_path: Path) -> None:
         low, middle, high = (float(line[key]) for key in ("smallest", "median", "largest"))
         assert low <= middle <= high
     assert found == dict.fromkeys(("precision", "tolerance", "steps"), everywhere | reduced) | {
-        "counts": everywhere, "cost": everywhere, "whole": everywhere | {("slip", "auto")}
+        "cost": everywhere, "whole": everywhere | {("slip", "auto")}
     }  # fmt: skip
 
     def values(quantity: str, **where: str) -> list[float]:
@@ -132,7 +125,6 @@ def test_a_tiny_run_has_every_section_for_every_method(tmp_path: Path) -> None:
         return [float(one["median"]) for one in chosen]
 
     assert 0 < max(values("spin_error")) < 1e-3
-    assert set(values("share_wrong", case="firm")) == {0.0}
     assert values("ns_per_step", method="twin")
     assert 0 < max(values("spin_error", section="whole")) < 1e-7
     assert min(values("ratio")) > 1
@@ -142,12 +134,12 @@ def test_a_tiny_run_has_every_section_for_every_method(tmp_path: Path) -> None:
     # Each is written with six digits.
     assert sum(shares.values()) == pytest.approx(2 * shares["whole_seconds"], rel=1e-5)
 
-    titles = ("Work and precision", "Wrong counts", "Time of a step", "Cost", "Whole runs", "Hard cases")
+    titles = ("Work and precision", "Time of a step", "Cost", "Whole runs", "Hard cases")
     assert all(f"\n{title}\n" in done.stdout for title in titles)
     assert "short [twin]" in done.stdout
     page = (tmp_path / "bench.html").read_text(encoding="utf-8")
     assert not re.search("https?:", page)  # letters alone occur in pictures by chance
-    assert page.count("<h2>") == 8
+    assert page.count("<h2>") == 7
     assert "data:image/png;base64" in page
     assert (tmp_path / "bench.png").read_bytes().startswith(b"\x89PNG")
 

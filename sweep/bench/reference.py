@@ -1,8 +1,8 @@
-"""Reference spins and counts, and errors against them.  The project's `data/README.md` says how they were made."""
+"""Reference spins, and errors against them.  The project's `data/README.md` says how they were made."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import resources
 
@@ -17,8 +17,7 @@ from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
 
-_DATA = resources.files("sweep.bench") / "data"
-SPINS, COUNTS = _DATA / "reference_spins.csv", _DATA / "reference_counts_500.csv"
+SPINS = resources.files("sweep.bench") / "data" / "reference_spins.csv"
 
 
 @dataclass(frozen=True)
@@ -46,23 +45,9 @@ class Spins:
         return ", ".join(shown) or "standard"
 
 
-@dataclass(frozen=True)
-class Counts:
-    """Reversals of cells of the slip model."""
-
-    columns: dict[str, Array]
-    reversals: Array
-    firm: Array
-    """Whether the count depends neither on round-off nor on where the windows begin."""
-
-
-def _table(path: object) -> Array:
-    return np.genfromtxt(str(path), delimiter=",", names=True, dtype=None, encoding="utf-8")
-
-
 def read_spins() -> dict[str, Spins]:
     """Read the reference spins of each model, whose lines are in the order of bodies and times."""
-    table, spins = _table(SPINS), {}
+    table, spins = np.genfromtxt(str(SPINS), delimiter=",", names=True, dtype=None, encoding="utf-8"), {}
     for model in dict.fromkeys(table["model"].tolist()):
         lines = table[table["model"] == model]
         times = np.unique(lines["t"]).astype(float)
@@ -78,24 +63,6 @@ def comparisons() -> Iterator[tuple[str, str, Spins]]:
         for method in allowed(MODELS[model]):
             mu = reference.columns.get("mu", np.zeros(len(reference.spins)))
             yield model, method, reference.select(np.array([runs_at(method, x) for x in mu]))
-
-
-def read_counts() -> Counts:
-    """Read the reference counts."""
-    table = _table(COUNTS)
-    columns = {name: table[name].astype(float) for name in MODELS["slip"].parameters}
-    return Counts(columns, table["reversals"], table["firm"] == 1)
-
-
-def at_each(steps: list[Array], run: Callable[[Array, Array], Array]) -> Array:
-    """Tabulate what `run` (bodies, steps) finds for all bodies at several steps, of shape (..., several, bodies).
-
-    Equal steps of a body, which occur where stability decides, are run once.
-    """
-    bodies = np.tile(np.arange(len(steps[0])), len(steps))
-    runs, place = np.unique(np.stack([bodies, np.concatenate(steps)]), axis=1, return_inverse=True)
-    found = run(runs[0].astype(int), runs[1])
-    return found[..., place.ravel()].reshape(*found.shape[:-1], len(steps), -1)
 
 
 def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:

@@ -13,10 +13,9 @@ import numba
 from matplotlib.figure import Figure
 
 from sweep.bench.cost import cost, step_times
-from sweep.bench.counts import wrong_counts
 from sweep.bench.hard import hard_cases
 from sweep.bench.precision import work_precision
-from sweep.bench.section import BenchSection, Reading
+from sweep.bench.section import LINE, BenchSection
 from sweep.bench.timing import Effort
 from sweep.bench.tolerance import tolerance
 from sweep.bench.whole import whole
@@ -28,7 +27,7 @@ from sweep.report.rows import Row, Section
 from sweep.results.writing import replacing
 
 SECTIONS: tuple[Callable[[Effort], BenchSection], ...] = (
-    work_precision, tolerance, wrong_counts, step_times, cost, whole, hard_cases,
+    work_precision, tolerance, step_times, cost, whole, hard_cases,
 )  # fmt: skip
 
 COLUMNS = 3
@@ -45,7 +44,10 @@ def bench(output: Path, note: Callable[[str], None] = lambda _: None, effort: Ef
     for measure in SECTIONS:
         sections.append(measure(effort or Effort()))
         note(page.text(sections[-1]))
-    write_csv(output / "bench.csv", [reading for section in sections for reading in section.readings])
+    with replacing(output / "bench.csv") as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        lines = csv.writer(stream, lineterminator="\n")
+        lines.writerow(LINE)
+        lines.writerows(line for section in sections for line in section.readings)
     figure = draw(sections)
     with replacing(output / "bench.png") as temporary:
         figure.savefig(temporary, format="png")
@@ -81,16 +83,3 @@ def draw(sections: list[BenchSection]) -> Figure:
     for axes in grid[len(panels) :]:
         axes.set_axis_off()
     return figure
-
-
-def write_csv(path: Path, readings: list[Reading]) -> None:
-    """Write the raw figures, one per line."""
-    names = ("section", "model", "method", "case", "setting")
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([*names, "at", "quantity", "median", "smallest", "largest", "repeats"])
-        for one in readings:
-            values = one.spread.values
-            figures = [f"{v:.6g}" for v in (one.spread.median, values.min(), values.max())]
-            where = (getattr(one, name) for name in names)
-            writer.writerow([*where, f"{one.at:.8g}", one.quantity, *figures, len(values)])

@@ -30,19 +30,8 @@ class Spread:
         return f"{self.median:{form}} ({self.values.min():{form}} … {self.values.max():{form}})"
 
 
-@dataclass(frozen=True)
-class Reading:
-    """One line of bench.csv."""
-
-    section: str
-    model: str
-    method: str
-    case: str
-    setting: str
-    """What was varied, to the value `at`."""
-    at: float
-    quantity: str
-    spread: Spread
+LINE = ("section", "model", "method", "case", "setting", "at", "quantity", "median", "smallest", "largest", "repeats")
+"""The columns of bench.csv; `setting` was varied, to the value `at`."""
 
 
 @dataclass(kw_only=True)
@@ -51,15 +40,18 @@ class BenchSection(Section):
 
     name: str
     """As in bench.csv."""
-    readings: list[Reading] = field(default_factory=list)
+    readings: list[tuple[str | int, ...]] = field(default_factory=list)
+    """Lines of bench.csv, as `LINE` has it."""
     panels: list[Callable[[Axes], None]] = field(default_factory=list)
 
     def add(self, model: str, method: str, case: str, setting: str, at: float, **quantities: Spread | float) -> None:
         """Note quantities that were found with the `setting` at this value; those that are NaN are left out."""
         for quantity, value in quantities.items():
-            spread = value if isinstance(value, Spread) else Spread(np.array([value], float))
-            if not np.isnan(spread.median):
-                self.readings.append(Reading(self.name, model, method, case, setting, float(at), quantity, spread))
+            values = value.values if isinstance(value, Spread) else np.array([value], float)
+            if not np.isnan(values).any():
+                figures = [f"{figure:.6g}" for figure in (np.median(values), values.min(), values.max())]
+                where = (self.name, model, method, case, setting, f"{at:.8g}", quantity)
+                self.readings.append((*where, *figures, len(values)))
 
 
 def colour(method: str) -> str:

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from support import wide_bodies
+from support import ROOT, wide_bodies
 
 import sweep
-from sweep.bench.reference import COUNTS
 from sweep.kernels.status import SETTLED
 from sweep.models import MODELS
 from sweep.models.theory import stability
@@ -14,7 +13,7 @@ from sweep.models.theory import stability
 @pytest.mark.parametrize("method", ["dopri5", "adams"])
 def test_nearly_round_bodies_do_not_settle_ahead_of_a_reversal(method: str) -> None:
     """Cells of the reference whose second reversal comes while upright spin is stable and the rattle is small."""
-    table = np.genfromtxt(str(COUNTS), delimiter=",", names=True, dtype=None)
+    table = np.genfromtxt(ROOT / "data" / "reference_counts_500.csv", delimiter=",", names=True, dtype=None)
     rows = [i for i, b in enumerate(table["b"]) if b in (8.34943, 8.85002, 8.91708)]
     assert list(table["reversals"][rows]) == [2, 2, 2]
     cells = {name: table[name][rows] for name in ("b", "mu", "n0")}
