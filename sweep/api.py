@@ -5,12 +5,15 @@ What a function needs is imported when it is called: an import of all would take
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from importlib import import_module
+
+from sweep.studies import BOUNDARY_WIDTH, SPIN_WIDTH
 
 TYPE_CHECKING = False  # as in `sweep`
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
     from typing import Any
 
@@ -41,6 +44,22 @@ _HOMES = {
     "predict": "sweep.studies.predictions",
 }
 """The modules that define the names which are not defined here."""
+
+
+@contextmanager
+def _prepared(
+    config: ConfigLike,
+    overrides: Mapping[str, Any],
+    progress: bool | None,
+    reporter: Reporter | None,
+    unit: str = "cells",
+) -> Iterator[tuple[Config, Reporter]]:
+    """The checked configuration of a call, and who is told of its progress."""
+    from sweep.config import load_config
+    from sweep.progress import shown
+
+    with shown(progress, reporter, unit) as told:
+        yield load_config(config, overrides, announce=told.note), told
 
 
 def run(
@@ -88,12 +107,9 @@ def run(
     >>> maps.reversals.values
     array([1, 2, 5], dtype=int16)
     """
-    from sweep.config import load_config
     from sweep.engine.run import run
-    from sweep.progress import shown
 
-    with shown(progress, reporter) as told:
-        checked = load_config(config, overrides, announce=told.note)
+    with _prepared(config, overrides, progress, reporter) as (checked, told):
         return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, cluster=cluster)
 
 
@@ -101,7 +117,7 @@ def boundaries(
     config: ConfigLike,
     x: str | None = None,
     y: str | None = None,
-    width: float = 1e-6,
+    width: float = BOUNDARY_WIDTH,
     output: str | Path | None = None,
     *,
     fresh: bool = False,
@@ -138,18 +154,15 @@ def boundaries(
     >>> curves.attrs["x"], curves.attrs["y"]
     ('n0', 'mu')
     """
-    from sweep.config import load_config
-    from sweep.progress import shown
     from sweep.studies.boundaries import boundaries
 
-    with shown(progress, reporter) as told:
-        checked = load_config(config, overrides, announce=told.note)
+    with _prepared(config, overrides, progress, reporter) as (checked, told):
         return boundaries(checked, x, y, width, output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def critical(
     config: ConfigLike,
-    width: float = 1e-3,
+    width: float = SPIN_WIDTH,
     output: str | Path | None = None,
     *,
     fresh: bool = False,
@@ -186,12 +199,9 @@ def critical(
     >>> f"{float(spins.n_c2_plus_simulated):.3f}"
     '0.005'
     """
-    from sweep.config import load_config
-    from sweep.progress import shown
     from sweep.studies.critical import critical
 
-    with shown(progress, reporter) as told:
-        checked = load_config(config, overrides, announce=told.note)
+    with _prepared(config, overrides, progress, reporter) as (checked, told):
         return critical(checked, width, output, fresh=fresh, reporter=told, cluster=cluster)
 
 
@@ -239,14 +249,13 @@ def trajectory(
     >>> two.spin.dims
     ('trajectory', 'time')
     """
-    from sweep.config import load_config, parameters_of
-    from sweep.progress import shown
+    from sweep.config import parameters_of
     from sweep.studies.trajectory import trajectory
 
     known = parameters_of(config, values)
     cells = {name: value for name, value in values.items() if name in known}
-    with shown(progress, reporter, "sqrt(c/g)") as told:
-        checked = load_config(config, {n: v for n, v in values.items() if n not in known}, announce=told.note)
+    settings = {name: value for name, value in values.items() if name not in known}
+    with _prepared(config, settings, progress, reporter, "sqrt(c/g)") as (checked, told):
         return trajectory(
             checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
         )
@@ -291,13 +300,10 @@ def fit(
     ConfigError
         if the configuration or the film cannot be used, or the configuration is not of one body.
     """
-    from sweep.config import load_config
-    from sweep.progress import shown
     from sweep.studies.fit import fit
     from sweep.studies.laws import compare
 
-    with shown(progress, reporter) as told:
-        checked = load_config(config, overrides, announce=told.note)
+    with _prepared(config, overrides, progress, reporter) as (checked, told):
         return compare(checked, film, free, laws, told) if laws else fit(checked, film, free, told)
 
 
@@ -362,12 +368,9 @@ def indices(
     ConfigError, StoreError
         as `run`; also if the model is a formula, no parameter is a distribution, or one is an axis.
     """
-    from sweep.config import load_config
-    from sweep.progress import shown
     from sweep.studies.indices import indices
 
-    with shown(progress, reporter) as told:
-        checked = load_config(config, overrides, announce=told.note)
+    with _prepared(config, overrides, progress, reporter) as (checked, told):
         return indices(checked, output, fresh=fresh, reporter=told, cluster=cluster)
 
 

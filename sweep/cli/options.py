@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,6 @@ def begun_parameters(_context: click.Context, _parameter: click.Parameter, begun
     return [CompletionItem(f"{p.name}=", help=p.long_name) for p in PARAMETERS.values() if p.name.startswith(begun)]
 
 
-CONFIG = click.argument("config", type=PATH)
 FILE = click.argument("file", type=PATH)
 SETTINGS = click.option(
     "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=_begun_keys,
@@ -51,8 +51,17 @@ def report_folder(default: str) -> Callable[[Any], Any]:
     return click.option("--output", type=PATH, default=default, show_default=True, help="Folder for the report.")
 
 
+def configured(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the argument CONFIG to a command, which gets the configuration with the values of `SETTINGS`."""
+
+    @wraps(command)
+    def call(config: Path, settings: tuple[str, ...], **options: Any) -> None:
+        command(config=loaded(config, settings), **options)
+
+    return click.argument("config", type=PATH)(call)
+
+
 def loaded(config: Path, settings: tuple[str, ...]) -> Config:
-    """The configuration of a command, with the values of `--set`."""
     from sweep.config import load_config
     from sweep.config.document import parse_value
     from sweep.config.faults import brief

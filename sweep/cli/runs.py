@@ -12,13 +12,15 @@ import click
 
 from sweep import interrupt
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, resumable, say
-from sweep.cli.options import CONFIG, OUTPUT, PATH, QUIET, SETTINGS, begun_parameters, cells_of, loaded
+from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun_parameters, cells_of, configured
 from sweep.parameters import PARAMETERS
+from sweep.studies import BOUNDARY_WIDTH, SPIN_WIDTH
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from sweep.config import Config
+    from sweep.results.folder import RunFiles
 
 _TIMES = {"paper": "sqrt(c/g)", "SI": "s", "own": "of time"}
 """The unit in which a progress bar counts time, by the `units` of a configuration."""
@@ -66,13 +68,11 @@ def _resumed(command: Callable[..., None]) -> Callable[..., None]:
 
 
 @click.command(epilog=_parameter_help())
-@CONFIG
+@configured
 @click.option("--rerun", type=click.Choice(["failed", "limit"]),
               help="Simulate again only those cells of the dataset that failed, or that reached t_end.")  # fmt: skip
 @_resumed
-def run(
-    config: Path, settings: tuple[str, ...], dry_run: bool, fresh: bool, rerun: str | None, **how: Any
-) -> None:  # fmt: skip
+def run(config: Config, rerun: str | None, fresh: bool, **how: Any) -> None:
     """Run the sweep that CONFIG describes.
 
     Writes NAME.nc (the dataset) and NAME.png (its maps), where NAME is the name of the run, and a
@@ -80,25 +80,22 @@ def run(
     interrupted, finished work is kept, and the same command resumes the run.  If CONFIG has since
     got more values along an axis, or a later t_end, only what the dataset lacks is simulated.
     """
-    checked = loaded(config, settings)
-    if dry_run:
-        from sweep.engine.estimate import estimate
-
-        click.echo(estimate(checked))
-        return
+    from sweep.engine.estimate import estimate
     from sweep.engine.run import run as run_sweep
     from sweep.results.summary import failed_fraction
 
-    result = _written(checked, "run", partial(run_sweep, checked, fresh=fresh, rerun=rerun), **how)
+    work = partial(run_sweep, config, fresh=fresh, rerun=rerun)
+    if (result := _written(config, "run", work, lambda: estimate(config), **how)) is None:
+        return
     failed = failed_fraction(result)
-    if failed > checked.max_failed_fraction:
-        most = f"max_failed_fraction allows {checked.max_failed_fraction:.2%}"
+    if failed > config.max_failed_fraction:
+        most = f"max_failed_fraction allows {config.max_failed_fraction:.2%}"
         click.echo(f"{failed:.2%} of the cells failed; {most}", err=True)
         sys.exit(TOO_MANY_FAILED)
 
 
 @click.command()
-@CONFIG
+@configured
 @AT
 @click.option("--stop-when-settled", is_flag=True,
               help="End when neither spin nor count can change any more, as a sweep does, not at t_end.")  # fmt: skip
@@ -109,45 +106,28 @@ def run(
 @DRY_RUN
 @QUIET
 def trajectory(
-    config: Path,
-    cells: tuple[str, ...],
-    stop_when_settled: bool,
-    samples: int | None,
-    output: Path | None,
-    settings: tuple[str, ...],
-    dry_run: bool,
-    quiet: bool,
-) -> None:
+    config: Config, cells: tuple[str, ...], samples: int | None, output: Path | None, dry_run: bool, quiet: bool,
+    **how: Any,
+) -> None:  # fmt: skip
     """Follow single cells of CONFIG densely in time, up to its t_end.
 
     Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip,
     normal force, energy and the work of friction.  Several trajectories are drawn over each other; of samples,
     the bands in which most of the spins lie.
     """
-    checked = loaded(config, settings)
-    at = cells_of(cells, checked.table)
     if dry_run:
         from sweep.studies.trajectory import estimate
 
-        with of_option("--at", checked.table):
-            click.echo(estimate(checked, at, samples))
+        with of_option("--at", config.table):
+            click.echo(estimate(config, cells_of(cells, config.table), samples))
         return
-    from sweep.plots import picture
-    from sweep.progress import Terminal
-    from sweep.results.folder import RunFiles
-    from sweep.studies.trajectory import trajectory as follow
-
-    interrupt.raise_again()
-    with Terminal(quiet, _TIMES[checked.units]) as terminal, of_option("--at", checked.table):
-        result = follow(checked, stop_when_settled=stop_when_settled, samples=samples, reporter=terminal, **at)
-    files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_trajectory")
-    files.save_result(result, picture.plot(result))
+    files = _save(config, "trajectory", _followed(config, cells, quiet, samples=samples, **how), output)
     if not quiet:
         say(f"wrote {files.dataset} and .png")
 
 
 @click.command()
-@CONFIG
+@configured
 @AT
 @click.option("--from", "begin", type=float, default=0.0, show_default=True, help="Time at which the clip begins.")
 @click.option("--to", "end", type=float, help="Time at which it ends [default: some time after the first reversal].")
@@ -157,27 +137,21 @@ def trajectory(
 @SETTINGS
 @QUIET
 def animate(
-    config: Path, cells: tuple[str, ...], begin: float, end: float | None, speed: float | None, output: Path | None,
-    settings: tuple[str, ...], quiet: bool,
+    config: Config, cells: tuple[str, ...], begin: float, end: float | None, speed: float | None, output: Path | None,
+    quiet: bool,
 ) -> None:  # fmt: skip
     """Show how single bodies of CONFIG turn, and their contact points' paths on the table.
 
     Several stand side by side, in one clock, above their spins.  A page (html) opens without network; an mp4 needs
     ffmpeg.
     """
-    checked = loaded(config, settings)
-    at = cells_of(cells, checked.table)
     from sweep.config import ConfigError
     from sweep.plots import animation
-    from sweep.progress import Terminal
-    from sweep.studies.trajectory import trajectory as follow
 
-    target = output or Path("runs") / checked.name / f"{checked.name}_trajectory.gif"
-    interrupt.raise_again()
+    target = output or Path("runs") / config.name / f"{config.name}_trajectory.gif"
     try:
         animation.check(target)
-        with Terminal(quiet, _TIMES[checked.units]) as terminal, of_option("--at", checked.table):
-            result = follow(checked, reporter=terminal, **at)
+        result = _followed(config, cells, quiet)
         target.parent.mkdir(parents=True, exist_ok=True)
         animation.animate(result, target, begin=begin, end=end, speed=speed)
     except ValueError as error:
@@ -189,88 +163,71 @@ def animate(
 
 
 @click.command()
-@CONFIG
+@configured
 @click.option("--x", help="Parameter along the horizontal axis.")
 @click.option("--y", help="Parameter along the vertical axis.")
-@click.option("--width", type=click.FloatRange(1e-12, 0.5), default=1e-6, show_default=True,
+@click.option("--width", type=click.FloatRange(1e-12, 0.5), default=BOUNDARY_WIDTH, show_default=True,
               help="Relative distance of the two simulated cells between which a count changes.")  # fmt: skip
 @_resumed
-def boundaries(
-    config: Path, x: str | None, y: str | None, width: float, settings: tuple[str, ...], dry_run: bool, fresh: bool,
-    **how: Any,
-) -> None:  # fmt: skip
+def boundaries(config: Config, x: str | None, y: str | None, width: float, fresh: bool, **how: Any) -> None:
     """Find the curves over two axes of CONFIG on which the number of reversals changes.
 
     The cells of the grid tell where the curves pass, and further simulations how exactly: each point lies between
     two simulated cells.  Writes NAME_boundaries.nc and .png.  If it is interrupted, finished simulations are kept,
     and the same command resumes the search.
     """
-    checked = loaded(config, settings)
     from sweep.studies import estimates
     from sweep.studies.boundaries import boundaries as search
 
-    if dry_run:
-        click.echo(estimates.of_boundaries(checked, x, y))
-    else:
-        _written(checked, "boundaries", partial(search, checked, x, y, width, fresh=fresh), **how)
+    work = partial(search, config, x, y, width, fresh=fresh)
+    _written(config, "boundaries", work, lambda: estimates.of_boundaries(config, x, y), **how)
 
 
 @click.command()
-@CONFIG
-@click.option("--width", type=click.FloatRange(1e-12, 0.5), default=1e-3, show_default=True,
+@configured
+@click.option("--width", type=click.FloatRange(1e-12, 0.5), default=SPIN_WIDTH, show_default=True,
               help="Relative width of the brackets of n_c2.")  # fmt: skip
 @_resumed
-def critical(
-    config: Path, width: float, settings: tuple[str, ...], dry_run: bool, fresh: bool, **how: Any
-) -> None:  # fmt: skip
+def critical(config: Config, width: float, fresh: bool, **how: Any) -> None:
     """Find the critical spins over all axes of CONFIG but n0.
 
     They come from the paper's formulas, n_c1 also from the model's eigenvalues, and n_c2 from simulation.
     Writes NAME_critical.nc and .png.  If it is interrupted, finished simulations are kept, and the
     same command resumes the search.
     """
-    checked = loaded(config, settings)
     from sweep.studies import estimates
     from sweep.studies.critical import critical as search
 
-    if dry_run:
-        click.echo(estimates.of_critical(checked))
-    else:
-        _written(checked, "critical", partial(search, checked, width, fresh=fresh), **how)
+    work = partial(search, config, width, fresh=fresh)
+    _written(config, "critical", work, lambda: estimates.of_critical(config), **how)
 
 
 @click.command()
-@CONFIG
+@configured
 @_resumed
-def indices(config: Path, settings: tuple[str, ...], dry_run: bool, fresh: bool, **how: Any) -> None:
+def indices(config: Config, fresh: bool, **how: Any) -> None:
     """Tell on which of the uncertain parameters of CONFIG its results depend.
 
     CONFIG is of one scene, with a distribution for each parameter that is uncertain.  Sobol indices say how much of the
     variance of counts and times comes from each.  Writes NAME_indices.nc and .png.  If it is interrupted, finished
     simulations are kept, and the same command resumes.
     """
-    checked = loaded(config, settings)
     from sweep.engine.estimate import estimate
     from sweep.studies.indices import designed
     from sweep.studies.indices import indices as find
 
-    if dry_run:
-        click.echo(estimate(designed(checked)))
-    else:
-        _written(checked, "indices", partial(find, checked, fresh=fresh), **how)
+    _written(config, "indices", partial(find, config, fresh=fresh), lambda: estimate(designed(config)), **how)
 
 
 @click.command()
-@CONFIG
+@configured
 @click.argument("film", type=PATH)
 @click.option("--free", required=True, metavar="NAME,NAME", help="The parameters to find, e.g. mu,sigma,n0,x0,y0.")
 @click.option("--laws", metavar="NAME,NAME", help="Laws of friction to fit and compare, e.g. viscous,coulomb.")
 @OUTPUT
 @SETTINGS
 @QUIET
-def fit(
-    config: Path, film: Path, free: str, laws: str | None, output: Path | None, settings: tuple[str, ...], quiet: bool
-) -> None:
+def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | None, quiet: bool) -> None:
     """Find the parameters of the body in CONFIG that reproduce FILM.
 
     FILM is a table with a header: a time, and a spin, a gyroscope's reading or a heading, such as "Time (s), Gyroscope
@@ -278,33 +235,53 @@ def fit(
     itself, film_delay, film_bias, film_lean_x and film_lean_y can be free.  Writes NAME_fit.nc and .png, and
     NAME_fit.yaml, which runs the fitted body; with --laws, NAME_laws.nc, .png and .yaml, that of the best law.
     """
-    checked = loaded(config, settings)
-    from sweep.plots import picture
     from sweep.progress import Terminal
-    from sweep.results.folder import RunFiles
     from sweep.results.summary import describe
     from sweep.studies.fit import fit as find
     from sweep.studies.laws import compare
 
     names = [name.strip() for name in free.split(",")]
     interrupt.raise_again()
-    with Terminal(quiet) as terminal, of_option("--free", checked.table):
+    with Terminal(quiet) as terminal, of_option("--free", config.table):
         result = (
-            compare(checked, film, names, [name.strip() for name in laws.split(",")], terminal)
-            if laws else find(checked, film, names, terminal)
+            compare(config, film, names, [name.strip() for name in laws.split(",")], terminal)
+            if laws else find(config, film, names, terminal)
         )  # fmt: skip
-    files = RunFiles(output or Path("runs") / checked.name, f"{checked.name}_{'laws' if laws else 'fit'}")
-    files.save_result(result, picture.plot(result))
+    files = _save(config, "laws" if laws else "fit", result, output)
     files.configuration.write_text(result.attrs["config"], encoding="utf-8")
     if not quiet:
         say(f"{describe(result)}\nwrote {files.dataset}, .png and .yaml")
 
 
+def _followed(config: Config, cells: tuple[str, ...], quiet: bool, **how: Any) -> xr.Dataset:
+    """Follow the cells of `--at`."""
+    from sweep.progress import Terminal
+    from sweep.studies.trajectory import trajectory
+
+    at = cells_of(cells, config.table)
+    interrupt.raise_again()
+    with Terminal(quiet, _TIMES[config.units]) as terminal, of_option("--at", config.table):
+        return trajectory(config, reporter=terminal, **how, **at)
+
+
+def _save(config: Config, verb: str, result: xr.Dataset, output: Path | None) -> RunFiles:
+    """Write a dataset that needed no checkpoint, and its picture."""
+    from sweep.plots import picture
+    from sweep.results.folder import RunFiles
+
+    files = RunFiles(output or Path("runs") / config.name, f"{config.name}_{verb}")
+    files.save_result(result, picture.plot(result))
+    return files
+
+
 def _written(
-    config: Config, verb: str, work: Callable[..., xr.Dataset], *,
-    output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
-) -> xr.Dataset:  # fmt: skip
-    """Carry out `work`, show its progress, and say what it found and wrote."""
+    config: Config, verb: str, work: Callable[..., xr.Dataset], estimate: Callable[[], str], *,
+    dry_run: bool, output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
+) -> xr.Dataset | None:  # fmt: skip
+    """Carry out `work`, show its progress, and say what it found and wrote; of a dry run, only the estimate."""
+    if dry_run:
+        click.echo(estimate())
+        return None
     from sweep.engine.cluster import connected
     from sweep.progress import Terminal
     from sweep.results.summary import describe

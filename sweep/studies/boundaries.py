@@ -26,12 +26,10 @@ from sweep.models.model import COUNT
 from sweep.results.dataset import described
 from sweep.results.margins import FOUND, OPEN, POINTS, UNCERTAIN, Counts
 from sweep.results.store import Store
+from sweep.studies import BOUNDARY_WIDTH
 from sweep.studies.kept import kept
 from sweep.studies.roots import Root
 from sweep.studies.search import Search, measuring, require_certain, require_simulated
-
-WIDTH = 1e-6
-"""Relative distance of the two simulated cells between which a count changes."""
 
 
 @deferred()
@@ -39,7 +37,7 @@ def boundaries(
     config: Config,
     x: str | None = None,
     y: str | None = None,
-    width: float = WIDTH,
+    width: float = BOUNDARY_WIDTH,
     output: str | Path | None = None,
     *,
     fresh: bool = False,

@@ -32,12 +32,10 @@ from sweep.results.dataset import (
 )
 from sweep.results.margins import Counts
 from sweep.results.store import Store
+from sweep.studies import SPIN_WIDTH
 from sweep.studies.kept import kept
 from sweep.studies.roots import Root
 from sweep.studies.search import Search, measuring, require_certain, require_simulated
-
-WIDTH = 1e-3
-"""Relative width down to which simulation brackets n_c2."""
 
 RATIO = 1.25
 """From one spin of the way outwards to the next."""
@@ -54,7 +52,7 @@ _FARTHEST = 8.0
 @deferred()
 def critical(
     config: Config,
-    width: float = WIDTH,
+    width: float = SPIN_WIDTH,
     output: str | Path | None = None,
     *,
     fresh: bool = False,

@@ -6,7 +6,7 @@ from sweep.config import Config
 from sweep.engine.estimate import estimate as of_run
 from sweep.grid import Grid
 from sweep.results.memory import Memory
-from sweep.studies import boundaries, critical
+from sweep.studies import SPIN_WIDTH, boundaries, critical
 from sweep.studies.search import measuring
 
 _A_POINT = 8
@@ -43,7 +43,7 @@ def of_critical(config: Config) -> str:
     if grid.table is not None:
         axes = f"case {grid.size}"
     bodies = f"bodies: {grid.size} ({axes or 'one body'}), each with spins of both signs"
-    search = critical.CriticalSpins(config, Memory(), critical.WIDTH)
+    search = critical.CriticalSpins(config, Memory(), SPIN_WIDTH)
     if not search.spins:
         return f"{bodies}; none has an n_c1 from which to search"
     search.rounds.append(search.ask())
