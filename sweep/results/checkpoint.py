@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from sweep.grid import Array
 from sweep.results.identity import Identity, require_same
 from sweep.results.store import Running, StoreError
 from sweep.results.writing import replacing
+
+_IDENTITY = TypeAdapter(Identity)
 
 
 class Checkpoint:
@@ -40,14 +42,14 @@ class Checkpoint:
         head = folder / "identity.json"
         if head.exists():
             try:
-                found = Identity.of(json.loads(head.read_text(encoding="utf-8")))
-            except (OSError, ValueError, RecursionError) as error:
-                raise StoreError(f"{head}: damaged ({error}); start again with --fresh") from None
+                found = _IDENTITY.validate_json(head.read_bytes())
+            except (OSError, ValueError):
+                raise StoreError(f"{head}: damaged; start again with --fresh") from None
             require_same(folder, found, identity)
         else:
             folder.mkdir(exist_ok=True)
             with replacing(head) as temporary:
-                temporary.write_text(json.dumps(identity.__dict__), encoding="utf-8")
+                temporary.write_bytes(_IDENTITY.dump_json(identity))
         for left in folder.glob(".*.part"):
             left.unlink()
         numbered = [path for path in folder.iterdir() if re.fullmatch(r"\d{6,}\.npz", path.name)]
@@ -88,8 +90,6 @@ class Checkpoint:
     def _read(self, path: Path) -> dict[str, Array] | None:
         """The arrays of a file, its checksums verified; None if it is missing or cannot be used."""
         try:
-            if path.exists() and not path.is_file():
-                raise OSError("not a file")  # opening a pipe would wait for its other end
             with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
                 if damaged := archive.zip.testzip():  # numpy stops reading where a damaged header tells it to
                     raise ValueError(f"checksum of {damaged}")

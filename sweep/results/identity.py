@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from sweep.config.faults import printable
 from sweep.results.store import StoreError
@@ -21,13 +20,6 @@ class Identity:
     """Hash of the source code that decides the numbers."""
     versions: str
     """Versions of this program and of the libraries that compile it."""
-
-    @classmethod
-    def of(cls, raw: Any) -> Identity:
-        """The identity read from a file; `ValueError` if `raw` is not one."""
-        if not isinstance(raw, dict) or {str} != set(map(type, raw.values())) or set(raw) != set(cls.__annotations__):
-            raise ValueError("not the identity of a run")
-        return cls(**raw)
 
     def again(self, rerun: str | None) -> Identity:
         """The identity of a run that computes only the cells `rerun` again."""

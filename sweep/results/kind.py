@@ -25,19 +25,22 @@ def parameters(dataset: xr.Dataset) -> list[str]:
     return [name for name in str(dataset.attrs.get("model_parameters", "")).split() or PARAMETERS if name in dataset]
 
 
+_MARKS = {
+    TRAJECTORY: {"trajectory", "spin", "time", "t_stop"},
+    CRITICAL: {"critical_reason"},
+    BOUNDARIES: {"level", "curve", "end_more"},
+    FIT: {"seen", "fitted"},
+    INDICES: {"first_order", "total_order"},
+}
+"""Variables by which each is known."""
+
+
 def kind(dataset: xr.Dataset) -> str | None:
     """Which of the six, told by the variables alone; None if it is of another program.
 
     Predictions count as a run, and so does a part of one.
     """
-    if {"spin", "time", "t_stop"} <= set(dataset.variables) and "trajectory" in dataset.dims:
-        return TRAJECTORY
-    if "critical_reason" in dataset:
-        return CRITICAL
-    if {"level", "curve", "end_more"} <= set(dataset.variables):
-        return BOUNDARIES
-    if {"seen", "fitted"} <= set(dataset.variables):
-        return FIT
-    if {"first_order", "total_order"} <= set(dataset.variables):
-        return INDICES
+    there = {*dataset.variables, *dataset.dims}
+    if found := [kind for kind, marks in _MARKS.items() if marks <= there]:
+        return found[0]
     return RUN if set(VARIABLES) & set(dataset.data_vars) else None

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -110,15 +111,8 @@ def smoothed(x: Array, y: Array, *, closed: bool, parts: int = 8) -> tuple[Array
         points = np.concatenate([points[-2:], points, points[:3]])
     steps = np.hypot(*np.diff(points, axis=0).T)
     points, steps = points[np.append(True, steps > 0)], steps[steps > 0]
-    chords = np.diff(points, axis=0) / steps[:, None]
-    inner = (chords[:-1] * steps[1:, None] + chords[1:] * steps[:-1, None]) / (steps[:-1] + steps[1:])[:, None]
-    slopes = np.concatenate([2 * chords[:1] - inner[:1], inner, 2 * chords[-1:] - inner[-1:]])
-    t, h = np.arange(parts)[:, None, None] / parts, steps[:, None]
-    curve = (
-        (1 + 2 * t) * (1 - t) ** 2 * points[:-1] + t * (1 - t) ** 2 * h * slopes[:-1]
-        + t**2 * (3 - 2 * t) * points[1:] + t**2 * (t - 1) * h * slopes[1:]
-    )  # fmt: skip
-    whole = np.concatenate([curve.swapaxes(0, 1).reshape(-1, 2), points[-1:]])
-    if closed:
-        whole = whole[2 * parts : -2 * parts]
-    return whole[:, 0], whole[:, 1]
+    along = np.append(0.0, np.cumsum(steps))
+    spline = CubicHermiteSpline(along, points, np.gradient(points, along, axis=0, edge_order=2))
+    places = np.interp(np.arange(parts * len(steps) + 1) / parts, np.arange(len(along)), along)
+    curve = spline(places[2 * parts : -2 * parts] if closed else places)
+    return curve[:, 0], curve[:, 1]

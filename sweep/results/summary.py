@@ -20,18 +20,9 @@ def failed_fraction(dataset: xr.Dataset) -> float:
     return float(dataset["status"].isin(FAILURES).mean())
 
 
-def summarize(dataset: xr.Dataset) -> str:
-    """A few lines on the results of a run."""
-    return "\n".join(_summary(dataset))
-
-
 def describe(dataset: xr.Dataset) -> str:
     """A few lines on the results of a dataset of any kind."""
-    if lines := _LINES.get(kind(dataset) or ""):
-        return "\n".join(lines(dataset))
-    if "status" in dataset:
-        return summarize(dataset)
-    return "no status: predictions, or a part of a run"
+    return "\n".join(_LINES.get(kind(dataset), _run)(dataset))
 
 
 def contents(dataset: xr.Dataset) -> str:
@@ -139,7 +130,11 @@ def _count(variable: xr.DataArray, of: str) -> str:
     return f"{variable.size} {of} ({axes or 'no axis'})"
 
 
-def _summary(dataset: xr.Dataset) -> Iterator[str]:
+def _run(dataset: xr.Dataset) -> Iterator[str]:
+    """How cells ended, what they count, how exact they are, and what they cost."""
+    if "status" not in dataset:
+        yield "no status: predictions, or a part of a run"
+        return
     status = np.ravel(dataset["status"].values)
     dims = " × ".join(f"{d} {n}" for d, n in dataset["status"].sizes.items()) or "one cell"
     ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if code in status)
@@ -197,7 +192,7 @@ def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:
     return f"{line}; as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
 
 
-_LINES: dict[str, Callable[[xr.Dataset], Iterator[str]]] = {
+_LINES: dict[str | None, Callable[[xr.Dataset], Iterator[str]]] = {
     TRAJECTORY: _trajectories,
     CRITICAL: _critical,
     BOUNDARIES: _boundaries,

@@ -16,7 +16,7 @@ from sweep.engine.estimate import estimate
 from sweep.grid import Grid
 from sweep.kernels.status import IMPOSSIBLE
 from sweep.plots.marks import blank, legend, marks
-from sweep.results.summary import failed_fraction, summarize
+from sweep.results.summary import describe, failed_fraction
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
@@ -49,7 +49,7 @@ def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> Non
         "6 cells, centre of mass outside the ellipsoid, the first at b=0.9, offset=1; "
         "2 cells, upright rest is not stable, the first at b=0.9, offset=0"
     )
-    words = summarize(edge)
+    words = describe(edge)
     assert "8 impossible" in words
     assert "2 cells, upright rest is not stable" in words
     assert "set by accuracy in 10 cells" in words
