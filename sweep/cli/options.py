@@ -20,25 +20,19 @@ if TYPE_CHECKING:
 PATH = click.Path(path_type=Path)
 
 
-def _begun_keys(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """The keys of a configuration that go on from what was typed."""
+def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> list[CompletionItem]:
+    """The keys of a configuration, or with `--at` the parameters, that go on from what was typed."""
     from click.shell_completion import CompletionItem
 
     from sweep.config.schema import PATHS
 
-    return [CompletionItem(f"{key}=", help=words) for key, words in PATHS.items() if key.startswith(begun)]
-
-
-def begun_parameters(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """The parameters that go on from what was typed."""
-    from click.shell_completion import CompletionItem
-
-    return [CompletionItem(f"{p.name}=", help=p.long_name) for p in PARAMETERS.values() if p.name.startswith(begun)]
+    known = PATHS if parameter.name == "settings" else {p.name: p.long_name for p in PARAMETERS.values()}
+    return [CompletionItem(f"{key}=", help=words) for key, words in known.items() if key.startswith(typed)]
 
 
 FILE = click.argument("file", type=PATH)
 SETTINGS = click.option(
-    "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=_begun_keys,
+    "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=begun,
     help="Replace a value of the configuration, e.g. friction.mu=60, or friction.mu=20..60:41 for the range "
     "START..STOP:NUM (repeatable).",
 )  # fmt: skip

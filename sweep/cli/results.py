@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -32,15 +32,11 @@ if TYPE_CHECKING:
 @click.option("--width", metavar="LENGTH",
               help="Width of a figure for print, such as 85mm, with text of 6 points or more.")  # fmt: skip
 @click.option("--no-title", is_flag=True, help="Draw no title.")
-@click.option(
-    "--output",
-    type=PATH,
-    help=f"Picture to write; its suffix names the format: {formats.ANY} [default: a PNG beside FILE].",
-)
+@click.option("--output", type=PATH, help=f"Picture to write; its suffix names the format: {formats.ANY} "
+              "[default: a PNG beside FILE].")  # fmt: skip
 def plot(
-    files: tuple[Path, ...], variable: str | None, x: str | None, y: str | None, cells: tuple[str, ...],
-    limits: str | None, cmap: str | None, contours: bool, histogram: bool, width: str | None, no_title: bool,
-    output: Path | None,
+    files: tuple[Path, ...], variable: str | None, cells: tuple[str, ...], limits: str | None, no_title: bool,
+    output: Path | None, **how: Any,
 ) -> None:  # fmt: skip
     """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries.
 
@@ -56,11 +52,14 @@ def plot(
     if formats.suffix(target) == formats.PAGE:
         if len(files) > 1:
             refuse(f"--output {target}", f"a page shows one dataset; write a {formats.A_PICTURE} of several")
-        given = {"--limits": limits, "--cmap": cmap, "--contours": contours, "--histogram": histogram, "--width": width}
-        for option, value in given.items():
-            if value:
-                refuse(option, f"not for a page; write a {formats.A_PICTURE}")
-        _plot_page(files[0], target, variable, x, y, sel)
+        for option, value in {"limits": limits, **how}.items():
+            if value and option not in ("x", "y"):
+                refuse(f"--{option}", f"not for a page; write a {formats.A_PICTURE}")
+        with needs_bokeh("--output"):
+            from sweep.explorer.page import save_html
+        with about(files[0]):
+            save_html(opened(files[0]), target, variable, how["x"], how["y"], sel)
+        say(f"wrote {target}")
         return
     if formats.suffix(target) not in formats.PICTURES:
         refuse(f"--output {target}", f"unknown format; write a {formats.ANY}")
@@ -70,10 +69,7 @@ def plot(
             for name, taken in panels.nearest(dataset, sel).items():
                 say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
     with about(files[0]):
-        picture.plot(
-            datasets, variable, x=x, y=y, sel=sel, limits=span, cmap=cmap, contours=contours, histogram=histogram,
-            width=width, title=not no_title, output=target,
-        )  # fmt: skip
+        picture.plot(datasets, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
     say(f"wrote {target}")
 
 
@@ -110,17 +106,6 @@ def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -
     say("stopped")
     sys.stdout.flush()
     os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it
-
-
-def _plot_page(
-    file: Path, target: Path, variable: str | None, x: str | None, y: str | None, sel: dict[str, float]
-) -> None:  # fmt: skip
-    """Draw a map as a page of its own."""
-    with needs_bokeh("--output"):
-        from sweep.explorer.page import save_html
-    with about(file):
-        save_html(opened(file), target, variable, x, y, sel)
-    say(f"wrote {target}")
 
 
 def opened(file: Path) -> xr.Dataset:

@@ -12,7 +12,7 @@ import click
 
 from sweep import interrupt
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, resumable, say
-from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun_parameters, cells_of, configured
+from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured
 from sweep.parameters import PARAMETERS
 from sweep.studies import BOUNDARY_WIDTH, SPIN_WIDTH
 
@@ -54,7 +54,7 @@ DRY_RUN = click.option(
     "--dry-run", is_flag=True, help="Print how much would be simulated, and about how long it takes; compute nothing."
 )
 AT = click.option(
-    "--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun_parameters,
+    "--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun,
     help="A parameter of the cell, e.g. --at mu=60 --at b=3; given twice, it makes two runs.",
 )  # fmt: skip
 FRESH = click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")

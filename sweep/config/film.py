@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from pathlib import Path
 from typing import get_args
@@ -71,13 +70,11 @@ def _rows(path: Path) -> tuple[list[str], Array]:
         with path.open(encoding="utf-8-sig") as stream:
             first = stream.readline()
         mark = max(",;\t", key=first.count)
-        header = next(csv.reader([first.strip()], delimiter=mark), [])
         table = pandas.read_csv(path, sep=mark, encoding="utf-8-sig", dtype=str, keep_default_na=False)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is no table of numbers"
         raise _fault(path, None, f"cannot be read: {reason}") from None
-    numbers = [pandas.to_numeric(table.iloc[:, i], errors="coerce") for i in range(table.shape[1])]
-    return [name.strip() for name in header], np.array(numbers, float).reshape(len(numbers), -1).T
+    return list(map(str.strip, table)), table.apply(pandas.to_numeric, errors="coerce").to_numpy(float)
 
 
 def _columns(path: Path, header: list[str]) -> dict[str, tuple[int, float]]:
