@@ -66,7 +66,7 @@ def _variables() -> tuple[Row, list[Row]]:
     for name, spec in PROBABILITIES.items():
         rows.append((f"`{name}`", spec.dtype, "all but `sample`, and `count`", spec.long_name))
     for name, spec in dataset.VERIFIED.items():
-        rows.append((f"`verified_{name}`", spec.dtype, "`verified`", spec.long_name))
+        rows.append((f"`{name}`", spec.dtype, "`verified`", spec.long_name))
     return ("variable", "type", "axes", "meaning"), rows
 
 

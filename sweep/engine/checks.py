@@ -70,8 +70,8 @@ def verify(config: Config, cells: Array, first: Mapping[str, Array], work: Work)
     again["spin_difference"] = np.abs(again["spin_final"] - first["spin_final"])
     if "reversals" in again:
         again["count_changed"] = again["reversals"] != first["reversals"]
-    found = {f"verified_{name}": again[name] for name in dataset.VERIFIED if name in again}
-    return {"verified_cell": cells[rows]} | found
+    again["cell"] = cells[rows]
+    return {name: again[own] for name in dataset.VERIFIED if (own := name.removeprefix("verified_")) in again}
 
 
 def results(job: Plan, errors: Errors | None, work: Work) -> dict[str, Array]:

@@ -53,79 +53,79 @@ ROWS = {CASE: "row of the table of cases", SAMPLE: "number of the sample"}
 """What the index along the rows of a table says."""
 
 
+def _number(long_name: str, **how: Any) -> Variable:
+    return Variable("float64", "1", long_name, **how)
+
+
+def _flag(long_name: str, meanings: Mapping[int, str], **how: Any) -> Variable:
+    return Variable("int8", "1", long_name, meanings, **how)
+
+
 def _critical(sign: str, event: str, source: str) -> Variable:
     where = "positive spin above" if sign == "+" else "negative spin below"
-    return Variable("float64", "1", f"{where} which {event}, by {source}, in sqrt(g/c)", per_body=True)
+    return _number(f"{where} which {event}, by {source}, in sqrt(g/c)", per_body=True)
 
 
 _FORMULA, _EIGENVALUES = "the formula of Takano (2011)", "the eigenvalues of the model"
+_SIDES = {"plus": "+", "minus": "-"}
 
 VARIABLES: dict[str, Variable] = {
     **{name: spec for kind in measures.MEASURES.values() for name, spec in kind.variables.items()},
-    "status": Variable("int8", "1", "how the simulation of the trajectory ended", STATUSES),
-    "inferred": Variable("int8", "1", "how reversals and status were found", {0: "simulated", 1: "inferred"}),
-    "spin_final": Variable("float64", "1", "spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
-    "spin_error": Variable("float64", "1", "estimated error of the spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
-    "sensitive": Variable(
-        "int8",
-        "1",
-        "whether other steps, or starts 1e-10 apart, give another number of reversals",
-        {0: "firm", 1: "sensitive"},
+    "status": _flag("how the simulation of the trajectory ended", STATUSES),
+    "inferred": _flag("how reversals and status were found", {0: "simulated", 1: "inferred"}),
+    "spin_final": _number("spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
+    "spin_error": _number("estimated error of the spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
+    "sensitive": _flag(
+        "whether other steps, or starts 1e-10 apart, give another number of reversals", {0: "firm", 1: "sensitive"},
         of_sound_runs=True,
     ),
-    "decided": Variable(
-        "int8",
-        "1",
+    "decided": _flag(
         "whether the number of reversals is final, and its margins are larger than ten times their errors",
-        {0: "open", 1: "decided"},
-        of_sound_runs=True,
+        {0: "open", 1: "decided"}, of_sound_runs=True,
     ),
-    "t_stop": Variable("float64", "1", "time at which the simulation ended, in sqrt(c/g)"),
-    "method": Variable(
-        "int8", "1", "integration method of the trajectory", {method.code: name for name, method in METHODS.items()}
-    ),
-    "step": Variable("float64", "1", "integration step, in sqrt(c/g)"),
-    "step_rule": Variable("int8", "1", "what set the integration step", STEP_RULES),
+    "t_stop": _number("time at which the simulation ended, in sqrt(c/g)"),
+    "method": _flag("integration method of the trajectory", {each.code: name for name, each in METHODS.items()}),
+    "step": _number("integration step, in sqrt(c/g)"),
+    "step_rule": _flag("what set the integration step", STEP_RULES),
     "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),
-    "t_first_reversal_predicted": Variable(
-        "float64", "1", "time of the first spin reversal predicted by Garcia and Hubbard (1988), in sqrt(c/g)"
+    "t_first_reversal_predicted": _number(
+        "time of the first spin reversal predicted by Garcia and Hubbard (1988), in sqrt(c/g)"
     ),
-    "reversal_time_reason": Variable(
-        "int8", "1", "whether there is a predicted time of the first reversal, and why not", reversal_time.REASONS
+    "reversal_time_reason": _flag(
+        "whether there is a predicted time of the first reversal, and why not", reversal_time.REASONS
     ),
-    "n_c1_plus": _critical("+", "a tiny rattle grows", _FORMULA),
-    "n_c1_minus": _critical("-", "a tiny rattle grows", _FORMULA),
-    "n_c2_plus": _critical("+", "the spin reverses", _FORMULA),
-    "n_c2_minus": _critical("-", "the spin reverses", _FORMULA),
-    "n_c1_plus_linear": _critical("+", "a tiny rattle grows", _EIGENVALUES),
-    "n_c1_minus_linear": _critical("-", "a tiny rattle grows", _EIGENVALUES),
-    "form_factor": Variable("float64", "1", "form factor L(f) of Takano (2011)", per_body=True),
+    **{f"n_c1_{side}": _critical(sign, "a tiny rattle grows", _FORMULA) for side, sign in _SIDES.items()},
+    **{f"n_c2_{side}": _critical(sign, "the spin reverses", _FORMULA) for side, sign in _SIDES.items()},
+    **{f"n_c1_{side}_linear": _critical(sign, "a tiny rattle grows", _EIGENVALUES) for side, sign in _SIDES.items()},
+    "form_factor": _number("form factor L(f) of Takano (2011)", per_body=True),
     **{
         f"n_c2_{side}_simulated{suffix}": _critical(sign, "the spin reverses", f"simulation: {words}")
-        for side, sign in (("plus", "+"), ("minus", "-"))
+        for side, sign in _SIDES.items()
         for suffix, words in (("", "middle of the bracket"), ("_inner", "end nearer zero"), ("_outer", "far end"))
     },
     **{
-        f"n_{n}_{side}_reason": Variable(
-            "int8", "1", f"whether {source} find n_{n}_{side}, and why not", REASONS, per_body=True
-        )
+        f"n_{n}_{side}_reason": _flag(f"whether {source} find n_{n}_{side}, and why not", REASONS, per_body=True)
         for n, source in (("c1", "eigenvalues"), ("c2", "simulations"))
-        for side in ("plus", "minus")
+        for side in _SIDES
     },
-    "critical_reason": Variable("int8", "1", "first of the four reasons that is not exists", REASONS, per_body=True),
-}
+    "critical_reason": _flag("first of the four reasons that is not exists", REASONS, per_body=True),
+}  # fmt: skip
 
 
 def _again(name: str) -> Variable:
     return replace(VARIABLES[name], long_name=f"{VARIABLES[name].long_name}; second run, with finer steps")
 
 
-_VERIFIED_CELL = Variable("int64", "1", "cell run again: its index in the C order of the axes")
 VERIFIED: dict[str, Variable] = {
-    **{name: _again(name) for name in ("reversals", "t_last_reversal", "spin_final", "status", "energy_error", "step")},
-    "spin_difference": Variable("float64", "1", "difference in spin between the two runs at t_stop, in sqrt(g/c)"),
-    "count_changed": Variable("int8", "1", "whether the two runs count other reversals", {0: "no", 1: "yes"}),
+    "verified_cell": Variable("int64", "1", "cell run again: its index in the C order of the axes"),
+    **{
+        f"verified_{name}": _again(name)
+        for name in ("reversals", "t_last_reversal", "spin_final", "status", "energy_error", "step")
+    },
+    "verified_spin_difference": _number("difference in spin between the two runs at t_stop, in sqrt(g/c)"),
+    "verified_count_changed": _flag("whether the two runs count other reversals", {0: "no", 1: "yes"}),
 }
+"""The variables over the cells that were run again."""
 
 
 def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
@@ -201,7 +201,7 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
 
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
     """Raise a `ConfigError` if a parameter has the name of a variable, or of one of these `series`."""
-    own = {*VARIABLES, *PROBABILITIES, *ROWS, *(f"verified_{name}" for name in ("cell", *VERIFIED)), *series}
+    own = {*VARIABLES, *PROBABILITIES, *ROWS, *VERIFIED, *series}
     names = own & set(config.tier.parameters)
     if names:
         words = f"parameter {min(names)}: is reserved for a variable of the dataset; rename it"
@@ -240,14 +240,13 @@ def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, A
 
 def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
     """`result`, with the results of a second run of some cells (`again`) along the dimension `verified`."""
-    variables = {
-        f"verified_{name}": xr.Variable(
-            "verified", np.asarray(again[f"verified_{name}"]).astype(spec.dtype), described(spec, config.units)
-        )
-        for name, spec in {"cell": _VERIFIED_CELL, **VERIFIED}.items()
-        if f"verified_{name}" in again
-    }
-    result = result.assign(variables)
+    result = result.assign(
+        {
+            name: xr.Variable("verified", np.asarray(again[name]).astype(spec.dtype), described(spec, config.units))
+            for name, spec in VERIFIED.items()
+            if name in again
+        }
+    )
     if "verified_count_changed" in again:
         result.attrs["verified_counts_changed"] = int(again["verified_count_changed"].sum())
     if "verified_spin_difference" in again:
