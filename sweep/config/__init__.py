@@ -232,7 +232,8 @@ def _parameters(
 ) -> dict[str, Values]:
     """Order the parameters of the model as axes, with defaults; columns of the table and missing ones are left out."""
     found = {}
-    for name in sorted(model.parameters, key=lambda n: (_rank(n, FIRST_AXES), _rank(n, tuple(given)))):
+    order = dict.fromkeys((*FIRST_AXES, *given, *model.parameters))
+    for name in (name for name in order if name in model.parameters):
         default = None if known[name] in physics.required else known[name].default
         if name in given:
             found[name] = given[name]
@@ -259,7 +260,3 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
     if "t_end" not in said and MODES in model.offers and integrator.stop_when_settled:
         found |= {"t_end": schema.LATER, "patience": integrator.patience or schema.T_END}
     return Integrator(**{**dict(integrator), **found})
-
-
-def _rank(name: str, names: tuple[str, ...]) -> int:
-    return names.index(name) if name in names else len(names)

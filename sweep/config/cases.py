@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sweep.config import faults
-from sweep.config.document import Document, number
+from sweep.config.document import Document, is_number, number
 from sweep.config.faults import ConfigError, Fault, brief, refusal, suggestion
 from sweep.config.values import MAX_AXIS
 from sweep.parameters import Parameter
@@ -114,5 +114,5 @@ def _wrong(table: Mapping[str, Any], known: Mapping[str, Parameter]) -> Iterator
             yield (name,), refusal(column, "a list of numbers")
         else:
             for i, each in enumerate(column):
-                if isinstance(each, bool) or not isinstance(each, int | float) or not known[name].allows(each):
+                if not is_number(each) or not known[name].allows(each):
                     yield (name, i), refusal(each, known[name].allowed)

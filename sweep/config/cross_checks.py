@@ -62,10 +62,9 @@ def of_all_cells(config: Config) -> Iterator[Misfit]:
     cells = Grid.of(config).size
     if cells > MAX_CELLS:
         yield (), f"{cells} cells are too many; keep to {MAX_CELLS}"
-    if config.refine and cells > MAX_CELLS_IN_MEMORY:
-        yield ("refine",), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY}, or set it to 0"
-    if config.samples and cells > MAX_CELLS_IN_MEMORY:
-        yield ("samples",), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY} in all"
+    for name, way_out in (("refine", ", or set it to 0"), ("samples", " in all")):
+        if getattr(config, name) and cells > MAX_CELLS_IN_MEMORY:
+            yield (name,), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY}{way_out}"
     for path, check in (
         (("body",), bodies.impossible),
         (("start", "x0"), bodies.misplaced),
@@ -92,10 +91,9 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
             yield path, f"must be {config.table[name].allowed}, but {words}; choose another distribution"
         if name in model.positive and 0.0 in value.numbers:
             yield path, f"must be > 0 for the {model.name} model, not 0"
-    if config.samples and not columns:
-        yield ("samples",), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
-    if config.until and not columns:
-        yield ("until",), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
+    for name in ("samples", "until"):
+        if getattr(config, name) and not columns:
+            yield (name,), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
     if config.until and "reversals" not in config.measure:
         yield ("measure",), "must have reversals, on which until depends; add them, or leave out until"
     for name, column in () if config.samples else columns.items():

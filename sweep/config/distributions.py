@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from sweep.config.document import is_number
 from sweep.config.faults import refusal
 from sweep.config.messages import wrong
 from sweep.grid import Array
@@ -67,7 +68,7 @@ class Distribution:
             raise wrong(refusal(numbers, "[{}, {}]".format(*family.words)), name)
         for i, (number, word, above) in enumerate(zip(numbers, family.words, family.above, strict=True)):
             least = numbers[0] if above == "first" else above
-            if not _is_number(number) or not number > least:
+            if not (is_number(number) and isfinite(number) and number > least):
                 bound = "" if least == -inf else f" > {least:g}"
                 raise wrong(refusal(number, f"the {word}, a finite number{bound}"), name, i)
         return cls(name, *map(float, numbers))
@@ -116,7 +117,3 @@ def chances(parameters: int, number: int, seed: int) -> Array:
 
 _BITS = 52
 """Binary digits of a Sobol point."""
-
-
-def _is_number(raw: Any) -> bool:
-    return isinstance(raw, int | float) and not isinstance(raw, bool) and isfinite(raw)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from math import inf, nan
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from ruamel.yaml import YAML
@@ -128,6 +128,11 @@ def parse_value(text: str, source: str) -> Any:
         return {"start": float(span["start"]), "stop": float(span["stop"]), "num": float(span["num"])}
     node = _compose(text, source)
     return None if node is None else _values(node, Document(source))
+
+
+def is_number(value: Any) -> TypeGuard[float]:
+    """Tell a number, which a truth value is not."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def number(text: str) -> float | None:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic_core import PydanticCustomError
 
 from sweep.config.distributions import FAMILIES, Distribution
-from sweep.config.document import number, plain_data
+from sweep.config.document import is_number, number, plain_data
 from sweep.config.faults import fault_of, refusal
 from sweep.config.messages import describe, wrong
 from sweep.parameters import Parameter
@@ -144,7 +144,5 @@ def _axis(numbers: list[float], spec: Any = None) -> Values:
 
 
 def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
-    is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
-    if not is_number or not parameter.allows(raw):
-        axis = "" if is_number or at else _MORE
-        raise wrong(refusal(raw, parameter.allowed + axis), *at)
+    if not is_number(raw) or not parameter.allows(raw):
+        raise wrong(refusal(raw, parameter.allowed + ("" if is_number(raw) or at else _MORE)), *at)

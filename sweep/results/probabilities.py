@@ -12,13 +12,8 @@ from sweep.variables import Variable
 _END = "end of its interval of 95 %, by Wilson's formula; of samples at Sobol points it is wide enough"
 
 PROBABILITIES = {
-    "probability": Variable("float64", "1", "probability of so many reversals or more", along="count"),
-    "probability_low": Variable(
-        "float64", "1", f"probability of so many reversals or more: lower {_END}", along="count"
-    ),
-    "probability_high": Variable(
-        "float64", "1", f"probability of so many reversals or more: upper {_END}", along="count"
-    ),
+    f"probability{end}": Variable("float64", "1", f"probability of so many reversals or more{words}", along="count")
+    for end, words in (("", ""), ("_low", f": lower {_END}"), ("_high", f": upper {_END}"))
 }
 """The variables over the axes that samples have in common, and over counts from one on."""
 
