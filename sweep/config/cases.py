@@ -20,6 +20,9 @@ Columns = dict[str, tuple[float, ...]]
 Place = Callable[[faults.Path, str], Fault]
 """Makes a fault of its path in a table, such as the name of a column and the number of a row, and of its words."""
 
+_Table = tuple[dict[str, list[Any]], Place, list[Fault]]
+"""The columns of a file, what makes faults in it, and those of its shape."""
+
 
 def read(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns:
     """Read the table `name`, a path relative to the configuration's folder, and check it cell by cell.
@@ -42,10 +45,10 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns
 
 def of_columns(source: Document, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> Columns:
     """Check a table that the configuration itself gives, by column; result and errors are as of `read`."""
-    return _checked(table, lambda path, words: source.fault(("cases", *path), words), known)
+    return _checked(table, lambda path, words: source.fault(("cases", *path), words), [], known)
 
 
-def _of_csv(source: Document, name: str) -> tuple[dict[str, list[Any]], Place]:
+def _of_csv(source: Document, name: str) -> _Table:
     """The columns of a CSV file, of numbers where its cells spell such."""
     path, text = source.read_beside("cases", name)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -55,7 +58,9 @@ def _of_csv(source: Document, name: str) -> tuple[dict[str, list[Any]], Place]:
         reason = f"{brief(str(path))}: not a readable CSV file: {error}"
         raise ConfigError([source.fault(("cases",), reason)]) from None
     (_, header), *rows = lines or [(1, [])]
-    if misshapen := list(_misshapen(str(path), header, rows)):
+    misshapen = list(_misshapen(str(path), header, rows))
+    rows = [(line, row) for line, row in rows if len(row) == len(header)]
+    if not 0 < len(rows) <= MAX_AXIS:
         raise ConfigError(misshapen)
     cells = [[text if (value := number(text)) is None else value for text in row] for _, row in rows]
 
@@ -64,12 +69,12 @@ def _of_csv(source: Document, name: str) -> tuple[dict[str, list[Any]], Place]:
         line = rows[int(row[0])][0] if row else 1
         return Fault(str(path), line, header.index(str(name)) + 1, (name,), words)
 
-    return {name: [row[i] for row in cells] for i, name in enumerate(header)}, place
+    return {name: [row[i] for row in cells] for i, name in enumerate(header)}, place, misshapen
 
 
 def _misshapen(file: str, header: list[str], rows: list[tuple[int, list[str]]]) -> Iterator[Fault]:
     if not header:
-        yield Fault(file, None, None, (), "empty; its first line has to name the columns")
+        yield Fault(file, None, None, (), "empty; its first line has to name the columns, such as mu,n0")
     elif not 0 < len(rows) <= MAX_AXIS:
         yield Fault(file, None, None, (), f"must have 1 to {MAX_AXIS} rows under its first line, not {len(rows)}")
     for column, name in enumerate(header, start=1):
@@ -80,7 +85,7 @@ def _misshapen(file: str, header: list[str], rows: list[tuple[int, list[str]]]) 
             yield Fault(file, line, None, (), f"{len(row)} values, but {len(header)} columns in line 1")
 
 
-def _of_parquet(source: Document, name: str) -> tuple[dict[str, list[Any]], Place]:
+def _of_parquet(source: Document, name: str) -> _Table:
     import pandas
 
     path = Path(source.file).parent / name
@@ -92,12 +97,12 @@ def _of_parquet(source: Document, name: str) -> tuple[dict[str, list[Any]], Plac
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "not a readable Parquet file"
     else:
-        return table, lambda at, words: Fault(str(path), None, None, at, words)
+        return table, lambda at, words: Fault(str(path), None, None, at, words), []
     raise ConfigError([source.fault(("cases",), f"{brief(str(path))}: {reason}")])
 
 
-def _checked(table: Mapping[str, Any], place: Place, known: Mapping[str, Parameter]) -> Columns:
-    if found := [place(path, words) for path, words in _wrong(table, known)]:
+def _checked(table: Mapping[str, Any], place: Place, misshapen: list[Fault], known: Mapping[str, Parameter]) -> Columns:
+    if found := [*misshapen, *(place(path, words) for path, words in _wrong(table, known))]:
         raise ConfigError(found)
     return {name: tuple(map(float, column)) for name, column in table.items()}
 
