@@ -3,7 +3,7 @@
     python scripts/many_cells.py [LARGEST]
 
 LARGEST is the number of cells of the last run, by default 10⁷.  A cell is cheap, so that what is measured is what goes
-on around the kernel: dopri5 to t = 2, reversals alone, and no second run for the error.
+on around the kernel: dopri5 to t = 2, reversals alone, no second run for the error, and no look at what comes after.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ name: cells
 friction: {{mu: {{start: 20, stop: 200, num: {frictions}}}}}
 start: {{n0: {{start: 0.02, stop: 0.1, num: {spins}}}}}
 measure: [reversals]
-integrator: {{method: dopri5, t_end: 2, estimate_errors: false}}
+integrator: {{method: dopri5, t_end: 2, estimate_errors: false, stop_when_settled: false}}
 verify: 0
 """
 

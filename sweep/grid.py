@@ -129,16 +129,17 @@ class Grid:
         """Index of the first cell of a tile, in the C order of the grid."""
         return int(np.ravel_multi_index([at.start for at in tile], self.shape)) if tile else 0
 
-    def bodies(self) -> tuple[Grid, Array]:
-        """The grid of the bodies, without the start parameters, and for each cell the index of its body in it.
-
-        Every case is a body of its own.
-        """
+    def of_bodies(self) -> Grid:
+        """The grid of the bodies, without the start parameters.  Every case is a body of its own."""
         fixed = {name: float(values[0]) for name, values in self._at([slice(1)] * len(self.shape)).items()}
         kept = {name: values for name, values in self.axes.items() if name not in START}
         table = self.table if self.table and (self.row == CASE or set(self.table) - START) else None
         constants = self.constants | {name: fixed[name] for name in fixed if name not in {**kept, **(table or {})}}
-        bodies = replace(self, axes=kept, constants=constants, table=table)
+        return replace(self, axes=kept, constants=constants, table=table)
+
+    def bodies(self) -> tuple[Grid, Array]:
+        """The grid of the bodies, and for each cell the index of its body in it."""
+        bodies = self.of_bodies()
         own = [n if dim in bodies.dims else 1 for dim, n in zip(self.dims, self.shape, strict=True)]
         return bodies, np.broadcast_to(np.arange(bodies.size).reshape(own), self.shape).ravel()
 

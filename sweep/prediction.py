@@ -78,7 +78,7 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     if not isinstance(tier, Model):
         return prediction
     if LINEAR not in tier.offers:
-        nothing = np.full(grid.bodies()[0].size, np.nan)
+        nothing = np.full(grid.of_bodies().size, np.nan)
         found = Stability((nothing, nothing), np.full((6, grid.size), np.nan), applies=not tier.origin)
     else:
         found = _stability(tier, grid)
@@ -112,7 +112,7 @@ def _stability(model: Model, grid: Grid) -> Stability:
 
 def formulas(tier: Tier, grid: Grid) -> Prediction:
     """The prediction without the eigenvalues: what is left costs next to nothing."""
-    bodies = grid.bodies()[0].columns()
+    bodies = grid.of_bodies().columns()
     found = None
     if FORMULAS in tier.offers:
         found = Formulas(analytic.reversal_count(grid.columns()), analytic.critical_spins(bodies))

@@ -7,6 +7,7 @@ worker dies, another one computes the tile it was working on.
 from __future__ import annotations
 
 import logging
+import math
 import signal
 import threading
 import time
@@ -33,6 +34,10 @@ AHEAD = 3
 
 PATIENCE = "10s"
 """How long to wait for a scheduler to answer."""
+
+_RECOUNT = 1.0
+"""Time in s between two questions how many workers there are, who come and go.  Asked for each tile, the
+answers of 1000 workers would have kept this process busy."""
 
 _POLL = 0.01
 """Time in seconds between two looks at whether a tile has come back."""
@@ -69,10 +74,13 @@ class Cluster:
         shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
         waiting, numbers = iter(todo), dict[Any, int]()
         running = as_completed(loop=self.client.loop)
+        workers, counted = 0, -math.inf
 
         def send_ahead() -> None:
-            # The number of workers is asked each time, since they come and go.
-            while len(numbers) < AHEAD * max(1, len(self.client.scheduler_info(n_workers=-1)["workers"])):
+            nonlocal workers, counted
+            if time.monotonic() > counted + _RECOUNT:
+                workers, counted = len(self.client.scheduler_info(n_workers=-1)["workers"]), time.monotonic()
+            while len(numbers) < AHEAD * max(1, workers):
                 if (i := next(waiting, None)) is None:
                     return
                 future = self.client.submit(_work, shared, i, pure=False)

@@ -210,7 +210,7 @@ def check_names(config: Config, series: Iterable[str] = ()) -> None:
 
 def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]:
     """Those of the variables `names` that extend over cells or bodies, each with the grid that it extends over."""
-    bodies, _ = grid.bodies()
+    bodies = grid.of_bodies()
     return {name: (bodies if spec.per_body else grid, spec) for name, spec in VARIABLES.items() if name in names}
 
 
