@@ -34,6 +34,13 @@ class Parameter:
     """Exclusive upper bound."""
     at_least: float = -inf
     """Inclusive lower bound."""
+    words: str = ""
+    """What figures call it, with its symbol; by default its `long_name`."""
+
+    @property
+    def symbol(self) -> str:
+        """What figures write for it: the Greek or indexed letter in its words, or else its name."""
+        return next((word for word in self.words.split() if not word.isascii()), self.name)
 
     @property
     def place(self) -> tuple[str, ...]:
@@ -60,7 +67,7 @@ class Parameter:
 
 
 _SIZE = {"above": 0, "below": 1e6}
-_MASS = {"above": 0, "below": 1e12}
+_MASS: dict[str, Any] = {"above": 0, "below": 1e12}
 _MOMENT = {"above": 0, "below": 1e24}
 _PRODUCT = {"above": -1e24, "below": 1e24}
 _COEFFICIENT = {"at_least": 0, "below": 1e6}
@@ -70,15 +77,17 @@ _SLIP = {"above": -1e6, "below": 1e6}
 _ANGLE = {"units": "radian", "above": -pi / 2, "below": pi / 2}
 _POINT: dict[str, Any] = {}
 
-_Row = tuple[str, str, float | None, dict[str, Any]]
-"""Name, meaning, default, and the bounds of a parameter."""
+_Row = tuple[str, str, float | None, dict[str, Any], *tuple[str, ...]]
+"""Name, meaning, default, and the bounds of a parameter, and what figures call it."""
 
 _SECTIONS: dict[str, tuple[_Row, ...]] = {
     "body": (
-        ("a", "semi-axis of the ellipsoid at delta from x (long axis), in c", 10.0, _SIZE),
-        ("b", "semi-axis of the ellipsoid at delta from y (short axis), in c", 3.0, _SIZE),
-        ("c", "semi-axis of the ellipsoid along z, the unit of length", 1.0, _SIZE),
-        ("delta", "angle from the ellipsoid's axes to the axes of inertia", 0.03, _ANGLE),
+        ("a", "semi-axis of the ellipsoid at delta from x (long axis), in c", 10.0, _SIZE, "long semi-axis a"),
+        ("b", "semi-axis of the ellipsoid at delta from y (short axis), in c", 3.0, _SIZE, "short semi-axis b"),
+        ("c", "semi-axis of the ellipsoid along z, the unit of length", 1.0, _SIZE,
+         "height c of the center over the table"),
+        ("delta", "angle from the ellipsoid's axes to the axes of inertia", 0.03, _ANGLE,
+         "angle δ of the axes of inertia"),
         ("offset", "depth of the centre of mass below the ellipsoid's centre, in c", 0.0, _POINT),
         ("mass", "mass, in m", None, _MASS),
         ("Ixx", "central moment of inertia about x, in m c^2", None, _MOMENT),
@@ -90,13 +99,14 @@ _SECTIONS: dict[str, tuple[_Row, ...]] = {
     ),
     "": (("gravity", "acceleration of free fall, in g", 9.80665, _SIZE),),
     "friction": (
-        ("mu", "viscous friction coefficient, in 1/sqrt(g c)", None, _VISCOUS),
+        ("mu", "viscous friction coefficient, in 1/sqrt(g c)", None, _VISCOUS, "friction μ"),
         ("speed", "slip velocity from which on friction is that of slipping, in sqrt(g c)", None, _SIZE),
         ("mu_static", "coefficient of friction at no slip", None, _COEFFICIENT),
         ("speed_stick", "slip velocity over which static friction sets in, in sqrt(g c)", None, _SIZE),
         ("radius_contact", "radius of the contact, in c", None, _SIZE),
         ("mu_viscous", "viscous part of the coefficient of friction, in 1/sqrt(g c)", 0.0, _VISCOUS),
-        ("sigma", "couple per angular velocity that opposes it, in m c sqrt(g c)", 0.0, _VISCOUS),
+        ("sigma", "couple per angular velocity that opposes it, in m c sqrt(g c)", 0.0, _VISCOUS,
+         "couple σ per angular velocity"),
         ("mu_rolling", "coefficient of rolling friction", None, _COEFFICIENT),
         ("radius", "contact radius of rolling friction, in c", None, _SIZE),
         ("speed_rolling", "angular velocity below which rolling friction fades, in sqrt(g/c)", None, _SIZE),
@@ -105,23 +115,25 @@ _SECTIONS: dict[str, tuple[_Row, ...]] = {
         ("speed_spinning", "spin below which spinning friction fades, in sqrt(g/c)", None, _SIZE),
     ),
     "start": (
-        ("n0", "start spin about the upward normal, in sqrt(g/c)", 0.05, _SPIN),
-        ("x0", "start contact point along x, in c", 0.01, _POINT),
-        ("y0", "start contact point along y, in c", 0.01, _POINT),
+        ("n0", "start spin about the upward normal, in sqrt(g/c)", 0.05, _SPIN, "start spin n₀"),
+        ("x0", "start contact point along x, in c", 0.01, _POINT, "start contact point x₀"),
+        ("y0", "start contact point along y, in c", 0.01, _POINT, "start contact point y₀"),
         ("roll", "start angle about the axis of a", 0.0, _ANGLE),
         ("pitch", "start angle about the axis of b, after roll", 0.0, _ANGLE),
-        ("omega1", "start angular velocity about the axis of a, in sqrt(g/c)", 0.0, _SPIN),
-        ("omega2", "start angular velocity about the axis of b, in sqrt(g/c)", 0.0, _SPIN),
-        ("omega3", "start angular velocity about z, in sqrt(g/c)", 0.0, _SPIN),
+        ("omega1", "start angular velocity about the axis of a, in sqrt(g/c)", 0.0, _SPIN,
+         "start angular velocity ω₁ about the axis of a"),
+        ("omega2", "start angular velocity about the axis of b, in sqrt(g/c)", 0.0, _SPIN,
+         "start angular velocity ω₂ about the axis of b"),
+        ("omega3", "start angular velocity about z, in sqrt(g/c)", 0.0, _SPIN, "start angular velocity ω₃ about z"),
         ("slip1", "start slip along the ground, at heading zero along x, in sqrt(g c)", 0.0, _SLIP),
         ("slip2", "start slip along the ground, at heading zero along y, in sqrt(g c)", 0.0, _SLIP),
     ),
-}
+}  # fmt: skip
 
 PARAMETERS: dict[str, Parameter] = {
-    name: Parameter(name, section, long_name=meaning, default=default, **{"units": "1", **bounds})
+    name: Parameter(name, section, long_name=meaning, default=default, words="".join(words), **{"units": "1", **bounds})
     for section, rows in _SECTIONS.items()
-    for name, meaning, default, bounds in rows
+    for name, meaning, default, bounds, *words in rows
 }
 
 DENSITY = Parameter("density", "", "kg/m^3", "density of a body of one material", None, **_MASS)

@@ -21,6 +21,8 @@ class Variable:
     """Whether it has one value per body: it does not depend on the parameters of the start."""
     along: str | None = None
     """Name of one further dimension, after those of the cells; its coordinate counts from one."""
+    words: str = ""
+    """What figures call it; by default its `long_name`.  To a question, a flag answers yes or no."""
     of_sound_runs: bool = False
     """Whether it is undefined for a trajectory that failed, whatever number the array holds there."""
 

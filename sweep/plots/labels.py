@@ -3,87 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import xarray as xr
 
-from sweep.kernels import status
 from sweep.models.general.surfaces import SURFACES
-from sweep.parameters import PARAMETERS
-from sweep.results.dataset import VARIABLES
+from sweep.parameters import PARAMETERS, Parameter
+from sweep.results.dataset import STATUS_WORDS, VARIABLES
 from sweep.results.kind import is_of_own_body, parameters
+from sweep.results.probabilities import PROBABILITIES
+from sweep.variables import Variable
 
-SYMBOLS = {
-    "mu": "μ", "delta": "δ", "n0": "n₀", "x0": "x₀", "y0": "y₀", "sigma": "σ",
-    "omega1": "ω₁", "omega2": "ω₂", "omega3": "ω₃",
-}  # fmt: skip
+_RECORDS: Mapping[str, Parameter | Variable] = {**PARAMETERS, **VARIABLES, **PROBABILITIES}
 
-STATUS_WORDS = {
-    0: "not run",
-    status.SETTLED: "settled",
-    status.TIME_LIMIT: "ended at the time limit",
-    status.LIFT_OFF: "lifted off the table",
-    status.DIVERGED: "diverged",
-    status.PARADOX: "met Painlevé's paradox",
-    status.TOPPLED: "toppled",
-    status.IMPOSSIBLE: "no such body, or none that stands",
-}
-"""How a trajectory ended, by the values of `status`."""
-
-_PARAMETER_WORDS = {
-    "mu": "friction μ",
-    "b": "short semi-axis b",
-    "a": "long semi-axis a",
-    "c": "height c of the center over the table",
-    "delta": "angle δ of the axes of inertia",
-    "n0": "start spin n₀",
-    "x0": "start contact point x₀",
-    "y0": "start contact point y₀",
-    "sigma": "couple σ per angular velocity",
-    "omega1": "start angular velocity ω₁ about the axis of a",
-    "omega2": "start angular velocity ω₂ about the axis of b",
-    "omega3": "start angular velocity ω₃ about z",
-    "case": "case",
-    "sample": "sample",
+_WORDS = {
+    **{name: record.words for name, record in _RECORDS.items()},
+    **{index: index for index in ("case", "sample", "trajectory")},
     "count": "spin reversals, at least",
-    "trajectory": "trajectory",
-}
-
-_VARIABLE_WORDS = {
-    "reversals": "spin reversals, simulated",
-    "probability": "probability of so many spin reversals or more",
-    "probability_low": "probability, lower end of its 95 % interval",
-    "probability_high": "probability, upper end of its 95 % interval",
-    "reversals_predicted": "spin reversals, predicted (Takano 2011)",
-    "difference": "simulated − predicted",
-    "ratio": "first reversal, simulated / predicted",
-    "regime": "regime of motion",
-    "lyapunov": "largest Lyapunov exponent",
-    "cycle_variation": "variation of the cycles",
-    "status": "how the trajectory ended",
-    "inferred": "how the count was found",
-    "spin_final": "final spin n",
-    "spin_mean": "final spin n, without ripple",
-    "spin_error": "estimated error of the final spin",
-    "t_stop": "time of the end",
-    "t_last_reversal": "time of the last reversal",
-    "t_first_reversal": "time of the first reversal",
-    "t_first_reversal_predicted": "time of the first reversal, predicted (Garcia and Hubbard 1988)",
-    "reversal_time_reason": "is the first reversal predicted?",
-    "noise_limited": "are late times limited by round-off?",
-    "window_dependent": "does the count depend on the windows?",
-    "sensitive": "does the count depend on steps or the start's 10th digit?",
-    "margin_more": "margin to one reversal more",
-    "margin_fewer": "margin to one reversal fewer",
-    "decided": "is the count certain?",
-    "energy_error": "largest error of the energy, relative",
-    "form_factor": "form factor L(f)",
     "spin": "spin n",
     "time": "time t",
 }
-
-_FLAG_WORDS = {"noise_limited": {0: "no", 1: "yes"}, "window_dependent": {0: "no", 1: "yes"}, "status": STATUS_WORDS}
-_FLAG_WORDS["sensitive"] = _FLAG_WORDS["window_dependent"]
+"""What figures call a parameter or a variable."""
 
 # The scale of a dimensionless quantity at the end of its `long_name`, made of g, c and m: ", in 1/sqrt(g c)".
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -93,7 +33,7 @@ _SCALE = re.compile(r", in ((?:1/)?(?:sqrt\([gc/ ]+\)|[gcm](?: [gcm])*))(?=;|$)"
 
 def symbol(name: str) -> str:
     """A parameter's symbol, such as n₀."""
-    return SYMBOLS.get(name, name)
+    return PARAMETERS[name].symbol if name in PARAMETERS else name
 
 
 def unit(dataset: xr.Dataset, name: str) -> str:
@@ -111,24 +51,29 @@ def unit(dataset: xr.Dataset, name: str) -> str:
 def words(dataset: xr.Dataset, name: str) -> str:
     """Say what a variable or coordinate is, without its unit."""
     of_surface = SURFACES[surface].labels if (surface := dataset.attrs.get("surface")) in SURFACES else {}
-    of_parameters = {} if is_of_own_body(dataset) else _PARAMETER_WORDS
-    short = {**of_parameters, **_VARIABLE_WORDS, **of_surface}.get(name)
-    return short or _SCALE.sub("", _long_name(dataset, name)) or name.replace("_", " ")
+    known = "" if is_of_own_body(dataset) and name in PARAMETERS else _WORDS.get(name)
+    return of_surface.get(name) or known or _SCALE.sub("", _long_name(dataset, name)) or name.replace("_", " ")
 
 
 def short(name: str) -> str:
     """A variable of a run in a few words."""
-    return _VARIABLE_WORDS.get(name, name.replace("_", " "))
+    return _WORDS.get(name) or name.replace("_", " ")
 
 
 def label(dataset: xr.Dataset, name: str) -> str:
     """The label of an axis: what it shows, and the unit."""
-    return f"{words(dataset, name)} ({found})" if (found := unit(dataset, name)) else words(dataset, name)
+    return with_unit(words(dataset, name), unit(dataset, name))
+
+
+def with_unit(words: str, unit: str) -> str:
+    """Words and a unit, or whichever of them there is."""
+    return f"{words} ({unit})" if words and unit else words or unit
 
 
 def common(dataset: xr.Dataset, name: str) -> str:
     """The label of an axis or a bar that a variable shares with its prediction."""
-    return "spin reversals" if name.startswith("reversals") else label(dataset, name.removesuffix("_predicted"))
+    alone = words(dataset, name.removesuffix("_predicted")).removesuffix(", simulated")
+    return with_unit(alone, unit(dataset, name))
 
 
 def flag_words(dataset: xr.Dataset, name: str) -> dict[int, str]:
@@ -138,8 +83,11 @@ def flag_words(dataset: xr.Dataset, name: str) -> dict[int, str]:
         return {}
     values = [int(value) for value in attributes["flag_values"]]
     meanings = dict(zip(values, str(attributes.get("flag_meanings", "")).split(), strict=False))
-    known = _FLAG_WORDS.get(name, {})
-    return {value: known.get(value, meanings.get(value, str(value)).replace("_", " ")) for value in values}
+    if name == "status":
+        meanings |= STATUS_WORDS
+    elif values == [0, 1] and words(dataset, name).endswith("?"):
+        meanings = {0: "no", 1: "yes"}
+    return {value: meanings.get(value, str(value)).replace("_", " ") for value in values}
 
 
 def is_code(flags: xr.DataArray) -> bool:
@@ -219,8 +167,6 @@ def _fraction(units: str) -> str:
 
 def _long_name(dataset: xr.Dataset, name: str) -> str:
     given = dataset[name].attrs.get("long_name")
-    if given is None and name in PARAMETERS:
-        given = PARAMETERS[name].long_name
-    if given is None and name in VARIABLES:
-        given = VARIABLES[name].long_name
+    if given is None and name in _RECORDS:
+        given = _RECORDS[name].long_name
     return str(given or "")

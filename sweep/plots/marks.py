@@ -5,16 +5,13 @@ From the dataset alone, and without any library that draws.
 
 from __future__ import annotations
 
-import operator
-from functools import reduce
-
 import numpy as np
 import xarray as xr
 
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
-from sweep.plots.labels import STATUS_WORDS, is_code
+from sweep.plots.labels import is_code
 from sweep.plots.quantities import DERIVED, field
-from sweep.results.dataset import VARIABLES
+from sweep.results.dataset import STATUS_WORDS, VARIABLES
 
 WORDS = {
     "not_run": "not run",
@@ -104,11 +101,6 @@ def legend(dataset: xr.Dataset, name: str, *others: xr.Dataset) -> dict[str, str
 def of_all(counts: list[int], sizes: list[int]) -> str:
     """Numbers of cells in one dataset after the other: "3 of 80 and 5 of 80"."""
     return " and ".join(f"{count} of {size}" for count, size in zip(counts, sizes, strict=True))
-
-
-def blank(kinds: dict[str, xr.DataArray]) -> xr.DataArray:
-    """Where there is no result to draw, by the kinds of the cells."""
-    return reduce(operator.or_, (kinds[kind] for kind in BLANK))
 
 
 def meaning(dataset: xr.Dataset, name: str, kind: str) -> str:

@@ -30,14 +30,12 @@ class Derived:
 def _difference(dataset: xr.Dataset) -> xr.DataArray:
     simulated = dataset["reversals"]  # whose integers are too short for a difference
     found = (simulated.astype("int32") if simulated.dtype.kind == "i" else simulated) - dataset["reversals_predicted"]
-    long_name = "spin reversals simulated less those predicted by Takano (2011)"
-    return found.rename("difference").assign_attrs(long_name=long_name)
+    return found.rename("difference").assign_attrs(long_name="simulated − predicted")
 
 
 def _ratio(dataset: xr.Dataset) -> xr.DataArray:
     found = dataset["t_first_reversal"] / dataset["t_first_reversal_predicted"]
-    long_name = "time of the first spin reversal, simulated, divided by that of Garcia and Hubbard (1988)"
-    return found.rename("ratio").assign_attrs(long_name=long_name)
+    return found.rename("ratio").assign_attrs(long_name="first reversal, simulated / predicted")
 
 
 PREDICTIONS = {

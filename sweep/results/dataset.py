@@ -23,16 +23,18 @@ from sweep.results import accessor as accessor
 from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.variables import Variable, in_si, with_unit, without_unit
 
-STATUSES = {
-    0: "not_run",
-    status.SETTLED: "settled",
-    status.TIME_LIMIT: "time_limit",
-    status.LIFT_OFF: "lift_off",
-    status.DIVERGED: "diverged",
-    status.PARADOX: "paradox",
-    status.TOPPLED: "toppled",
-    status.IMPOSSIBLE: "impossible",
+_STATUSES = {
+    0: ("not_run", "not run"),
+    status.SETTLED: ("settled", "settled"),
+    status.TIME_LIMIT: ("time_limit", "ended at the time limit"),
+    status.LIFT_OFF: ("lift_off", "lifted off the table"),
+    status.DIVERGED: ("diverged", "diverged"),
+    status.PARADOX: ("paradox", "met Painlevé's paradox"),
+    status.TOPPLED: ("toppled", "toppled"),
+    status.IMPOSSIBLE: ("impossible", "no such body, or none that stands"),
 }
+STATUSES, STATUS_WORDS = ({code: each[k] for code, each in _STATUSES.items()} for k in (0, 1))
+"""How a trajectory ended: the flags of the variable `status`, and what figures call them."""
 
 # 4 was a simulated n_c1 that disagreed with the eigenvalues.
 EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, REVERSES_AT_N_C1, UNDECIDED, FAILED, NO_BODY = 0, 1, 2, 3, 5, 6, 7, 8
@@ -71,33 +73,38 @@ _SIDES = {"plus": "+", "minus": "-"}
 
 VARIABLES: dict[str, Variable] = {
     **{name: spec for kind in measures.MEASURES.values() for name, spec in kind.variables.items()},
-    "status": _flag("how the simulation of the trajectory ended", STATUSES),
-    "inferred": _flag("how reversals and status were found", {0: "simulated", 1: "inferred"}),
-    "spin_final": _number("spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
-    "spin_error": _number("estimated error of the spin at t_stop, in sqrt(g/c)", of_sound_runs=True),
+    "status": _flag("how the simulation of the trajectory ended", STATUSES, words="how the trajectory ended"),
+    "inferred": _flag("how reversals and status were found", {0: "simulated", 1: "inferred"},
+                      words="how the count was found"),
+    "spin_final": _number("spin at t_stop, in sqrt(g/c)", of_sound_runs=True, words="final spin n"),
+    "spin_error": _number("estimated error of the spin at t_stop, in sqrt(g/c)", of_sound_runs=True,
+                          words="estimated error of the final spin"),
     "sensitive": _flag(
         "whether other steps, or starts 1e-10 apart, give another number of reversals", {0: "firm", 1: "sensitive"},
-        of_sound_runs=True,
+        of_sound_runs=True, words="does the count depend on steps or the start's 10th digit?",
     ),
     "decided": _flag(
         "whether the number of reversals is final, and its margins are larger than ten times their errors",
-        {0: "open", 1: "decided"}, of_sound_runs=True,
+        {0: "open", 1: "decided"}, of_sound_runs=True, words="is the count certain?",
     ),
-    "t_stop": _number("time at which the simulation ended, in sqrt(c/g)"),
+    "t_stop": _number("time at which the simulation ended, in sqrt(c/g)", words="time of the end"),
     "method": _flag("integration method of the trajectory", {each.code: name for name, each in METHODS.items()}),
     "step": _number("integration step, in sqrt(c/g)"),
     "step_rule": _flag("what set the integration step", STEP_RULES),
-    "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)"),
+    "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)",
+                                    words="spin reversals, predicted (Takano 2011)"),
     "t_first_reversal_predicted": _number(
-        "time of the first spin reversal predicted by Garcia and Hubbard (1988), in sqrt(c/g)"
+        "time of the first spin reversal predicted by Garcia and Hubbard (1988), in sqrt(c/g)",
+        words="time of the first reversal, predicted (Garcia and Hubbard 1988)",
     ),
     "reversal_time_reason": _flag(
-        "whether there is a predicted time of the first reversal, and why not", reversal_time.REASONS
+        "whether there is a predicted time of the first reversal, and why not", reversal_time.REASONS,
+        words="is the first reversal predicted?",
     ),
     **{f"n_c1_{side}": _critical(sign, "a tiny rattle grows", _FORMULA) for side, sign in _SIDES.items()},
     **{f"n_c2_{side}": _critical(sign, "the spin reverses", _FORMULA) for side, sign in _SIDES.items()},
     **{f"n_c1_{side}_linear": _critical(sign, "a tiny rattle grows", _EIGENVALUES) for side, sign in _SIDES.items()},
-    "form_factor": _number("form factor L(f) of Takano (2011)", per_body=True),
+    "form_factor": _number("form factor L(f) of Takano (2011)", per_body=True, words="form factor L(f)"),
     **{
         f"n_c2_{side}_simulated{suffix}": _critical(sign, "the spin reverses", f"simulation: {words}")
         for side, sign in _SIDES.items()

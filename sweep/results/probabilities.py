@@ -12,8 +12,14 @@ from sweep.variables import Variable
 _END = "end of its interval of 95 %, by Wilson's formula; of samples at Sobol points it is wide enough"
 
 PROBABILITIES = {
-    f"probability{end}": Variable("float64", "1", f"probability of so many reversals or more{words}", along="count")
-    for end, words in (("", ""), ("_low", f": lower {_END}"), ("_high", f": upper {_END}"))
+    f"probability{end}": Variable(
+        "float64", "1", f"probability of so many reversals or more{more}", along="count", words=f"probability{words}"
+    )
+    for end, more, words in (
+        ("", "", " of so many spin reversals or more"),
+        ("_low", f": lower {_END}", ", lower end of its 95 % interval"),
+        ("_high", f": upper {_END}", ", upper end of its 95 % interval"),
+    )
 }
 """The variables over the axes that samples have in common, and over counts from one on."""
 

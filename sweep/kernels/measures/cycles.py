@@ -28,7 +28,8 @@ class Cycles(Measurement):
     variables = {
         "cycle_mean": measured("float64", "mean time from a spin reversal to the second after it, in sqrt(c/g)"),
         "cycle_variation": measured(
-            "float64", "standard deviation of the times from a reversal to the second after it, by their mean"
+            "float64", "standard deviation of the times from a reversal to the second after it, by their mean",
+            words="variation of the cycles",
         ),
     }  # fmt: skip
 

@@ -29,6 +29,7 @@ class EnergyError(Measurement):
             "float64",
             f"largest violation of the energy balance, looked at every {BLOCK} steps, "
             "relative to the start energy above rest",
+            words="largest error of the energy, relative",
         )
     }
 

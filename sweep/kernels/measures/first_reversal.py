@@ -20,7 +20,11 @@ class FirstReversal(Measurement):
     needs = ("reversals",)
     quantities = ("first_reversal",)
 
-    variables = {"t_first_reversal": measured("float64", "time of the first spin reversal, in sqrt(c/g)")}
+    variables = {
+        "t_first_reversal": measured(
+            "float64", "time of the first spin reversal, in sqrt(c/g)", words="time of the first reversal"
+        )
+    }
 
     def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
         return {"first_reversal": np.nan}

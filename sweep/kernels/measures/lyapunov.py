@@ -40,7 +40,8 @@ class Lyapunov(Measurement):
 
     variables = {
         "lyapunov": measured(
-            "float64", "largest Lyapunov exponent over the later half of the trajectory, in 1/sqrt(c/g)"
+            "float64", "largest Lyapunov exponent over the later half of the trajectory, in 1/sqrt(c/g)",
+            words="largest Lyapunov exponent",
         ),
         "lyapunov_error": measured("float64", "standard error of the largest Lyapunov exponent, in 1/sqrt(c/g)"),
     }  # fmt: skip

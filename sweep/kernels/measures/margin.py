@@ -40,11 +40,13 @@ class Margin(Measurement):
             "float64",
             "smallest averaged spin after the largest since the last reversal: zero where one more begins, "
             "missing where the count is not final, in sqrt(g/c)",
+            words="margin to one reversal more",
         ),
         "margin_fewer": measured(
             "float64",
             "largest averaged spin since the last reversal: zero where this reversal begins, missing without one, "
             "in sqrt(g/c)",
+            words="margin to one reversal fewer",
         ),
     }
 

@@ -43,12 +43,14 @@ from sweep.models.model import Array, Columns, Model
 from sweep.variables import Variable
 
 
-def measured(dtype: str, long_name: str, flag: str = "", along: str | None = None) -> Variable:
+def measured(dtype: str, long_name: str, flag: str = "", along: str | None = None, words: str = "") -> Variable:
     """Describe a variable that a measurement adds to the dataset: it is undefined for a trajectory that failed.
 
     `flag` names the value 1 of a variable that marks some cells; the value 0 is called "firm".
+    `words` are what figures call it.
     """
-    return Variable(dtype, "1", long_name, {0: "firm", 1: flag} if flag else None, along=along, of_sound_runs=True)
+    flags = {0: "firm", 1: flag} if flag else None
+    return Variable(dtype, "1", long_name, flags, along=along, words=words, of_sound_runs=True)
 
 
 @dataclass(frozen=True)

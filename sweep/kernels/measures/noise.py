@@ -54,6 +54,7 @@ class NoiseLimited(Measurement):
             "int8",
             "whether a mode of the rattle fell under the round-off of the other before it grew",
             flag="noise_limited",
+            words="are late times limited by round-off?",
         )
     }
 

@@ -33,14 +33,17 @@ class Reversals(Measurement):
     )  # fmt: skip
 
     variables = {
-        "reversals": measured("int16", "spin reversals of the simulated trajectory"),
-        "t_last_reversal": measured("float64", "time of the last spin reversal, in sqrt(c/g)"),
+        "reversals": measured("int16", "spin reversals of the simulated trajectory", words="spin reversals, simulated"),
+        "t_last_reversal": measured(
+            "float64", "time of the last spin reversal, in sqrt(c/g)", words="time of the last reversal"
+        ),
         "spin_mean": measured(
-            "float64", "ripple-free spin averaged over the last full window before t_stop, in sqrt(g/c)"
+            "float64", "ripple-free spin averaged over the last full window before t_stop, in sqrt(g/c)",
+            words="final spin n, without ripple",
         ),
         "window_dependent": measured(
             "int8", "whether windows that begin half a period later give another number of reversals",
-            flag="window_dependent",
+            flag="window_dependent", words="does the count depend on the windows?",
         ),
     }  # fmt: skip
 
