@@ -24,8 +24,6 @@ _STRETCHES = 3000
 
 _OVER_TIME = ("spin", "energy", "dissipated")
 
-_CRITICAL = {"n_c1_plus": "dotted", "n_c1_minus": "dotted", "n_c2_plus": "dashed", "n_c2_minus": "dashed"}
-
 _LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.0,
            "label_text_color": axes.SOFT, "border_line_color": None}  # fmt: skip
 
@@ -64,13 +62,12 @@ class Curves:
         if (chosen, end) != self._played:
             self._played = chosen, end
             self.player.show(chosen, CURVES[active], end)
-        spins = {n: float(chosen.dataset[n]) for n in _CRITICAL if n in chosen.dataset} if chosen else {}
-        shown = [name for name, spin in spins.items() if np.isfinite(spin)]
+        spins = theory.levels(chosen.dataset) if chosen else []
         self._critical.data = {
-            "spin": [spins[name] for name in shown],
-            "time": [end * (0.93 if "c1" in name else 1.0) for name in shown],  # they often lie close together
-            "dash": [_CRITICAL[name] for name in shown],
-            "symbol": [theory.symbol(name) for name in shown],
+            "spin": [at for _, _, at, _ in spins],
+            "time": [end * (0.93 if name == "n_c1" else 1.0) for name, *_ in spins],  # they often lie close together
+            "dash": [theory.OVER_TIME[name] for name, *_ in spins],
+            "symbol": [sign for _, sign, *_ in spins],
         }
 
     def _label(self, one: xr.Dataset) -> None:
@@ -81,7 +78,7 @@ class Curves:
             (self.spin.yaxis, "spin", ""), (self.energy.yaxis, "energy", "energy"),
         ):  # fmt: skip
             if name in one:
-                axis.axis_label = f"{words or labels.words(one, name)} ({labels.unit(one, name)})".removesuffix(" ()")
+                axis.axis_label = labels.with_unit(words or labels.words(one, name), labels.unit(one, name))
 
 
 class _Slot:

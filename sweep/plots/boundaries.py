@@ -26,8 +26,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     figure = Picture(width * columns + 0.6, 1.2 + width * RATIO * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     scale = scales.counts(dataset["level"].values if dataset.sizes["point"] else np.zeros(1, int), None, None)
-    for k, (words, part) in enumerate(panels):
-        axes = figure.add_subplot(rows, columns, k + 1)
+    for axes, (words, part) in zip(figure.panels(rows, columns, len(panels)), panels, strict=True):
         axes.set_title(words)
         set_scale(axes, "x", _axis(dataset, x).values)
         set_scale(axes, "y", _axis(dataset, y).values)

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from sweep.grid import Array
 from sweep.plots import labels, lines, theory
 from sweep.plots.description import describe
-from sweep.plots.figure import BESIDE, Picture, framed, set_scale
+from sweep.plots.figure import BESIDE, Frames, set_scale
 from sweep.plots.marks import BLANK, legend
 from sweep.plots.panels import Panels
 from sweep.plots.quantities import COMPARISONS, PREDICTIONS
@@ -40,22 +40,8 @@ _BELOW = 0.03
 """Room below zero, relative to that above."""
 
 
-def draw(panels: Panels, limits: Limits | None = None) -> Picture:
-    """The variables over the one long axis, in a panel for each value of the others."""
-    dataset, x = panels.dataset, panels.across[0] if panels.across else ""
-    figure, frames = framed(dataset, panels.each, x, 7.0, 1.9, 2.6)
-    figure.explain(_curves(panels, frames, limits))
-    return figure
-
-
-def draw_in(axes: Axes, panels: Panels, limits: Limits | None = None) -> None:
-    """Draw the same into these axes."""
-    _curves(panels, [(axes, panels.dataset.isel(panels.each[0]))], limits)
-    axes.set_xlabel(labels.label(panels.dataset, panels.across[0]) if panels.across else "")
-
-
-def _curves(panels: Panels, frames: list[tuple[Axes, xr.Dataset]], limits: Limits | None) -> list[Artist]:
-    """Draw each panel into its axes; returns the entries for the legend."""
+def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[Artist]:
+    """The variables over the one long axis, in a panel for each value of the others; returns entries for a legend."""
     dataset, x = panels.dataset, panels.across[0] if panels.across else ""
     names = [name for name in panels.names if name not in COMPARISONS] or panels.names
     names = names[:1] + [name for name in names[1:] if dataset[name].notnull().any()]

@@ -126,6 +126,13 @@ class Picture(Figure):
         if title:
             self.suptitle(fill(title, int(self._width / _OF_TITLE)))
 
+    def panels(self, rows: int, columns: int, count: int, **shared: Any) -> list[Axes]:
+        """Axes side by side and below each other, of which the last row may have fewer."""
+        grid = self.subplots(rows, columns, squeeze=False, **shared).ravel()
+        for axes in grid[count:]:
+            axes.remove()
+        return list(grid[:count])
+
     def explain(self, handles: Sequence[Artist]) -> None:
         """A legend below the figure, never over its data, in as many columns as fit; over it the constants."""
         self._wrap_labels()
@@ -191,29 +198,30 @@ def panel_width(columns: int, widest: float, around: float) -> float:
     return width if _is_asked() else min(width, widest)
 
 
+Frames = list[tuple[Axes, xr.Dataset]]
+"""Axes, and the part of a dataset to draw there."""
+
+
 def framed(
-    dataset: xr.Dataset, panels: list[Panel], x: str, width: float, above: float, height: float
-) -> tuple[Picture, list[tuple[Axes, xr.Dataset]]]:
+    dataset: xr.Dataset, panels: list[Panel], x: str, size: tuple[float, float, float] = (7.0, 2.6, 1.9)
+) -> tuple[Picture, Frames]:
     """A figure with axes over `x` for each panel of a dataset, and the part of the dataset to draw there.
 
     Parameters
     ----------
-    width, height : of one panel, in inches
-    above : inches for what stands around the panels
+    size : inches of one panel across and upwards, and for what stands around the panels
     """
-    rows, columns = arrangement(len(panels), 2)
+    (width, height, above), (rows, columns) = size, arrangement(len(panels), 2)
     figure = Picture(panel_width(columns, width, 0) * columns, above + height * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
-    grid = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-    for k, (axes, panel) in enumerate(zip(grid, panels, strict=False)):
+    frames = list(zip(figure.panels(rows, columns, len(panels), sharex=True), panels, strict=True))
+    for k, (axes, panel) in enumerate(frames):
         lowest = k + columns >= len(panels)
         axes.set_title(title(dataset, panel))
         axes.tick_params(labelbottom=lowest)
         if lowest and x:
             axes.set_xlabel(labels.label(dataset, x))
-    for axes in grid[len(panels) :]:
-        axes.remove()
-    return figure, [(axes, dataset.isel(panel)) for axes, panel in zip(grid, panels, strict=False)]
+    return figure, [(axes, dataset.isel(panel)) for axes, panel in frames]
 
 
 def arrangement(panels: int, maps: int) -> tuple[int, int]:

@@ -6,7 +6,7 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import MaxNLocator
@@ -15,7 +15,7 @@ from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels
 from sweep.plots.description import Map, common_scale, describe
-from sweep.plots.figure import Picture, framed
+from sweep.plots.figure import Frames
 from sweep.plots.hatches import HATCHES
 from sweep.plots.marks import legend
 from sweep.plots.panels import Panels
@@ -25,22 +25,8 @@ _MOST = 60
 """Bars of a histogram, at most."""
 
 
-def draw(panels: Panels) -> Picture:
-    """Draw the shares of the cells, simulated and predicted."""
-    figure, frames = framed(panels.dataset, panels.each, panels.names[0], 7.0, 1.9, 2.6)
-    _bars(panels, frames)
-    figure.explain(frames[0][0].get_legend_handles_labels()[0])
-    return figure
-
-
-def draw_in(axes: Axes, panels: Panels) -> None:
-    """Draw the same into these axes."""
-    axes.set_xlabel(labels.label(panels.dataset, panels.names[0]))
-    _bars(panels, [(axes, panels.dataset.isel(panels.each[0]))])
-
-
-def _bars(panels: Panels, frames: list[tuple[Axes, xr.Dataset]]) -> None:
-    """Draw each panel into its axes."""
+def draw(panels: Panels, frames: Frames) -> list[Artist]:
+    """Draw the shares of the cells, simulated and predicted; returns entries for a legend."""
     dataset, across = panels.dataset, panels.across[::-1] or [""]
     names = [name for name in panels.names if name not in COMPARISONS] or panels.names
     maps = [[describe(chosen, name, *across) for name in names] for _, chosen in frames]
@@ -58,6 +44,7 @@ def _bars(panels: Panels, frames: list[tuple[Axes, xr.Dataset]]) -> None:
         if axes.get_xlabel():
             axes.set_xlabel(labels.common(dataset, names[0]))
         _scale(axes, first, edges)
+    return frames[0][0].get_legend_handles_labels()[0]
 
 
 def _scale(axes: Axes, shown: Map, edges: Array) -> None:

@@ -17,11 +17,9 @@ def draw(dataset: xr.Dataset) -> Picture:
     rows, columns = arrangement(len(quantities), 1) if page() < 3.2 * len(quantities) else (1, len(quantities))
     figure = Picture(panel_width(columns, 3.2, 1) * columns + 1, 1 + 2.6 * rows)
     figure.head(dataset.attrs["title"], "")
-    grid = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
-    for axes in grid[len(quantities) :]:
-        axes.remove()
+    grid = figure.panels(rows, columns, len(quantities), sharey=True)
     places = np.arange(dataset.sizes["parameter"])
-    for axes, quantity in zip(grid, quantities, strict=False):
+    for axes, quantity in zip(grid, quantities, strict=True):
         one = dataset.sel(quantity=quantity)
         for k, (order, words) in enumerate(_ORDERS.items()):
             index, low, high = (one[f"{order}{end}"].values for end in ("", "_low", "_high"))

@@ -17,13 +17,11 @@ from sweep.plots import labels, places
 from sweep.plots.description import Map
 from sweep.plots.figure import RATIO, extent
 from sweep.plots.scales import Scale
-from sweep.plots.theory import Line
+from sweep.plots.theory import STYLES, Line
 
+_DASHES = {"dotted": (0, (1.5, 1.5)), "solid": "-", "dashed": (0, (6, 3))}
 _STYLES: dict[str, dict[str, Any]] = {
-    "n_c1": {"linestyle": (0, (1.5, 1.5)), "linewidth": 1.2},
-    "n_c2": {"linestyle": "-", "linewidth": 1.2},
-    "best": {"linestyle": (0, (6, 3)), "linewidth": 1.2},
-    "boundary": {"linestyle": "-", "linewidth": 0.6},
+    name: {"linestyle": _DASHES[dash], "linewidth": width} for name, (dash, width) in STYLES.items()
 }
 
 _LAID_OUT = 0.9

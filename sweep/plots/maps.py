@@ -41,16 +41,6 @@ _AROUND = 1.2
 _OF_DIFFERENCES = ("failed", "not_run", "impossible", "time_limit")
 """Kinds of cell marked on maps of differences too; the map of the simulated counts beside it has all."""
 
-_TITLES = {
-    "reversals": ("simulated", "simulated"),
-    "t_first_reversal": ("simulated", "simulated"),
-    "reversals_predicted": ("predicted (Takano 2011)", "predicted"),
-    "t_first_reversal_predicted": ("predicted (Garcia and Hubbard 1988)", "predicted"),
-    "difference": ("simulated − predicted", "difference"),
-    "ratio": ("simulated / predicted", "ratio"),
-}
-"""What a map beside others is called, and a small one."""
-
 
 def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, *, contours: bool = False) -> Picture:
     """A map of each variable over two axes, side by side, and such a row for each value of the other axes."""
@@ -88,9 +78,7 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, 
     return figure
 
 
-def draw_in(
-    axes: Axes, panels: Panels, limits: Limits | None = None, cmap: str | None = None, *, contours: bool = False
-) -> None:
+def draw_in(axes: Axes, panels: Panels, limits: Limits | None, cmap: str | None, *, contours: bool) -> None:
     """Draw the map of the first variable into these axes, with its bar beside them."""
     name = panels.names[0]
     shown = _maps(panels, [name])[0][name]
@@ -198,8 +186,9 @@ def _thinned(shown: Map) -> Map:
 def _title(panels: Panels, name: str, panel: Panel, *, small: bool) -> str:
     """Name what a map shows; a small one beside others leaves the values of its panel to the first of them."""
     words = labels.words(panels.dataset, name)
-    if len(panels.names) > 1:
-        words = _TITLES[name][small]
+    if len(panels.names) > 1:  # what they have in common stands at the bar
+        words = words.rpartition(", ")[2] if name in COMPARISONS else words.partition(", ")[2] or "simulated"
+        words = (name if name in COMPARISONS else words.partition(" (")[0]) if small else words
     elif panel:
         words = ""  # it stands at the bar or in the legend
     where = title(panels.dataset, panel) if not small or name == panels.names[0] else ""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
 import matplotlib as mpl
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -19,13 +20,14 @@ from sweep.plots import (
     fit,
     histograms,
     indices,
+    labels,
     maps,
     panels,
     probabilities,
     scales,
     trajectories,
 )
-from sweep.plots.figure import Picture, style
+from sweep.plots.figure import Frames, Picture, framed, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED, subject
 from sweep.plots.scales import Limits
@@ -42,8 +44,11 @@ _LENGTH = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-z]+)")
 _NARROWEST, _WIDEST = 50.0, 1000.0
 """Millimetres of a figure across."""
 
-_OWN = {BOUNDARIES: boundaries.draw, FIT: fit.draw, INDICES: indices.draw}
-"""Kinds of dataset that have one picture each."""
+_OWN: dict[str | None, Callable[[xr.Dataset], Picture]] = {
+    TRAJECTORY: trajectories.draw, CRITICAL: critical.draw, BOUNDARIES: boundaries.draw, FIT: fit.draw,
+    INDICES: indices.draw,
+}  # fmt: skip
+"""Kinds of dataset that have a picture of their own."""
 
 Source = xr.Dataset | xr.DataArray | str | Path
 """A dataset, the path of its file, or a variable of it."""
@@ -119,7 +124,8 @@ def plot(
         variable = str(dataset.name)
     axes, how = {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap, "contours": contours}
     if ax is not None:
-        figure = _draw_in(ax, opened, variable, axes, how, histogram=histogram)
+        _draw_in(ax, opened, variable, axes, how, histogram=histogram)
+        figure = cast(Figure, ax.get_figure(root=True))
     else:
         across = inches(width) if width is not None else None
         with mpl.rc_context(style(across) | ({"figure.figsize": figsize} if figsize else {})):
@@ -155,43 +161,51 @@ def _drawn(
         common = variable or subject(datasets[0])
         return maps.draw_beside([panels.choose(each, common, **axes) for each in datasets], **how)
     (dataset,), (found,) = datasets, kinds
-    if found in _OWN and variable is not None:
-        raise ValueError(f"variable: not for a figure of {found}, which draws what it is; leave it out")
-    if found in (TRAJECTORY, *_OWN) or (found == CRITICAL and variable is None):
+    if found in _OWN and (found != CRITICAL or variable is None):
+        if found != TRAJECTORY and variable is not None:
+            raise ValueError(f"variable: not for a figure of {found}, which draws what it is; leave it out")
         if given := [name for name, value in {**axes, **how, "histogram": histogram}.items() if value]:
             raise ValueError(f"{given[0]}: not for a figure of {found}; name it for the maps of a run alone")
-        if found == TRAJECTORY:
-            return trajectories.draw(dataset, variable)
-        return {**_OWN, CRITICAL: critical.draw}[found](dataset)
+        return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
     chosen = panels.choose(dataset, variable, **axes)
-    if chosen.names == ["probability"] and len(chosen.across) < 2:
-        if histogram:
-            raise ValueError("histogram: a probability is a share already; name another variable, such as reversals")
-        return probabilities.draw(chosen)
-    room, options = _way(chosen, how, histogram=histogram)
-    return cast(Picture, room.draw(chosen, **options))
+    if len(chosen.across) == 2 and not histogram:
+        return maps.draw(chosen, **how)
+    figure, frames = framed(chosen.dataset, chosen.each, _over(chosen, histogram=histogram))
+    figure.explain(_fill(chosen, frames, how["limits"], histogram=histogram))
+    return figure
 
 
 def _draw_in(
     ax: Axes, datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], how: dict[str, Any], *,
     histogram: bool,
-) -> Figure:  # fmt: skip
-    """Draw one map or curve into axes of the user; returns their figure."""
+) -> None:  # fmt: skip
+    """Draw one map or curve into axes of the user."""
     if {kind(each) for each in datasets} != {RUN} or len(datasets) > 1:
         raise ValueError("ax: only a map or a curve of one run is drawn into given axes")
     chosen = panels.choose(datasets[0], variable, **axes)
     if len(chosen.each) > 1 or "probability" in chosen.names:
         raise ValueError(f"ax: {chosen.names[0]} needs more than one panel; select a value of each other axis")
-    room, options = _way(chosen, how, histogram=histogram)
-    room.draw_in(ax, chosen, **options)
-    return cast(Figure, ax.get_figure(root=True))
+    if len(chosen.across) == 2 and not histogram:
+        maps.draw_in(ax, chosen, **how)
+        return
+    over = _over(chosen, histogram=histogram)
+    ax.set_xlabel(labels.label(chosen.dataset, over) if over else "")
+    _fill(chosen, [(ax, chosen.dataset.isel(chosen.each[0]))], how["limits"], histogram=histogram)
 
 
-def _way(chosen: panels.Panels, how: dict[str, Any], *, histogram: bool) -> tuple[Any, dict[str, Any]]:
-    """Which module draws the panels of a run, and what it is told."""
+def _over(chosen: panels.Panels, *, histogram: bool) -> str:
+    """What the axis across shows in a figure without maps."""
+    return chosen.names[0] if histogram else next(iter(chosen.across), "")
+
+
+def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None, *, histogram: bool) -> list[Artist]:
+    """Draw the panels of a run that are no maps; returns the entries for their legend."""
+    bars = chosen.names == ["probability"] and len(chosen.across) < 2
+    if histogram and bars:
+        raise ValueError("histogram: a probability is a share already; name another variable, such as reversals")
     if histogram:
-        return histograms, {}
-    return (maps, how) if len(chosen.across) == 2 else (curves, {"limits": how["limits"]})
+        return histograms.draw(chosen, frames)
+    return probabilities.draw(chosen, frames) if bars else curves.draw(chosen, frames, limits)
 
 
 def inches(width: str) -> float:

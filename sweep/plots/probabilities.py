@@ -7,11 +7,12 @@ from itertools import pairwise
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
-from sweep.plots.figure import Picture, framed, set_scale
+from sweep.plots.figure import Frames, set_scale
 from sweep.plots.panels import Panels, title
 from sweep.results.probabilities import interval, sound
 
@@ -19,19 +20,16 @@ _COLOURS = 0.85
 """Part of the colour map that curves take: its last colours are too light for lines."""
 
 
-def draw(panels: Panels) -> Picture:
-    """Draw the probabilities over the one long axis, or those of each panel, if there is none."""
-    dataset, x = panels.dataset, panels.across[0] if panels.across else ""
-    figure, frames = framed(dataset, panels.each, x, 7.0, 1.9, 2.6)
+def draw(panels: Panels, frames: Frames) -> list[Artist]:
+    """Draw the probabilities over the one long axis, or those of each panel; returns entries for a legend."""
     for axes, chosen in frames:
-        if x:
-            _curves(axes, chosen, x)
+        if panels.across:
+            _curves(axes, chosen, panels.across[0])
         else:
             _bars(axes, chosen)
         axes.set_ylim(0, 1.02)
         axes.grid(alpha=0.3)
-    figure.explain(frames[0][0].get_legend_handles_labels()[0])
-    return figure
+    return frames[0][0].get_legend_handles_labels()[0]
 
 
 def _curves(axes: Axes, chosen: xr.Dataset, x: str) -> None:

@@ -27,6 +27,12 @@ _SOURCES = {
 
 WORDS = {"n_c1": "a tiny rattle grows", "n_c2": "the spin reverses"}
 
+STYLES = {"n_c1": ("dotted", 1.2), "n_c2": ("solid", 1.2), "best": ("dashed", 1.2), "boundary": ("solid", 0.6)}
+"""How the lines over a map are dashed, and their widths in points."""
+
+OVER_TIME = {"n_c2": "dashed", "n_c1": "dotted"}
+"""How critical spins are dashed beside the curve of a spin."""
+
 Points = tuple[Array, Array]
 """x and y of a line."""
 
@@ -52,6 +58,12 @@ def critical_spins(dataset: xr.Dataset, name: str) -> Iterator[tuple[str, xr.Dat
             if f"{name}_{side}{suffix}" in dataset:
                 yield symbol(f"{name}_{side}"), dataset[f"{name}_{side}{suffix}"], source
                 break
+
+
+def levels(one: xr.Dataset) -> list[tuple[str, str, float, str]]:
+    """The name, symbol, value and source of each critical spin that one trajectory has."""
+    spins = ((name, *found) for name in OVER_TIME for found in critical_spins(one, name))
+    return [(name, sign, float(at), source) for name, sign, at, source in spins if np.isfinite(at)]
 
 
 def symbol(name: str) -> str:

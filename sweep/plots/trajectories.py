@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
@@ -12,7 +14,7 @@ from matplotlib.lines import Line2D
 from sweep.grid import SAMPLE, Array
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.plots import bands, labels, lines, theory
+from sweep.plots import bands, labels, theory
 from sweep.plots.figure import Picture, page, panel_width
 from sweep.results.kind import is_of_own_body, parameters
 
@@ -44,9 +46,6 @@ _ENDLESS = ("heading", "table_x", "table_y")
 
 _NARROW = 6.0
 """Inches of a page up to which panels stand below each other."""
-
-_CRITICAL = {"n_c1": ":", "n_c2": "--"}
-"""Styles of the critical spins, none of them that of a curve."""
 
 
 def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
@@ -123,7 +122,7 @@ def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist
 def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Artist]:
     """Draw series of all trajectories, in their colours; returns the entries of the trajectories for the legend."""
     first = next(iter(names))
-    axes.set_ylabel(_with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
+    axes.set_ylabel(labels.with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
     if SAMPLE in dataset.coords:
         return bands.draw(axes, dataset, first)
     entries: list[Artist] = []
@@ -153,10 +152,7 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
     """Lines at the critical spins, one set a body: in the colour of its first trajectory if there are several."""
     bodies: dict[tuple[tuple[str, str, float, str], ...], int] = {}
     for i in range(dataset.sizes["trajectory"]):
-        one = dataset.isel(trajectory=i)
-        spins = ((name, *found) for name in ("n_c2", "n_c1") for found in theory.critical_spins(one, name))
-        found = [(name, symbol, float(at), source) for name, symbol, at, source in spins if np.isfinite(at)]
-        bodies.setdefault(tuple(found), i)
+        bodies.setdefault(tuple(theory.levels(dataset.isel(trajectory=i))), i)
     entries: dict[str, Line2D] = {}
     written: list[float] = []
     letter = mpl.rcParams["font.size"] / (72 * axes.bbox.height / axes.figure.dpi)
@@ -164,9 +160,11 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
     for body, i in bodies.items():
         colour = "0.4" if len(bodies) == 1 else f"C{i}"
         for name, symbol, at, source in body:
-            axes.axhline(at, color=colour, linestyle=_CRITICAL[name], linewidth=0.9, gid=name)
-            entries[name] = lines.entry(name, theory.words(name, source, over_n0=True, spin="n"))
-            entries[name].set(linestyle=_CRITICAL[name], linewidth=0.9)
+            style: Any = {"linestyle": theory.OVER_TIME[name], "linewidth": 0.9}
+            axes.axhline(at, color=colour, gid=name, **style)
+            entries[name] = Line2D(
+                [], [], color="black", label=theory.words(name, source, over_n0=True, spin="n"), **style
+            )
             if all(abs(at - other) > apart for other in written):
                 axes.annotate(
                     labels.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
@@ -222,10 +220,6 @@ def label(dataset: xr.Dataset, i: int) -> str:
     names = varying or [name for name in ("n0", "omega3") if name in dataset]
     named = ", ".join(labels.measured(dataset, name, float(np.ravel(dataset[name].values)[i])) for name in names)
     return f"{named}: {labels.reversals(int(dataset['reversals'][i]))}" if "reversals" in dataset else named
-
-
-def _with_unit(words: str, unit: str) -> str:
-    return f"{words} ({unit})" if words and unit else words or unit
 
 
 def constants_apart(dataset: xr.Dataset) -> xr.Dataset:
