@@ -32,7 +32,8 @@ class CellControls:
         self._rows = [self._row(k, activate, remove) for k in range(MAX_CELLS)]
         self._title = Div(text="", margin=(8, 0, 0, 0))
         self._end = Div(text="", margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
-        self._inputs = {name: self._input(source, known[name]) for name in self._order(source, base)}
+        ordered = [*(n for n in source.dims if n in base), *(n for n in base if n not in source.dims)]
+        self._inputs = {name: self._input(source, known[name]) for name in ordered}
         wrap = {"gap": "4px 10px", "flex-wrap": "wrap", "align-items": "flex-end"}
         dragged = [
             Row(one.field, one.slider, sizing_mode="stretch_width", styles=wrap)
@@ -44,11 +45,6 @@ class CellControls:
         self._editor = Column(self._title, grid, sizing_mode="stretch_width", visible=False, name="parameters")
         self.root = Column(self._keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
                            stylesheets=[WIDGETS], sizing_mode="stretch_width", visible=bool(base))  # fmt: skip
-
-    @staticmethod
-    def _order(source: Source, base: Cell) -> list[str]:
-        """The parameters, those of the axes first."""
-        return [*(n for n in source.dims if n in base), *(n for n in base if n not in source.dims)]
 
     @property
     def keeps(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import BoundaryNorm, LogNorm, Normalize, to_hex
 
-from sweep.explorer.state import Colours
+from sweep.explorer.state import State
 from sweep.plots import scales
 from sweep.plots.description import Map, common_scale
 from sweep.plots.scales import SEQUENTIAL, Scale, colour_map
@@ -32,23 +32,23 @@ def mapping(scale: Scale) -> dict[str, Any]:
     return {"palette": [to_hex(colour) for colour in scale.rgba(at)], "low": low, "high": high}
 
 
-def scale_of(part: Map, colours: Colours) -> Scale:
+def scale_of(part: Map, state: State) -> Scale:
     """The scale of a map, with whatever of it the visitor has chosen; all values of flags have their colours."""
-    palette = colours.palette or None
+    palette = state.palette or None
     if part.flags:
         return scales.flags(part.flags, palette)
     shown = part.shown[np.isfinite(part.shown)].astype(float)
-    if colours.spacing == "log":
+    if state.spacing == "log":
         shown = shown[shown > 0]
     if not shown.size:
         return common_scale([part], cmap=palette)
     low, high = (
-        shown.min() if colours.low is None else colours.low,
-        shown.max() if colours.high is None else colours.high,
+        shown.min() if state.low is None else state.low,
+        shown.max() if state.high is None else state.high,
     )
-    given = (colours.low, colours.high) != (None, None) and low < high
+    given = (state.low, state.high) != (None, None) and low < high
     scale = common_scale([part], (low, high) if given else None, palette)
-    norm = {"linear": Normalize, "log": LogNorm}.get(colours.spacing)
+    norm = {"linear": Normalize, "log": LogNorm}.get(state.spacing)
     if norm is None or not (low < high and (low > 0 or norm is Normalize)):
         return scale
     return replace(scale, norm=norm(low, high), ticks=None, colours=colour_map(palette or SEQUENTIAL))

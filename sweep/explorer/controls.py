@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -51,7 +50,7 @@ class MapControls:
             widgets.show(self._choices[name].of(state))
             widgets.root.visible = name not in self._source.axes or name in along - {state.x, state.y}
         for name, field in self._limits.items():
-            limit = getattr(state.colours, name)
+            limit = getattr(state, name)
             field.value = "" if limit is None else f"{limit:.6g}"
 
     def _pick(self, choice: Choice, k: Any) -> None:
@@ -67,8 +66,7 @@ class MapControls:
         def put(text: str) -> None:
             limit = number(text)
             if self._state:
-                colours = self._state.colours.limited(name, limit if math.isfinite(limit) else None)
-                self._change(replace(self._state, colours=colours))
+                self._change(self._state.limited(name, limit if math.isfinite(limit) else None))
 
         on(field, "value", put)
         return field

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
+import pandas as pd
 
 from sweep.config import Config, Values
 from sweep.explorer.runner import Curve
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State
-from sweep.grid import Array
 from sweep.plots import labels
 
 
@@ -41,16 +39,13 @@ def netcdf(source: Source, address: str, state: State, curves: Sequence[Curve]) 
 
 def csv(curves: Sequence[Curve]) -> str:
     """The samples of all trajectories, one a line, below a line of names and units."""
-    table, head = list[Array](), dict[str, str]()
+    tables = [pd.DataFrame(columns=["trajectory"])] if not curves else []
     for k, curve in enumerate(curves, 1):
         one = curve.dataset
         names = ["time", *(str(name) for name, v in one.data_vars.items() if v.dims == ("time",))]
-        head = {name: f"{name} ({unit})" if (unit := labels.unit(one, name)) else name for name in names}
-        table.append(np.stack([np.full(one.sizes["time"], k), *(one[name].values for name in names)], axis=1))
-    text = io.StringIO()
-    np.savetxt(text, np.concatenate(table) if table else np.zeros((0, 1)), "%.10g", ",", comments="",
-               header=",".join(["trajectory", *head.values()]))  # fmt: skip
-    return text.getvalue()
+        series = {labels.with_unit(name, labels.unit(one, name)): one[name].values for name in names}
+        tables.append(pd.DataFrame({"trajectory": k} | series))
+    return str(pd.concat(tables).to_csv(index=False, float_format="%.10g", na_rep="nan"))
 
 
 def yaml(source: Source, setup: Setup, state: State) -> str:

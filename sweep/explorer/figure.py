@@ -28,20 +28,20 @@ from sweep.explorer.colours import is_logarithmic, mapping, scale_of
 from sweep.explorer.cuts import Cuts
 from sweep.explorer.patterns import TILES
 from sweep.explorer.slices import PlacedAxis, Source, plain
-from sweep.explorer.state import Colours
+from sweep.explorer.state import COUNTS, State
 from sweep.grid import Array
-from sweep.plots import labels, marks, places
+from sweep.plots import labels, marks, places, theory
 from sweep.plots.description import Map
 from sweep.plots.scales import Scale
 
 HEIGHT = 480
 """Of the map, in pixels."""
 
-_SHORT = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference", "status": "end"}
+_SHORT = COUNTS | {"status": "end"}
 """What these are called under the pointer, where the table must not hide the map."""
 
-LINES = {"n_c1": ("dotted", 1.5), "n_c2": ("solid", 1.5), "best": ("dashed", 1.5), "boundary": ("solid", 0.7)}
-"""How the lines over a map are dashed, and how wide they are."""
+LINES = {name: (dash, round(1.25 * width, 2)) for name, (dash, width) in theory.STYLES.items()}
+"""How the lines over a map are dashed, and their widths in pixels."""
 
 _BAR = {
     "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": axes.SOFT,
@@ -108,15 +108,15 @@ class MapFigure:
                  "cuts": self._cuts.models, "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK),
                  "request": request})  # fmt: skip
 
-    def show(self, part: Map, columns: Mapping[str, Array], colours: Colours) -> Scale:
+    def show(self, part: Map, columns: Mapping[str, Array], state: State) -> Scale:
         """Show a map over these axes; returns how its values become colours.
 
         Parameters
         ----------
         columns : what the pointer shows of a cell beside its place: tables of shape (y, x) by their variables
-        colours : as the visitor wants them
+        state : in which the visitor has chosen of the colour scale
         """
-        scale = scale_of(part, colours)
+        scale = scale_of(part, state)
         logarithmic = is_logarithmic(scale)
         for image in self._images:
             image.visible = (image is self._images[1]) == logarithmic

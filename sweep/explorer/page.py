@@ -78,7 +78,7 @@ def save_html(
         raise ValueError("; ".join(faults))
     part = source.map(shown.show, shown.x, shown.y, shown.at)
     drawn = figure.MapFigure(source, shown.x, shown.y)
-    scale = drawn.show(part, _all_values(source, shown), shown.colours)
+    scale = drawn.show(part, _all_values(source, shown), shown)
     document = Document()
     document.add_root(Column(drawn.figure, drawn.cuts, sizing_mode="stretch_width", name="map"))
     document.add_root(Div(text=legend(part, scale), sizing_mode="stretch_width", name="legend"))

@@ -42,16 +42,14 @@ def serve(source: Source, setup: Setup | None, port: int | None, *, browser: boo
     OSError
         if the port is in use.
     """
-    sockets, found = _bind(port)
-    loop = IOLoop()
-    loop.make_current()
-    _, url = _started(loop, source, setup, sockets, found)
+    url = serve_beside(source, setup, port=port).url
+    ended = threading.Event()
+    for end in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(end, lambda *_: ended.set())
     say(f"exploring {source.name} at {url} (Ctrl-C ends it)")
     if browser:
-        loop.add_callback(lambda: webbrowser.open(url))
-    for end in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(end, lambda *_: loop.add_callback_from_signal(loop.stop))
-    loop.start()
+        webbrowser.open(url)
+    ended.wait()
 
 
 @dataclass(frozen=True)
@@ -68,17 +66,24 @@ class Beside:
         return f'<iframe src="{self.url}" width="100%" height="{self.height}" style="border: 0"></iframe>'
 
 
-def serve_beside(source: Source, setup: Setup | None, height: int) -> Beside:
-    """Serve until it is closed or this process ends, and return at once."""
-    sockets, port = _bind(0)  # any that is free: a notebook shows the page, whatever its address
-    ready = SimpleQueue[tuple[IOLoop, str]]()
-
-    closed = asyncio.Event()
+def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int | None = 0) -> Beside:
+    """Serve until it is closed or this process ends, and return at once; by default at any port that is free."""
+    # Its advice to name an option of Bokeh's own command helps nobody here; the browser is refused all the same.
+    logging.getLogger("bokeh.server.views.ws").setLevel(logging.CRITICAL)
+    logging.getLogger("tornado.access").setLevel(logging.ERROR)
+    sockets, found = _bind(port)
+    hosts = [f"{host}:{found}" for host in ("localhost", ADDRESS)]
+    url = f"http://{hosts[0]}/"
+    ready, closed = SimpleQueue[IOLoop](), asyncio.Event()
 
     async def work() -> None:
-        loop = IOLoop.current()
-        server, url = _started(loop, source, setup, sockets, port)
-        ready.put((loop, url))
+        application = Application(FunctionHandler(view.make(source, setup)))
+        web = _Web({"/": application}, extra_websocket_origins=hosts, absolute_url=url)
+        http = HTTPServer(web)
+        http.add_sockets(sockets)
+        server = BaseServer(IOLoop.current(), web, http)
+        server.start()
+        ready.put(IOLoop.current())
         await closed.wait()
         server.stop()
         for one in sockets:
@@ -86,31 +91,13 @@ def serve_beside(source: Source, setup: Setup | None, height: int) -> Beside:
 
     thread = threading.Thread(target=lambda: asyncio.run(work()), daemon=True, name="explorer")
     thread.start()
-    loop, url = ready.get(timeout=_SECONDS)
+    loop = ready.get(timeout=_SECONDS)
 
     def close() -> None:
         loop.add_callback(closed.set)
         thread.join(_SECONDS)
 
     return Beside(url, height, close)
-
-
-def _started(
-    loop: IOLoop, source: Source, setup: Setup | None, sockets: list[Any], port: int
-) -> tuple[BaseServer, str]:
-    """The server of the pages, for as long as the loop of this thread runs, and its address."""
-    # Its advice to name an option of Bokeh's own command helps nobody here; the browser is refused all the same.
-    logging.getLogger("bokeh.server.views.ws").setLevel(logging.CRITICAL)
-    logging.getLogger("tornado.access").setLevel(logging.ERROR)
-    hosts = [f"{host}:{port}" for host in ("localhost", ADDRESS)]
-    url = f"http://{hosts[0]}/"
-    application = Application(FunctionHandler(view.make(source, setup)))
-    web = _Web({"/": application}, extra_websocket_origins=hosts, absolute_url=url)
-    http = HTTPServer(web)
-    http.add_sockets(sockets)
-    server = BaseServer(loop, web, http)
-    server.start()
-    return server, url
 
 
 class _Web(BokehTornado):  # type: ignore[misc]  # Bokeh tells no types of it

@@ -27,7 +27,7 @@ _BUTTONS = 6
 LIMITS = {"low": "from", "high": "to"}
 """The ends of the colour scale, and what the page calls them."""
 
-_COUNTS = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
+COUNTS = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
 """The variables that have a button each, and what it says."""
 
 Cell = Mapping[str, float]
@@ -38,20 +38,6 @@ PALETTES = ("", "viridis", "cividis", "inferno", "turbo", "gray", "PuOr_r", "coo
 """Names of matplotlib's that can be chosen; without one a variable has its own."""
 
 _SPACINGS = {"": "by the values", "linear": "linear", "log": "logarithmic"}
-
-
-@dataclass(frozen=True)
-class Colours:
-    """What the visitor has chosen of the colour scale; the rest is as in pictures."""
-
-    palette: str = ""
-    spacing: str = ""
-    low: float | None = None
-    high: float | None = None
-
-    def limited(self, end: str, limit: float | None) -> Colours:
-        """The same with another of the `LIMITS`."""
-        return replace(self, low=limit) if end == "low" else replace(self, high=limit)
 
 
 @dataclass(frozen=True)
@@ -68,7 +54,15 @@ class State:
     beside: str = ""
     """The variable of a second map, if there is one."""
     cells: tuple[Cell, ...] = ()
-    colours: Colours = Colours()
+    palette: str = ""
+    spacing: str = ""
+    low: float | None = None
+    high: float | None = None
+    """What the visitor has chosen of the colour scale; the rest is as in pictures."""
+
+    def limited(self, end: str, limit: float | None) -> State:
+        """The same with another of the `LIMITS`."""
+        return replace(self, low=limit) if end == "low" else replace(self, high=limit)
 
 
 @dataclass(frozen=True)
@@ -84,8 +78,6 @@ class Choice:
     """The number of options, from the first on, that have a button each; the others share a list or a slider."""
     axis: Axis | None = None
     """The axis of the dataset on which the options are places."""
-    of_colours: bool = False
-    """True for what is chosen of the colour scale; the first option leaves it to the values."""
 
     def find(self, text: str) -> int | None:
         """The option that an address names, which may be any number on an axis; None if there is none."""
@@ -99,17 +91,15 @@ class Choice:
         """The option that is chosen in a state."""
         if self.axis:
             return state.at[self.name]
-        return self.options.index(getattr(state.colours if self.of_colours else state, self.name))
+        return self.options.index(getattr(state, self.name))
 
     def put(self, state: State, k: int) -> State:
         """The state with option `k`; two axes that would be the same change places."""
         if self.axis:
             return replace(state, at={**state.at, self.name: k})
         change: dict[str, Any] = {self.name: self.options[k]}
-        if self.of_colours:
-            return replace(state, colours=replace(state.colours, **change))
         if self.name == "show" and self.options[k] != state.show:
-            change["colours"] = replace(state.colours, low=None, high=None)
+            change |= {"low": None, "high": None}
         other = {"x": "y", "y": "x"}.get(self.name, "")
         if other and getattr(state, other) == self.options[k]:
             change[other] = getattr(state, self.name)
@@ -118,9 +108,9 @@ class Choice:
 
 def choices(source: Source) -> dict[str, Choice]:
     """All that can be chosen of the map of a dataset, by name."""
-    counts = [n for n in _COUNTS if n in source.variables]
+    counts = [n for n in COUNTS if n in source.variables]
     others = [n for n in source.variables if n not in counts]
-    words = [*(_COUNTS[n] for n in counts), *map(source.words, others)]
+    words = [*(COUNTS[n] for n in counts), *map(source.words, others)]
     axes = list(source.axes), [source.words(d) for d in source.axes]
     found = [Choice("show", "variable", [*counts, *others], words, len(counts))]
     found.append(Choice("beside", "beside it", ["", *counts, *others], ["nothing", *words]))
@@ -131,8 +121,8 @@ def choices(source: Source) -> dict[str, Choice]:
         unit = labels.si_unit(source.dataset, name)
         exact, short = [f"{v:.12g}" for v in axis.values], [f"{labels.number(v)}{unit}" for v in axis.values]
         found.append(Choice(name, source.words(name), exact, short, len(exact) * (len(exact) <= _BUTTONS), axis))
-    found.append(Choice("palette", "palette", PALETTES, ["its own", *PALETTES[1:]], of_colours=True))
-    found.append(Choice("spacing", "colours", list(_SPACINGS), list(_SPACINGS.values()), of_colours=True))
+    found.append(Choice("palette", "palette", PALETTES, ["its own", *PALETTES[1:]]))
+    found.append(Choice("spacing", "colours", list(_SPACINGS), list(_SPACINGS.values())))
     return {choice.name: choice for choice in found}
 
 
@@ -152,7 +142,7 @@ def write(state: State, source: Source, base: Cell) -> str:
     told = [choice for name, choice in choices(source).items() if name not in (state.x, state.y)]
     pairs = [(choice.name, choice.options[choice.of(state)]) for choice in told]
     pairs = [(name, option) for name, option in pairs if option or name == "y"]
-    limits = {name: getattr(state.colours, name) for name in LIMITS}
+    limits = {name: getattr(state, name) for name in LIMITS}
     pairs += [(name, f"{limit:.12g}") for name, limit in limits.items() if limit is not None]
     for cell in state.cells:
         named = {n: v for n, v in cell.items() if n in source.dims or v != base.get(n)}
@@ -180,7 +170,7 @@ def read(
             among = f"from {choice.options[0]} to {choice.options[-1]}" if choice.axis else ", ".join(choice.options)
             faults.append(f"{key}={brief(values[-1])} is not there; choose {among}")
         elif key in LIMITS and math.isfinite(limit := number(values[-1])):
-            state = replace(state, colours=state.colours.limited(key, limit))
+            state = state.limited(key, limit)
         elif key in LIMITS:
             faults.append(f"{key}={brief(values[-1])} is no number")
         elif key != "cell":

@@ -21,7 +21,7 @@ from sweep.explorer.page import PARTS
 from sweep.explorer.runner import Curve, Job, Runner
 from sweep.explorer.setup import Setup, why_still
 from sweep.explorer.slices import Source
-from sweep.explorer.state import Cell, Colours, State
+from sweep.explorer.state import Cell, State
 from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 
@@ -109,10 +109,12 @@ class View:
         self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts]
         if self._second:
             second = self._source.map(state.beside, state.x, state.y, state.at)
-            self._second.show(second, {state.beside: second.values, **tables}, Colours(state.colours.palette))
+            self._second.show(
+                second, {state.beside: second.values, **tables}, replace(state, spacing="", low=None, high=None)
+            )
         self._part = part
         columns = {state.show: part.values, **tables}
-        self._legend.text = page.legend(part, self._shown.show(part, columns, state.colours))
+        self._legend.text = page.legend(part, self._shown.show(part, columns, state))
         self._controls.show(state)
         self._draw_selection()
 

@@ -7,7 +7,7 @@ import pytest
 from sweep.explorer import state
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
-from sweep.explorer.state import Colours, State
+from sweep.explorer.state import State
 
 HOSTILE = {
     "show=../../etc/passwd": "show=../../etc/passwd is not there; choose reversals, ",
@@ -45,9 +45,7 @@ def test_the_longest_axes_are_shown_first(source: Source) -> None:
 
 def test_what_is_written_is_read_again(source: Source, base: state.Cell) -> None:
     cells = ({**base, "mu": 47.123456789, "b": 3.0}, {**base, "delta": -0.25})
-    shown = State(
-        "n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, "status", cells, Colours("gray", "log", high=4.5)
-    )
+    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, "status", cells, "gray", "log", high=4.5)
     again, faults = read(state.write(shown, source, base), source, base)
     assert not faults
     assert again == shown

@@ -136,11 +136,11 @@ def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None
 )
 def test_pictures_and_explorer_have_the_same_colours(name: str, whole: xr.Dataset) -> None:
     from sweep.explorer.figure import MapFigure  # needs Bokeh
-    from sweep.explorer.state import Colours
+    from sweep.explorer.state import first
 
     whole["reversals"] += xr.DataArray(np.arange(SIZE[1], dtype="int16") ** 3, dims="delta")
     part, shown = Source(whole).map(name, "delta", "n0", {}), MapFigure(Source(whole), "delta", "n0")
-    shown.show(part, {}, Colours())
+    shown.show(part, {}, first(Source(whole)))
     (bar,) = shown.figure.right
     mapper, values = bar.color_mapper, np.unique(part.shown)
     straight = np.log if "Log" in type(mapper).__name__ else np.asarray
