@@ -77,7 +77,7 @@ T_END = 30_000.0
 """Default of `t_end`, in sqrt(c/g); in SI it is as long for the body."""
 
 LATER = 1e6
-"""Default of `t_end` where it can be foreseen whether a spin reverses once more; that of `patience` is then `T_END`."""
+"""Default of `t_end` where it can be foreseen whether that is of use; that of `patience` is then `T_END`."""
 
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
@@ -116,9 +116,9 @@ class Integrator(Strict):
     )  # fmt: skip
     patience: Annotated[float | None, Allowed("null or a finite number > 0")] = Field(
         default=None, gt=0,
-        description="time after which a trajectory of `slip` goes on to `t_end` only if the slow equations foresee "
-        f"that its spin reverses once more, in sqrt(c/g); null for all that have not settled; by default {T_END:g} "
-        "if `t_end` is left out",
+        description="time after which a trajectory of `slip` goes on to `t_end` only if it can be foreseen that its spin "
+        "reverses once more, or that its rattle has wound down by then, in sqrt(c/g); null for all that have not "
+        f"settled; by default {T_END:g} if `t_end` is left out",
     )  # fmt: skip
     stop_when_settled: bool = Field(
         default=True, description="whether a trajectory of a sweep ends when neither spin nor count can change any more"

@@ -1,10 +1,15 @@
-"""Runs cells until their counts are final: where the rattle is small, the slow equations tell what is still to come."""
+"""Runs cells until their counts are final, or until nothing tells when that will be.
+
+Where the rattle is small, the slow equations tell what is still to come.  Where it rolls round and round, as in nearly
+round bodies, how it winds down is measured.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sweep.engine.plan import Part
+from sweep.engine.winding import whole_blocks, wind_down
 from sweep.engine.work import Work
 from sweep.grid import Array
 from sweep.kernels.measures.resting_spin import endings
@@ -24,20 +29,31 @@ _LARGEST = 0.2
 def run(part: Part, work: Work, name: str, most: Array | float = np.inf) -> None:
     """Run `part` to its ends, in place.
 
-    A cell that meets the configuration's `patience` goes on to `t_end` only if a further reversal can be foreseen.
-    Parameters as of `Work.run`.
+    A cell that meets the configuration's `patience` goes on to `t_end` only if it can be foreseen that its spin
+    reverses once more, or that its rattle has wound down before.  Parameters as of `Work.run`.
     """
     patience, table = part.config.integrator.patience, part.kernel.table(part.images)
-    first = most if patience is None else np.minimum(most, np.ceil(patience / table["step"]))
+    first = most if patience is None else np.minimum(most, whole_blocks(patience / table["step"]))
     work.run(name, part.kernel, part.images, settle=part.settles, most=first)
-    rows = np.flatnonzero(settle(part)) if part.settles else np.empty(0, int)
-    if patience is not None and len(rows):
-        on = part.take(rows)
-        on.kernel.table(on.images)["status"] = RUNNING
-        on_most = most if np.ndim(most) == 0 else np.asarray(most)[rows]
-        work.run(f"{name} later", on.kernel, on.images, settle=True, most=on_most)
-        settle(on)
-        part.images[rows] = on.images
+    on = settle(part) if part.settles else np.zeros(len(part.cells), bool)
+    if patience is None or not part.settles:
+        return
+    rest = np.flatnonzero(_late(part) & ~on)
+    on[rest] = wind_down(part, rest, work, f"{name} winding", patience)
+    rows = np.flatnonzero(on)
+    if len(rows):
+        later = part.take(rows)
+        later.kernel.table(later.images)["status"] = RUNNING
+        most = most if np.ndim(most) == 0 else np.asarray(most)[rows]
+        work.run(f"{name} later", later.kernel, later.images, settle=True, most=most)
+        settle(later)
+        part.images[rows] = later.images
+
+
+def _late(part: Part) -> Array:
+    """Tell which cells are at their limit of time, and can be shown to have settled, shape (cells,)."""
+    late = part.kernel.table(part.images)["status"] == TIME_LIMIT
+    return np.asarray(late & (MODES in part.kernel.model.offers and "reversals" in part.kernel.measure))
 
 
 def settle(part: Part) -> Array:
@@ -47,10 +63,9 @@ def settle(part: Part) -> Array:
     -------
     Where a further reversal can be foreseen, shape (cells,).
     """
-    table = part.kernel.table(part.images)
-    late = table["status"] == TIME_LIMIT
-    if not (MODES in part.kernel.model.offers and "reversals" in part.kernel.measure and late.any()):
-        return np.zeros(len(late), bool)
+    table, late = part.kernel.table(part.images), _late(part)
+    if not late.any():
+        return late
     left = endings(table, late)
     _, _, inertia = part.kernel.model.energy(*part.kernel.unpack(part.images))
     fastest = np.sqrt(2 * np.maximum(table["energy"], 0) / inertia)

@@ -27,11 +27,10 @@ def run(write: Write) -> xr.Dataset:
 def test_a_cell_goes_on_if_a_reversal_can_be_foreseen(run: xr.Dataset, write: Write) -> None:
     ended = sweep.run(write(SCENE), t_end=30_000.0)
     assert list(ended.status) == [TIME_LIMIT, TIME_LIMIT, SETTLED]
-    assert list(run.status) == [SETTLED, TIME_LIMIT, SETTLED]
+    assert list(run.status) == [SETTLED, SETTLED, SETTLED]
     assert list((run.reversals - ended.reversals).values) == [1, 0, 0]
     assert float(run.t_last_reversal[0]) > 30_000
-    assert float(run.t_stop[1]) == pytest.approx(30_000, rel=1e-4)
-    assert list(run.decided) == [1, 0, 1]
+    assert list(run.decided) == [1, 1, 1]
 
 
 def test_to_have_paused_changes_no_count(run: xr.Dataset, write: Write) -> None:
@@ -60,9 +59,12 @@ def test_a_run_that_settles_at_its_first_look_is_decided() -> None:
 @pytest.mark.campaign
 @pytest.mark.parametrize(
     "name",
-    ["kane_levinson_coulomb", "kane_levinson_viscous", "mu", "pebble", "plastic_toy", "taps", "tippe_top", "wooden"],
+    [
+        "b", "kane_levinson_coulomb", "kane_levinson_viscous", "mu", "pebble", "plastic_toy", "quick", "taps", "tippe_top",
+        "wooden",
+    ],  # fmt: skip
 )
 def test_shipped_configurations_end_decided(name: str) -> None:
-    """Of the others, two go to a published time, two have nearly round bodies, and two reverse for ever."""
+    """Of the others, two go to a published time, two reverse for ever, and one takes minutes."""
     found = sweep.run(ROOT / "configs" / f"{name}.yaml", verify=0.0)
     assert float(found.decided.mean()) >= 0.98

@@ -26,7 +26,7 @@ import numpy as np
 
 from sweep.kernels.adams.step import HISTORY, SLIPS, SLOPES
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.layout import Table
+from sweep.kernels.layout import BLOCK, Table
 from sweep.kernels.measures.measurement import Stretch
 from sweep.kernels.status import QUIET, RUNNING
 from sweep.models.ladder import slip
@@ -174,6 +174,8 @@ def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, l
         sinks &= np.isfinite(low) & (seen.log_d > np.log(_ZERO))
         strict = np.floor(np.minimum(ends, _until_curved(true, share)) / step)
         steps = np.clip(np.where(sinks, np.ceil(ends / step), strict), 0, left)
+        # Whole blocks, so that a run can pause at the end of one.
+        steps = np.where(steps < left, steps - steps % BLOCK, left)
 
         small = (logs < largest[:, None]).all(axis=1) & rattle.sound
         unclear = _until_clear(seen, largest, share)

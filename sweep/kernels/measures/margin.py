@@ -26,6 +26,9 @@ from sweep.models.model import COUNT, Array
 EXTREMES = ("overshoot", "nearest_approach")
 """The quantities that hold the margins, as far as the trajectory has come."""
 
+WOUND = "spin_when_wound_down"
+"""The least spin that is left when a rattle that rolls round has wound down (`sweep.engine.winding`); else zero."""
+
 
 class Margin(Measurement):
     name = "margin"
@@ -33,7 +36,9 @@ class Margin(Measurement):
     asks = COUNT
     needs = ("reversals",)
     by_default = True
-    quantities = (*EXTREMES, "counted", "window_time", "window_size", "window_time_before", "window_size_before")
+    quantities = (
+        *EXTREMES, WOUND, "counted", "window_time", "window_size", "window_time_before", "window_size_before",
+    )  # fmt: skip
 
     variables = {
         "margin_more": measured(
@@ -51,7 +56,7 @@ class Margin(Measurement):
     }
 
     def make_look(self, layout: Layout) -> Any:
-        OVERSHOOT, NEAREST, COUNTED, TIME, SIZE, TIME_BEFORE, SIZE_BEFORE = map(layout.at, self.quantities)
+        OVERSHOOT, NEAREST, _, COUNTED, TIME, SIZE, TIME_BEFORE, SIZE_BEFORE = map(layout.at, self.quantities)
         CLOSED, PERIOD, COUNT = map(layout.at, ("closed_window", "period", "reversals"))
         DONE, STEP, PHASE, SHIFTED = map(layout.at, ("done", "step", "phase", "shifted"))
 
@@ -89,6 +94,7 @@ class Margin(Measurement):
         left = endings(table, settled)
         further = left.overshoot > overshoot
         nearest = np.where(further, left.nearest_approach, np.fmin(nearest, left.nearest_approach))
+        nearest = np.where(table[WOUND] > 0, np.fmin(nearest, table[WOUND]), nearest)
         return {
             "margin_more": np.where(settled, nearest, np.nan),
             "margin_fewer": np.where(table["reversals"] > 0, np.fmax(overshoot, left.overshoot), np.nan),

@@ -52,14 +52,14 @@ def endings(table: Table, which: Array) -> Ending:
         cells = np.flatnonzero(which)
         for first in range(0, len(cells), _AT_A_TIME):
             some = cells[first : first + _AT_A_TIME]
-            found = ending(*_split(Table(table.images[some], table.layout)))
+            found = ending(*slow_states(Table(table.images[some], table.layout)))
             for whole, part in zip(result, found, strict=True):
                 whole[some] = part
     return result
 
 
-def _split(table: Table) -> tuple[Array, Constants]:
-    """States and constants of `stiff.slip`, from images of either set of variables."""
+def slow_states(table: Table) -> tuple[Array, Constants]:
+    """States and constants of `stiff.slip`, from images of a model with modes in either set of variables."""
     kept = {name: table[f"constant.{name}"] for name in slip.Constants._fields}
     constants = Constants(*(1 / kept[f"inv_{name}"] for name in ("I1", "I2", "I3")), **kept)
     if STIFF_MODEL.states[2] in table.layout:

@@ -1,0 +1,37 @@
+"""How a rattle that rolls round and round winds down.
+
+The two rocking frequencies of a nearly round body are nearly the same, and its rattle becomes circular: the contact
+point runs round and round, and neither the spin nor the rattle ripples.  Only the little slip that such a motion needs
+takes energy from it, which can last 10⁶ sqrt(c/g).  As the rattle is not small, the slow equations do not describe it
+(`sweep.models.stiff.final_spin`).  But the contact force has no torque about the contact point, so that the angular
+momentum about it along the vertical,
+
+    d (M·u)/dt = A12 (ω1² - ω2²) - (A11 - A22) ω1 ω2,
+
+changes by what averages to zero while the contact point goes round (docs/explanation/reversal.md).  M·u/I3 is where
+the spin goes while the rattle decays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.models.model import Array
+from sweep.models.stiff.slip import STIFF_MODEL, Constants
+
+
+def vertical_spin(states: Array, constants: Constants) -> tuple[Array, Array]:
+    """The spin M·u/I3 that would be left without rattle, and the spin that would have all the energy, squared.
+
+    Parameters
+    ----------
+    states : of `stiff.slip`, shape (7, cells)
+
+    Returns
+    -------
+    In sqrt(g/c) and g/c, each of shape (cells,).  The second, less the square of the first, is the energy that a rattle
+    can lose; of the three it alone has no ripple.
+    """
+    u1, u2, M1, M2, M3, *_ = states
+    spin, rattle, inertia = STIFF_MODEL.energy(states, constants)
+    return (u1 * M1 + u2 * M2 - np.sqrt(1 - u1**2 - u2**2) * M3) / inertia, 2 * rattle / inertia + spin**2

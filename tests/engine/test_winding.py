@@ -1,0 +1,71 @@
+"""Rattles that roll round and round, as those of nearly round bodies do."""
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.config import load_config
+from sweep.engine import executor
+from sweep.engine.plan import plan
+from sweep.engine.winding import whole_blocks
+from sweep.kernels.status import RUNNING, SETTLED
+from sweep.models.stiff.precession import vertical_spin
+from sweep.models.stiff.slip import Constants, slow
+
+
+BODY = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 60.0, "n0": 0.05, "x0": 0.01, "y0": 0.01}
+
+
+def test_a_pause_between_blocks_changes_no_bit() -> None:
+    """Within a block the history of adams would go on without the state."""
+    cells = {name: [value] for name, value in {**BODY, "b": 9.8}.items()}
+    (part,) = plan(load_config({"name": "round", "cases": cells, "integrator": {"method": "adams"}})).parts
+    paused, kernel = part.take(np.arange(1)), part.kernel
+    for steps in (100.0, 1000.0, 5000.0):
+        table = kernel.table(paused.images)
+        table["goal"], table["status"] = whole_blocks(np.full(1, steps)), RUNNING
+        executor.execute(kernel, paused.images, stop_when_settled=False)
+    kernel.table(part.images)["goal"] = table["goal"]
+    executor.execute(kernel, part.images, stop_when_settled=False)
+    # When to look for a leap depends on how many steps are left.
+    same = [name for name in kernel.layout.names if name != "quiet_after"]
+    np.testing.assert_array_equal(table.columns(same), kernel.table(part.images).columns(same))
+
+
+def test_a_rolling_rattle_turns_the_vertical_spin_by_its_product_of_inertia_alone() -> None:
+    """d (M·u)/dt = A12 (ω1² - ω2²) - (A11 - A22) ω1 ω2, to the third power of the rattle."""
+    columns = {name: np.full(3, value) for name, value in {**BODY, "b": 8.0, "delta": 0.3}.items()}
+    p, size = Constants.of(columns), 1e-4 * np.array([1.0, 0.5, 0.25])
+    states = np.array([0.3 * size, -0.7 * size, 5.0 * size, 2.0 * size, np.zeros(3), 0.0 * size, 0.0 * size])
+    later, _ = slow(*states, p)
+    after = states.copy()
+    after[:5] += 1e-6 * np.array(later)
+    gain = (vertical_spin(after, p)[0] - vertical_spin(states, p)[0]) * p.I3 / 1e-6
+    w1, w2 = states[2] / (p.I1 + columns["c"] ** 2), states[3] / (p.I2 + columns["c"] ** 2)
+    np.testing.assert_allclose(gain, p.A12 * (w1**2 - w2**2) - (p.A11 - p.A22) * w1 * w2, rtol=1e-3)
+
+
+def test_upright_spin_has_nothing_to_lose() -> None:
+    columns = {name: np.full(2, value) for name, value in BODY.items()}
+    p, spin = Constants.of(columns), np.array([0.05, -0.02])
+    states = np.zeros((7, 2))
+    states[4] = -p.I3 * spin
+    left, total = vertical_spin(states, p)
+    np.testing.assert_allclose(left, spin)
+    np.testing.assert_allclose(total, spin**2)
+
+
+@pytest.mark.campaign
+def test_what_has_wound_down_reverses_no_more() -> None:
+    """Bodies by which nothing was chosen, followed to t = 10⁶ without asking how their rattle winds down."""
+    random = np.random.default_rng(20261124)
+    ranges = {"a": (5, 15), "roundness": (0.85, 0.99), "delta": (0.01, 0.1), "mu": (20, 200), "n0": (0.03, 0.1)}
+    cells = {name: random.uniform(*ends, 32) for name, ends in ranges.items()}
+    cells["b"] = cells["a"] * cells.pop("roundness")
+    scene = {"name": "fresh", "cases": cells, "start": {"x0": 0.01, "y0": 0.01}, "integrator": {"method": "adams"}}
+    found = sweep.run(scene, estimate_errors=False)
+    far = sweep.run(scene, estimate_errors=False, t_end=1e6)
+    settled = (found.status == SETTLED).values
+    assert settled.mean() > 0.9
+    assert (found.t_stop.values > 30_000).sum() > 3
+    np.testing.assert_array_equal(found.reversals[settled], far.reversals[settled])
