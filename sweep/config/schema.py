@@ -116,8 +116,8 @@ class Integrator(Strict):
     )  # fmt: skip
     patience: Annotated[float | None, Allowed("null or a finite number > 0")] = Field(
         default=None, gt=0,
-        description="time after which a trajectory of `slip` goes on to `t_end` only if it can be foreseen that its spin "
-        "reverses once more, or that its rattle has wound down by then, in sqrt(c/g); null for all that have not "
+        description="time after which a trajectory of `slip` goes on to `t_end` only if it can be foreseen that its "
+        "spin reverses once more, or that its rattle has wound down by then, in sqrt(c/g); null for all that have not "
         f"settled; by default {T_END:g} if `t_end` is left out",
     )  # fmt: skip
     stop_when_settled: bool = Field(

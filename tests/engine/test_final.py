@@ -60,9 +60,17 @@ def test_a_run_that_settles_at_its_first_look_is_decided() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "b", "kane_levinson_coulomb", "kane_levinson_viscous", "mu", "pebble", "plastic_toy", "quick", "taps", "tippe_top",
+        "b",
+        "kane_levinson_coulomb",
+        "kane_levinson_viscous",
+        "mu",
+        "pebble",
+        "plastic_toy",
+        "quick",
+        "taps",
+        "tippe_top",
         "wooden",
-    ],  # fmt: skip
+    ],
 )
 def test_shipped_configurations_end_decided(name: str) -> None:
     """Of the others, two go to a published time, two reverse for ever, and one takes minutes."""

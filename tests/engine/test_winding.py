@@ -12,7 +12,6 @@ from sweep.kernels.status import RUNNING, SETTLED
 from sweep.models.stiff.precession import vertical_spin
 from sweep.models.stiff.slip import Constants, slow
 
-
 BODY = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 60.0, "n0": 0.05, "x0": 0.01, "y0": 0.01}
 
 
