@@ -116,10 +116,12 @@ def trajectory(
     the bands in which most of the spins lie.
     """
     if dry_run:
+        at = cells_of(cells, config.table)
+
         from sweep.studies.trajectory import estimate
 
         with of_option("--at", config.table):
-            click.echo(estimate(config, cells_of(cells, config.table), samples))
+            click.echo(estimate(config, at, samples))
         return
     files = _save(config, "trajectory", _followed(config, cells, quiet, samples=samples, **how), output)
     if not quiet:
@@ -255,10 +257,11 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
 
 def _followed(config: Config, cells: tuple[str, ...], quiet: bool, **how: Any) -> xr.Dataset:
     """Follow the cells of `--at`."""
+    at = cells_of(cells, config.table)  # which takes no time; what is loaded then takes a second
+
     from sweep.progress import Terminal
     from sweep.studies.trajectory import trajectory
 
-    at = cells_of(cells, config.table)
     interrupt.raise_again()
     with Terminal(quiet, _TIMES[config.units]) as terminal, of_option("--at", config.table):
         return trajectory(config, reporter=terminal, **how, **at)
