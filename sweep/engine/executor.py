@@ -20,7 +20,8 @@ CHUNK_SECONDS = 0.7
 STEP_SECONDS = 25e-9
 """Rough time of a step of one lane on one thread, measured on the slip model with dopri5 (`sweep bench`)."""
 
-_MOST_BLOCKS = 2**40
+UNTIL_ALL_STOP = 2**40
+"""Blocks of steps: as many as are needed."""
 
 
 def execute(
@@ -67,7 +68,7 @@ def execute(
 
 def _rescale(blocks: int, seconds: float, wanted: float) -> int:
     # While the last trajectories pause often, every call is short, and `blocks` would grow without end.
-    return min(max(1, int(blocks * np.clip(wanted / seconds, 0.25, 8))), _MOST_BLOCKS)
+    return min(max(1, int(blocks * np.clip(wanted / seconds, 0.25, 8))), UNTIL_ALL_STOP)
 
 
 def nominal_seconds(steps: Array) -> float:

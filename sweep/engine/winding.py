@@ -23,9 +23,6 @@ from sweep.models.stiff.precession import vertical_spin
 # 0.03 % of its energy in that time, so that few looks would not tell this from the ripple of M·u/I3, which is 3e-6.
 _LOOKS, _LONGER = 256, 0.1
 
-_IN_ONE = 2**40
-"""Blocks of steps: as many as there are between two looks, which take milliseconds."""
-
 _KEPT = 32
 """Looks after which they are kept for an interrupted run to go on."""
 
@@ -84,7 +81,7 @@ def _looks(part: Part, work: Work, name: str, patience: float) -> Array:
     for look in range(len(looks), _LOOKS + 1):
         table["goal"] = begun + look * between
         table["status"][(table["status"] == TIME_LIMIT) & (table["done"] < table["goal"])] = RUNNING
-        executor.execute(part.kernel, part.images, stop_when_settled=False, chunk_blocks=_IN_ONE)
+        executor.execute(part.kernel, part.images, stop_when_settled=False, chunk_blocks=executor.UNTIL_ALL_STOP)
         looks.append(vertical_spin(*slow_states(table)))
         if look % _KEPT == 0:
             work.kept |= {name: part.images.copy(), f"{name} looks": np.array(looks)}

@@ -21,7 +21,7 @@ from sweep.config.values import numbers_of
 from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
-from sweep.engine.executor import STEP_SECONDS
+from sweep.engine.executor import STEP_SECONDS, UNTIL_ALL_STOP
 from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
@@ -55,9 +55,6 @@ _SAME, _SAME_STEP = 1e-12, 1e-9
 # Every step is taken once to reach the end, and again between the marks for the samples; a sample of the slip model
 # took 2 µs on a Zen 5, all its series together.
 _PASSES, _SAMPLE_SECONDS = 2, 2e-6
-
-# Blocks of steps: as many as are needed.
-_UNTIL_ALL_STOP = 2**40
 
 MAX_TRAJECTORIES = 1000
 """Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
@@ -324,7 +321,7 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Arr
         active = np.flatnonzero(counts > i)
         samples = firsts[active] + i
         table["goal"][active], table["status"][active] = steps[samples], RUNNING
-        kernel.advance(stretches, active, _UNTIL_ALL_STOP, False)
+        kernel.advance(stretches, active, UNTIL_ALL_STOP, False)
         images = stretches[active]
         _go_on(kernel, images, times[at[samples]])
         states[:, samples] = kernel.states(images)
@@ -376,7 +373,7 @@ def _go_on(kernel: Kernel, images: Array, times: Array) -> None:
     between = np.flatnonzero(rest > _SAME_STEP * table["step"])
     table["step"][between], table["goal"][between] = rest[between], table["done"][between] + 1
     table["status"][between] = RUNNING
-    kernel.advance(images, between, _UNTIL_ALL_STOP, False)
+    kernel.advance(images, between, UNTIL_ALL_STOP, False)
 
 
 def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
