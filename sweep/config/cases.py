@@ -77,8 +77,9 @@ def _misshapen(file: str, header: list[str], rows: list[tuple[int, list[str]]]) 
         yield Fault(file, None, None, (), "empty; its first line has to name the columns, such as mu,n0")
     elif not 0 < len(rows) <= MAX_AXIS:
         yield Fault(file, None, None, (), f"must have 1 to {MAX_AXIS} rows under its first line, not {len(rows)}")
+    first: dict[str, int] = {}
     for column, name in enumerate(header, start=1):
-        if name in header[: column - 1]:
+        if first.setdefault(name, column) != column:
             yield Fault(file, 1, column, (name,), "a second column of this name; remove one of the two")
     for line, row in rows:
         if len(row) != len(header):
