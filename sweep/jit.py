@@ -159,11 +159,17 @@ def threads() -> int:
     return 1 if INTERPRETED else int(load_numba().get_num_threads())
 
 
-def on_all_threads(function: Callable[[Any], None], items: Sequence[Any]) -> None:
-    """Call `function` for each of `items`; it has to spend its time in functions of `serial`."""
+def on_all_threads(function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
+    """Call `function` for each of `items`, and return what it returns.
+
+    It has to spend its time in functions of `serial`, or in those of NumPy that let other threads run, as LAPACK's do.
+    """
     shares = [items[i :: 4 * threads()] for i in range(min(len(items), 4 * threads()))]
     over = map if INTERPRETED else _pool(threads()).map
-    list(over(lambda share: [*map(function, share)], shares))
+    found: list[Any] = [None] * len(items)
+    for i, results in enumerate(over(lambda share: [*map(function, share)], shares)):
+        found[i :: len(shares)] = results
+    return found
 
 
 @cache

@@ -9,6 +9,7 @@ import numpy as np
 
 from sweep.config import Config
 from sweep.grid import Array, Grid
+from sweep.jit import on_all_threads
 from sweep.kernels import methods
 from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
@@ -197,7 +198,7 @@ def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
 
 def fill(config: Config, grids: tuple[Grid, ...], chosen: tuple[Choice, ...]) -> Plan:
     """Give each cell of `grids` its limits and start as well."""
-    predictions = tuple(predict(config.equations, grid, config.measure) for grid in grids)
+    predictions = tuple(on_all_threads(lambda grid: predict(config.equations, grid, config.measure), grids))
     stable = np.concatenate([each.stability.ranges for each in predictions if each.stability], axis=1)
     parts = [Part(**vars(each), config=config, stable=stable[:, each.cells], images=np.empty(0)) for each in chosen]
     return Plan(config, grids, predictions, tuple(part.start() for part in parts))
