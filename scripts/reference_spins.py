@@ -18,6 +18,7 @@ from __future__ import annotations
 import csv
 import sys
 import time
+from collections.abc import Callable
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
@@ -36,6 +37,8 @@ from sweep.models.model import Array, Model
 from sweep.models.theory import coefficients
 
 Case = dict[str, float]
+Rhs = Callable[[Array], Any]
+"""From states, shape (states,) or (states, points), to their derivatives."""
 
 Extended, Quadruple = np.longdouble, heyoka.real128
 
@@ -155,28 +158,27 @@ def radau(stages: int) -> Array:
     return np.asarray(np.einsum("ki,kj,j->ij", integrals, P[:stages], weights))
 
 
-def full_jacobian(states: Array, constants: Array) -> Array:
+def full_jacobian(rhs: Rhs, states: Array) -> Array:
     """∂y'/∂y in double precision, by complex steps."""
     columns = []
     for i in range(len(states)):
         shifted = states.astype(complex)
         shifted[i] += 1e-30j
-        columns.append(np.array(slip.rhs(shifted, slip.Constants(*constants))[0]).imag / 1e-30)
-    return np.array(columns).T
+        columns.append(np.array(rhs(shifted)).imag / 1e-30)
+    return np.array(columns, dtype=float).T
 
 
-def radau_step(A: Array, states: Array, constants: Array, step: Any) -> Array:
+def radau_step(A: Array, rhs: Rhs, states: Array, step: Any) -> Array:
     """One step.  Newton's matrix is in double precision, the residual in 80 bits."""
     s, n = len(A), len(states)
-    jacobian = full_jacobian(states.astype(float), constants.astype(float))
-    inverse = np.linalg.inv(np.eye(s * n) - np.kron(float(step) * A.astype(float), jacobian))
-    increments, size = np.zeros((s, n), Extended), np.inf
-    # Each iteration gains four digits or more; round-off is at 1e-22.
-    while size > 1e-20:
-        slopes = np.array(slip.rhs((states + increments).T, slip.Constants(*constants[:, None]))[0]).T
+    inverse = np.linalg.inv(np.eye(s * n) - np.kron(float(step) * A.astype(float), full_jacobian(rhs, states)))
+    increments, size, before = np.zeros((s, n), Extended), 1e300, np.inf
+    # Each iteration gains four digits or so, down to round-off, which is at 1e-22 where slopes are at most one.
+    while size > 1e-20 and (size > 1e-15 or size < before / 4):
+        slopes = np.array(rhs((states + increments).T)).T
         change = (inverse @ (step * (A @ slopes) - increments).ravel().astype(float)).reshape(s, n)
         increments += change
-        size = np.abs(change).max()
+        size, before = np.abs(change).max(), size
     return np.asarray(states + increments[-1])
 
 
@@ -194,11 +196,15 @@ def radau_spins(case: Case, longest: float) -> list[Any]:
     """Spins of the slip model at `TIMES`."""
     states, constants = (np.array(numbers) for numbers in problem(slip.MODEL, case, Extended))
     A, spins, passed = radau(STAGES), [], first_times(case, longest)
+
+    def rhs(y: Array) -> Any:
+        return slip.rhs(y, slip.Constants(*constants))[0]
+
     for end in TIMES:
         steps = int(np.ceil((end - passed[-1]) / longest))
         edges = [*passed, *np.linspace(passed[-1], Extended(end), steps + 1)[1:]]
         for before, now in pairwise(edges):
-            states = radau_step(A, states, constants, now - before)
+            states = radau_step(A, rhs, states, now - before)
         spins.append(check_contact(slip.MODEL, states, constants))
         passed = [Extended(end)]
     return spins
