@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support import ROOT
+from support.newton import cross
 
 import sweep
 
@@ -38,11 +39,11 @@ def motion(z: np.ndarray, p: dict[str, float]) -> tuple[np.ndarray, np.ndarray, 
     M, up = z[:3], z[3:]
     r = contact(up, p)
     w = np.linalg.solve(matrix(r, p), M)
-    moves = np.cross(up, w)
+    moves = cross(up, w)
     x, t = turn(p).T @ r, (turn(p).T @ up) / up[2]
     dt = ((turn(p).T @ moves)[:2] - t[:2] * moves[2]) / up[2]
     dr = turn(p) @ np.array([*(-BOWLS * dt), -x[:2] @ dt])
-    return np.concatenate([np.cross(M, w) + np.cross(dr, np.cross(w, r)) + G * np.cross(r, up), moves]), w, r
+    return np.concatenate([cross(M, w) + cross(dr, cross(w, r)) + G * cross(r, up), moves]), w, r
 
 
 def to_theirs(y: np.ndarray, p: dict[str, float]) -> np.ndarray:

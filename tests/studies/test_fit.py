@@ -54,7 +54,9 @@ def seen() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def heading(body: Mapping[str, np.ndarray], law: str, start: np.ndarray, times: np.ndarray) -> np.ndarray:
     """How far the x axis of a body has turned, seen from above, by Newton and Euler."""
-    turned, roll, pitch, *_ = newton.pose(start, {name: float(value[0]) for name, value in body.items()}, law, times)
+    turned, roll, pitch, *_ = newton.pose(
+        start, {name: float(value[0]) for name, value in body.items()}, law, times, 1e-8
+    )
     return np.asarray(turned - np.arctan(np.sin(roll) * np.tan(pitch)))
 
 

@@ -3,7 +3,7 @@
 Nothing is solved by hand, and mass, gravity and couples enter as they are.  The laws are written as functions of |v|.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -63,22 +63,22 @@ def _solution(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vecto
     """As `derivative`, and the determinant of the linear system, which vanishes where no force solves it."""
     m, g = p.get("mass", 1.0), p.get("gravity", 1.0)
     u, slip = _attitude(y, law)
-    side = np.cross(u, [1.0, 0, 0]) / np.linalg.norm(np.cross(u, [1.0, 0, 0]))
-    space = np.array([np.cross(side, u), side, u])  # rows: axes fixed in space, in the body's components
+    side = _unit(cross(u, [1.0, 0, 0]))
+    space = np.array([cross(side, u), side, u])  # rows: axes fixed in space, in the body's components
     J = space @ inertia(p) @ space.T
     omega, up = space @ y[2:5], np.array([0, 0, 1.0])
     v = space @ slip
-    du = np.cross(u, y[2:5])
+    du = cross(u, y[2:5])
     x_p = space @ contact(u, p)
     # The velocity of the contact point, in space, as the body turns: by a complex step.
-    moving = space @ (contact(u + 1e-30j * du, p).imag / 1e-30) + np.cross(omega, x_p)
+    moving = space @ (contact(u + 1e-30j * du, p).imag / 1e-30) + cross(omega, x_p)
 
     # Unknowns: a_G, ω' and the contact force F; ω' is the same in both systems of axes.
     matrix, right = np.zeros((9, 9)), np.zeros(9)
     matrix[:3, :3], matrix[:3, 6:], right[:3] = m * np.eye(3), -np.eye(3), -m * g * up
     speed = np.linalg.norm(omega)
     matrix[3:6, 3:6], matrix[3:6, 6:] = J, -_cross(x_p)
-    right[3:6] = -np.cross(omega, J @ omega) - p.get("sigma", 0.0) * omega
+    right[3:6] = -cross(omega, J @ omega) - p.get("sigma", 0.0) * omega
     rolling = p["mu_rolling"] * p["radius"] / _rounded(speed, p["speed_rolling"]) if "mu_rolling" in p else 0.0
     matrix[3:6, 8] += rolling * omega
     n = omega[2]
@@ -88,7 +88,7 @@ def _solution(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vecto
     matrix[5, 8] += spinning * n
     # The acceleration of the point of the body in contact, plus that of the contact moving on in the body, is v'.
     acceleration = np.hstack([np.eye(3), -_cross(x_p)])
-    drift = -np.cross(omega, moving)
+    drift = -cross(omega, moving)
     if law:
         matrix[6, :6], right[6] = acceleration[2], drift[2]
         size = np.linalg.norm(v)
@@ -107,7 +107,7 @@ def _solution(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vecto
     slopes = [du[0], du[1], *turning]
     if law:
         in_space = acceleration @ found[:6] - drift
-        slopes += list((space.T @ in_space - np.cross(y[2:5], space.T @ v))[:2])
+        slopes += list((space.T @ in_space - cross(y[2:5], space.T @ v))[:2])
     power = -found[6:] @ v + (p.get("sigma", 0.0) + N * rolling) * speed**2 + N * spinning * n**2
     return np.array(slopes), N, power, np.linalg.det(matrix)
 
@@ -116,7 +116,7 @@ def energy(y: Vector, p: Mapping[str, float], law: str | None) -> float:
     """Energy per unit mass, above that of upright rest."""
     u, v = _attitude(y, law)
     x_p, m = contact(u, p), p.get("mass", 1.0)
-    v_g, rest = v + np.cross(x_p, y[2:5]), p["c"] - p.get("offset", 0.0)
+    v_g, rest = v + cross(x_p, y[2:5]), p["c"] - p.get("offset", 0.0)
     return float((y[2:5] @ inertia(p) @ y[2:5] / m + v_g @ v_g) / 2 - p.get("gravity", 1.0) * (x_p @ u + rest))
 
 
@@ -129,27 +129,27 @@ def follow(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) ->
     return np.asarray(solution.y)
 
 
-def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) -> Vector:
+def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector, rtol: float = 1e-12) -> Vector:
     """Heading, roll and pitch, and the contact point on the table, shape (5, times).
 
     By the matrix that turns the body and by its centre of mass: no angle is integrated, and no contact point.
     """
     n, (u, _) = len(y), _attitude(y, law)
-    across = _unit(np.cross(np.cross(u, [0, 1.0, 0]), u))
-    first = np.array([np.cross(u, across), -across, u])  # rows: X, Y and Z in the body's components
+    across = _unit(cross(cross(u, [0, 1.0, 0]), u))
+    first = np.array([cross(u, across), -across, u])  # rows: X, Y and Z in the body's components
 
     def slopes(_: float, z: Vector) -> Vector:
         turn, (u, slip), omega = z[n:-3].reshape(3, 3), _attitude(z[:n], law), z[2:5]
-        velocity = turn @ (slip + np.cross(contact(u, p), omega))
+        velocity = turn @ (slip + cross(contact(u, p), omega))
         return np.concatenate([derivative(z[:n], p, law)[0], (turn @ _cross(omega)).ravel(), velocity])
 
     begin = np.concatenate([y, first.ravel(), -first @ contact(u, p)])
-    solution = solve_ivp(slopes, (0, times[-1]), begin, "DOP853", times, rtol=1e-13, atol=1e-15)
+    solution = solve_ivp(slopes, (0, times[-1]), begin, "DOP853", times, rtol=rtol, atol=rtol / 100)
     found = []
     for z in solution.y.T:
         turn = z[n:-3].reshape(3, 3)
         place = z[-3:] + turn @ contact(_attitude(z[:n], law)[0], p)
-        assert abs(place[2]) < 1e-10
+        assert abs(place[2]) < 100 * rtol
         y_axis = turn[:, 1]
         found.append(
             [np.arctan2(y_axis[0], -y_axis[1]), -np.arcsin(y_axis[2]), np.arctan2(turn[2, 0], -turn[2, 2]), *place[:2]]
@@ -175,6 +175,11 @@ def contact(u: Vector, p: Mapping[str, float]) -> Vector:
 
 def _turn(delta: float) -> Vector:
     return np.array([[np.cos(delta), -np.sin(delta), 0], [np.sin(delta), np.cos(delta), 0], [0, 0, 1]])
+
+
+def cross(a: Sequence[float] | Vector, b: Sequence[float] | Vector) -> Vector:
+    """Of two vectors; ten times as fast as `numpy.cross`, which is for many."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _cross(x: Vector) -> Vector:
