@@ -1,6 +1,6 @@
 """Measures the boundaries of a map: `configs/mu_b.yaml` at n0 = 0.05, on a grid of SIDE × SIDE cells.
 
-    python scripts/boundaries.py SIDE SAMPLE
+    python scripts/boundaries.py SIDE SAMPLE [DEVIATION]
 
 It tells how far the curves that the margins draw are from the brackets, whether the ends of the brackets keep their
 counts with dopri5 at half its step, and how many of SAMPLE random cells the curves count wrong.
@@ -25,19 +25,20 @@ from sweep.kernels.status import SETTLED
 from sweep.plots.boundaries import curves
 from sweep.plots.levels import lines
 from sweep.results.margins import FOUND
+from sweep.studies import BOUNDARY_DEVIATION
 
 CONFIG = Path(__file__).parent.parent / "configs" / "mu_b.yaml"
 OTHERS = {"a": 10.0, "delta": 0.03, "n0": 0.05, "x0": 0.01, "y0": 0.01}
 
 
-def main(side: int, sample: int) -> None:
+def main(side: int, sample: int, deviation: float = BOUNDARY_DEVIATION) -> None:
     """Print the figures."""
     axes: dict[str, Any] = {"mu": np.linspace(20, 200, side), "b": np.linspace(1.2, 9.8, side)}
     sweep.run(CONFIG, n0=0.05, mu=[60, 70], b=[3, 4])  # compiles
     began = time.perf_counter()
     grid = sweep.run(CONFIG, n0=0.05, verify=0.0, **axes)
     of_map, began = time.perf_counter() - began, time.perf_counter()
-    found = sweep.boundaries(CONFIG, n0=0.05, **axes)
+    found = sweep.boundaries(CONFIG, n0=0.05, deviation=deviation, **axes)
     seconds = time.perf_counter() - began
     points, simulated = found.sizes["point"], int(found.attrs["trajectories"])
     outcomes, undecided = np.bincount(found.outcome, minlength=3).tolist(), int((grid.decided == 0).sum())
@@ -49,7 +50,8 @@ def main(side: int, sample: int) -> None:
     wide = np.abs(found.end_more - found.end_fewer) / np.minimum(found.end_more, found.end_fewer)
     print(f"largest bracket {float(wide.max()):.2e}")
     cell = np.array([float(np.diff(axes[name])[0]) for name in ("b", "mu")])
-    off = distances(grid, found, axes, cell)
+    on_lines = np.isin(found.b, axes["b"]) | np.isin(found.mu, axes["mu"])  # the others lie where curves are ragged
+    off = distances(grid, found.isel(point=on_lines), axes, cell)
     far = np.quantile(off, [0.5, 0.95])
     print("margins' curves from the brackets, in cells: median {:.3f}, 95th percentile {:.3f}".format(*far))
     print(f"ends that keep their counts with dopri5 at half its step: {kept(found)} of {2 * found.sizes['point']}")
@@ -126,4 +128,4 @@ def crossings(start: Array, end: Array, line: Array) -> Array:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(int(sys.argv[1]), int(sys.argv[2]), *map(float, sys.argv[3:]))

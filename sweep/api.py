@@ -8,7 +8,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from importlib import import_module
 
-from sweep.studies import BOUNDARY_WIDTH, SPIN_WIDTH
+from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
 TYPE_CHECKING = False  # as in `sweep`
 if TYPE_CHECKING:
@@ -120,6 +120,7 @@ def boundaries(
     width: float = BOUNDARY_WIDTH,
     output: str | Path | None = None,
     *,
+    deviation: float = BOUNDARY_DEVIATION,
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
@@ -129,13 +130,16 @@ def boundaries(
     """The curves over two axes on which the number of reversals changes, for each value of the other axes.
 
     The cells of the configuration are simulated first.  Where two neighbours along `x` or `y` count differently, the
-    place between them at which each count begins is bracketed by further simulations.
+    place between them at which each count begins is bracketed by further simulations.  Halfway between two points two
+    more cells tell whether the smooth curve passes between them; if not, a point is added there.
 
     Parameters
     ----------
     config, output, fresh, progress, reporter, cluster, overrides : as for `run`
     x, y : axes over which the curves are drawn; by default the second and the first of more than one value
     width : of the brackets, relative to the value of the parameter along which each lies
+    deviation : how far halfway between two points the boundary may be from the smooth curve through them, relative to
+        the lengths of the axes
 
     Returns
     -------
@@ -157,7 +161,9 @@ def boundaries(
     from sweep.studies.boundaries import boundaries
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return boundaries(checked, x, y, width, output, fresh=fresh, reporter=told, cluster=cluster)
+        return boundaries(
+            checked, x, y, width, output, deviation=deviation, fresh=fresh, reporter=told, cluster=cluster
+        )
 
 
 def critical(

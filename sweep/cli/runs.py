@@ -14,7 +14,7 @@ from sweep import interrupt
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, resumable, say
 from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured
 from sweep.parameters import PARAMETERS
-from sweep.studies import BOUNDARY_WIDTH, SPIN_WIDTH
+from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,8 +170,12 @@ def animate(
 @click.option("--y", help="Parameter along the vertical axis.")
 @click.option("--width", type=click.FloatRange(1e-12, 0.5), default=BOUNDARY_WIDTH, show_default=True,
               help="Relative distance of the two simulated cells between which a count changes.")  # fmt: skip
+@click.option("--deviation", type=click.FloatRange(1e-9), default=BOUNDARY_DEVIATION, show_default=True,
+              help="Distance of a curve from its boundary between two points, in lengths of the axes.")  # fmt: skip
 @_resumed
-def boundaries(config: Config, x: str | None, y: str | None, width: float, fresh: bool, **how: Any) -> None:
+def boundaries(
+    config: Config, x: str | None, y: str | None, width: float, deviation: float, fresh: bool, **how: Any
+) -> None:
     """Find the curves over two axes of CONFIG on which the number of reversals changes.
 
     The cells of the grid tell where the curves pass, and further simulations how exactly: each point lies between
@@ -181,7 +185,7 @@ def boundaries(config: Config, x: str | None, y: str | None, width: float, fresh
     from sweep.studies import estimates
     from sweep.studies.boundaries import boundaries as search
 
-    work = partial(search, config, x, y, width, fresh=fresh)
+    work = partial(search, config, x, y, width, deviation=deviation, fresh=fresh)
     _written(config, "boundaries", work, lambda: estimates.of_boundaries(config, x, y), **how)
 
 

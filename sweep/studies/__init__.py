@@ -3,5 +3,8 @@
 BOUNDARY_WIDTH = 1e-6
 """Relative distance of the two simulated cells between which a count changes."""
 
+BOUNDARY_DEVIATION = 1e-3
+"""How far a boundary may be from the smooth curve in the middle between two points, relative to the axes' lengths."""
+
 SPIN_WIDTH = 1e-3
 """Relative width down to which simulation brackets n_c2."""

@@ -7,10 +7,9 @@ has a root.  All roots are narrowed side by side, until two simulated cells on e
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,11 +23,11 @@ from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.models.model import COUNT
 from sweep.results.dataset import described
-from sweep.results.margins import FOUND, OPEN, POINTS, UNCERTAIN, Counts
+from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
-from sweep.studies import BOUNDARY_WIDTH
+from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH
+from sweep.studies.curve import Cell, Curve, Middle, Point
 from sweep.studies.kept import kept
-from sweep.studies.roots import Root
 from sweep.studies.search import Search, measuring, require_certain, require_simulated
 
 
@@ -40,6 +39,7 @@ def boundaries(
     width: float = BOUNDARY_WIDTH,
     output: str | Path | None = None,
     *,
+    deviation: float = BOUNDARY_DEVIATION,
     fresh: bool = False,
     reporter: Reporter | None = None,
     cluster: Cluster | None = None,
@@ -48,10 +48,10 @@ def boundaries(
     across = chosen_axes(config, x, y)
     config, settings = (
         measuring(config),
-        f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}",
+        f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}",
     )
     return kept(
-        config, __name__, settings, lambda store: Boundaries(config, store, across, width), output,
+        config, __name__, settings, lambda store: Boundaries(config, store, across, width, deviation), output,
         fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
     )  # fmt: skip
 
@@ -75,65 +75,51 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
     return right, up
 
 
-class Cell(NamedTuple):
-    """What is known of a cell on an edge."""
-
-    distance: float
-    """From the boundary, in spin; NaN where there is no count."""
-    reversals: int
-    decided: bool
-
-
-@dataclass
-class Point:
-    """A point of a curve, on an edge of the grid, that is being narrowed."""
-
-    level: int
-    curve: int
-    closed: bool
-    along: str
-    """The axis along which the edge lies."""
-    cell: dict[str, float]
-    """The other parameters of the edge."""
-    root: Root
-    """In the straight coordinate of the axis (`Axis.straight`)."""
-    cells: dict[float, Cell]
-    """What is known along the edge, by place."""
-
-
 class Boundaries(Search):
     """A search whose first round are the cells of the grid."""
 
-    def __init__(self, config: Config, store: Store, across: tuple[str, str], width: float) -> None:
+    def __init__(self, config: Config, store: Store, across: tuple[str, str], width: float, deviation: float) -> None:
         super().__init__(config, store, width)
-        self.across = across
+        self.across, self.deviation = across, deviation
         self.axes = {name: Axis(name, np.array(sorted(config.axes[name]))) for name in across}
-        self.points: list[Point] = []
-        self._asked: list[tuple[Point, float]] = []
-        """The points and places of the cells that were asked for last."""
+        self.curves: list[Curve] = []
+        self._asked: list[tuple[Curve, Point | Middle, float]] = []
+        """The curves and places of the cells that were asked for last."""
 
     def ask(self) -> Mapping[str, Array]:
         if not self.rounds:
             columns = self.grid.columns()
             return {name: columns[name] for name in self.config.axes}
         self.narrows = True
-        self._asked = [(point, place) for point in self.points if not point.root.ended for place in point.root.wanted()]
-        rows = [{**point.cell, point.along: self._bent(point, place)} for point, place in self._asked]
+        for curve in self.curves:
+            curve.grow(self.width, self.deviation)
+        self._asked = [
+            (curve, each, place) for curve in self.curves for each in curve.searched() for place in each.wanted()
+        ]
+        if not (self._asked or self.confirms) and self.config.integrator.estimate_errors:
+            self.confirms = True
+            self._asked = [
+                (curve, point, place)
+                for curve in self.curves
+                for point in curve.points
+                for place in (point.root.low, point.root.high)
+            ]
+        rows = [each.parameters(place) for _, each, place in self._asked]
         return {name: np.array([row[name] for row in rows]) for name in self.config.axes}
 
     def learn(self, found: Mapping[str, Array]) -> None:
         counts = Counts.of(found)
+        sure = found.get("decided", counts.known)
         if len(self.rounds) == 1:
-            self.points = list(self._points(counts, found.get("decided", counts.known)))
+            self.curves = list(self._curves(counts, sure))
             return
-        levels = np.array([point.level for point, _ in self._asked])
-        cells = map(Cell, counts.distance(levels), counts.reversals, found.get("decided", counts.known))
-        for (point, place), cell, smooth in zip(self._asked, cells, counts.borders(levels), strict=True):
-            point.root.learn(place, cell.distance, smooth=smooth)
-            point.cells[place] = cell
-
-    def _bent(self, point: Point, place: float) -> float:
-        return float(self.axes[point.along].bent(np.array(place)))
+        levels = np.array([curve.level for curve, *_ in self._asked])
+        cells = map(Cell, counts.distance(levels), counts.reversals, sure, counts.borders(levels))
+        for (_, each, place), cell in zip(self._asked, cells, strict=True):
+            if self.confirms:
+                each.cells[place] = cell
+            else:
+                each.learn(place, cell)
 
     def labelled(self) -> xr.Dataset:
         """The points, with what their search has cost."""
@@ -143,6 +129,8 @@ class Boundaries(Search):
             "title": f"{self.config.name}: boundaries ({self.config.model} model)",
         }
         head |= {"x": self.across[0], "y": self.across[1]} | self.told()
+        middles = [middle for curve in self.curves for middle in curve.middles.values()]
+        head |= {"deviation": self.deviation, "middles_off": sum(not middle.confirmed for middle in middles)}
         own = {name: xr.Variable("point", columns[name].astype(spec.dtype), described(spec))
                for name, spec in POINTS.items()}  # fmt: skip
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})
@@ -158,27 +146,19 @@ class Boundaries(Search):
     def _columns(self) -> dict[str, list[Any]]:
         """The variables and coordinates of all points, by name."""
         columns: dict[str, list[Any]] = {name: [] for name in (*POINTS, "bracket", *self.config.axes)}
-        for point in self.points:
-            root = point.root
-            ends = sorted((root.low, root.high), key=lambda place: root.values[place])
-            fewer, more = (self._bent(point, place) for place in ends)
-            cells = [point.cells[place] for place in ends]
-            sure = FOUND if all(cell.decided for cell in cells) else UNCERTAIN
-            row: dict[str, Any] = {"level": point.level, "curve": point.curve, "closed": point.closed}
-            row |= {"end_fewer": fewer, "end_more": more, "outcome": OPEN if root.unknown else sure}
-            row |= {"reversals_fewer": cells[0].reversals, "reversals_more": cells[1].reversals}
-            row |= {"bracket": point.along, **point.cell, point.along: (fewer + more) / 2}
-            for name, values in columns.items():
-                values.append(row[name])
+        for number, curve in enumerate(self.curves):
+            for point in curve.points:
+                row = {"level": curve.level, "curve": number, "closed": curve.closed, **point.row()}
+                for name, values in columns.items():
+                    values.append(row[name])
         return columns
 
-    def _points(self, found: Counts, decided: Array) -> Iterator[Point]:
-        """The points that the cells of the grid tell of, curve by curve."""
+    def _curves(self, found: Counts, decided: Array) -> Iterator[Curve]:
+        """The curves of which the cells of the grid tell."""
         names, (x, y) = list(self.config.axes), self.across
         others = [name for name in names if name not in self.across]
         order = [names.index(name) for name in (*others, y, x)]
         tables = [np.transpose(each.reshape(self.grid.shape), order) for each in (*vars(found).values(), decided)]
-        number = 0
         for at in product(*(range(len(self.config.axes[name])) for name in others)):
             cell = {name: self.config.axes[name][i] for name, i in zip(others, at, strict=True)}
             *here, sure = (_sorted(each[at], self.config.axes[y], self.config.axes[x]) for each in tables)
@@ -190,34 +170,22 @@ class Boundaries(Search):
                 for xs, ys in contours(_levelled(distance), columns, rows):
                     places = list(zip(xs.tolist(), ys.tolist(), strict=True))
                     closed = places[0] == places[-1]
-                    for place in places[: -1 if closed else None]:
-                        along, fixed, root, cells = self._edge(known, place)
-                        yield Point(level, number, closed, along, cell | fixed, root, cells)
-                    number += 1
+                    points = [self._edge(known, place, cell) for place in places[: -1 if closed else None]]
+                    yield Curve(level, closed, (self.axes[x], self.axes[y]), points)
 
-    def _edge(
-        self, known: tuple[Array, ...], at: tuple[float, float]
-    ) -> tuple[str, dict[str, float], Root, dict[float, Cell]]:
-        """The axis of the edge at `at`, in indices along x and y, one of which is whole; the other axis; and its ends.
+    def _edge(self, known: tuple[Array, ...], at: tuple[float, float], others: dict[str, float]) -> Point:
+        """The point on the edge at `at`, in indices along x and y, one of which is whole.
 
-        `known` are the distances, counts, and whether they are decided and measured, of shape (y, x).
+        `known` are distances, counts, and whether they are decided and measured, of shape (y, x).
         """
         x, y = self.across
         horizontal = abs(at[0] - round(at[0])) > abs(at[1] - round(at[1]))
-        along, other = (x, y) if horizontal else (y, x)
+        along, other = (self.axes[x], self.axes[y]) if horizontal else (self.axes[y], self.axes[x])
         first, whole = int(np.floor(at[not horizontal])), round(at[horizontal])
         pair = (whole, slice(first, first + 2)) if horizontal else (slice(first, first + 2), whole)
-        axis = self.axes[along]
-        ends = axis.values[first : first + 2]
-        places = axis.straight(ends).tolist()
-        distance, count, sure, measured = (each[pair].tolist() for each in known)
-        size = 1.0 if axis.spacing == "log" else float(np.abs(ends).min() or np.abs(ends).max())
-        values = dict(zip(places, distance, strict=True))
-        smooth = {place: values[place] for place, exact in zip(places, measured, strict=True) if exact}
-        root = Root(places[0], places[1], self.width * size, values, smooth)
-        return along, {other: float(self.axes[other].values[whole])}, root, dict(
-            zip(places, map(Cell, distance, count, sure), strict=True)
-        )  # fmt: skip
+        places = along.straight(along.values[first : first + 2]).tolist()
+        cells = dict(zip(places, map(Cell, *(each[pair].tolist() for each in known)), strict=True))
+        return Point.between(along, others | {other.name: float(other.values[whole])}, cells, places, self.width)
 
 
 def _sorted(table: Array, y: tuple[float, ...], x: tuple[float, ...]) -> Array:

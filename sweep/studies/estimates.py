@@ -25,8 +25,9 @@ def of_boundaries(config: Config, x: str | None = None, y: str | None = None) ->
         as `boundaries`.
     """
     across = boundaries.chosen_axes(config, x, y)
-    words = f"then:   about {_A_POINT} simulations for each point where a curve crosses a line of the grid"
-    return f"{of_run(measuring(config))}\n{words}, over {across[0]} and {across[1]}"
+    words = f"then:   about {_A_POINT} simulations for each point where a curve crosses a line of the grid, "
+    words += f"over {across[0]} and {across[1]}, and 2 or more between two points"
+    return f"{of_run(measuring(config))}\n{words}"
 
 
 def of_critical(config: Config) -> str:

@@ -69,7 +69,13 @@ class Search(Study):
         self.rounds: list[Mapping[str, Array]] = []
         """The parameters that vary, of the cells of each round."""
         self.narrows = False
-        """Whether the cells that were asked for last narrow brackets, not only find them."""
+        """Whether the cells that were asked for last narrow brackets, not only find them.
+
+        Their errors are not estimated: next to a boundary many are above the tolerance however short the steps are, and
+        would be run again and again.
+        """
+        self.confirms = False
+        """Whether they are the ends of all brackets, once more, whose errors are."""
         self.apart: list[Apart] = []
         """What the tiles that the search has learned from hold apart from their cells."""
 
@@ -86,7 +92,8 @@ class Search(Study):
         cases = {n: tuple(np.concatenate([each[n] for each in self.rounds]).tolist()) for n in self.rounds[0]}
         constants = {name: values for name, values in self.config.parameters.items() if name not in cases}
         tolerance = self._finer() if self.narrows else self.config.integrator.tolerance
-        integrator = self.config.integrator.model_copy(update={"tolerance": tolerance})
+        estimates = self.config.integrator.estimate_errors and (self.confirms or not self.narrows)
+        integrator = self.config.integrator.model_copy(update={"tolerance": tolerance, "estimate_errors": estimates})
         return replace(self.config, parameters=constants, cases=cases, integrator=integrator)
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:

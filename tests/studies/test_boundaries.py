@@ -1,5 +1,6 @@
 """Boundaries: curves on which a count changes."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +9,17 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 from support.cli import invoke, refused
 from support.runs import Stop, same_numbers
 
 import sweep
 from sweep.axis import Axis
+from sweep.grid import Array
 from sweep.plots import levels as drawn
 from sweep.plots import picture
 from sweep.results.margins import FOUND, OPEN, Counts, smoothed
+from sweep.studies.curve import Cell, Curve, Point
 from sweep.studies.roots import Root
 
 AXES: dict[str, Any] = {"mu": [60.0, 72.0, 84.0], "b": [3.0, 4.0]}
@@ -27,7 +31,7 @@ SCENE = {
 
 @pytest.fixture(scope="module")
 def found() -> xr.Dataset:
-    return sweep.boundaries(SCENE, **AXES)
+    return sweep.boundaries(SCENE, width=1e-4, **AXES)
 
 
 def narrowed(function: Any, low: float, high: float, width: float) -> tuple[Root, int]:
@@ -80,7 +84,7 @@ def test_a_cell_on_the_boundary_itself_is_on_one_of_its_sides() -> None:
     """A body at rest has no margin at all."""
     found = sweep.boundaries(
         {"body": {"a": 10.0, "delta": 0.03}, "start": {"n0": 0.05, "y0": 0.0}, "friction": {"mu": 75.0}},
-        x="x0", x0=[0.0, 0.01, 0.3], n0=[0.0, 0.02, 0.05], width=0.01, progress=False,
+        x="x0", x0=[0.0, 0.01, 0.3], n0=[0.0, 0.02, 0.05], width=0.1, deviation=0.1,
     )  # fmt: skip
     assert found.sizes["point"] > 0
 
@@ -117,7 +121,7 @@ def test_both_ends_of_each_bracket_count_what_another_method_counts(found: xr.Da
     assert (found.outcome == FOUND).all()
     assert found.sizes["point"] >= 4
     width = np.abs(found.end_more - found.end_fewer) / np.minimum(found.end_more, found.end_fewer)
-    assert float(width.max()) <= 1e-6
+    assert float(width.max()) <= 1e-4
     assert (found.reversals_more - found.reversals_fewer == 1).all()
     assert (found.reversals_more == found.level).all()
     for end, counted in (("end_fewer", "reversals_fewer"), ("end_more", "reversals_more")):
@@ -131,10 +135,13 @@ def test_margins_of_a_grid_draw_the_curves_without_a_search(found: xr.Dataset) -
     axes = [Axis(name, np.array(AXES[name])) for name in ("b", "mu")]
     lines = {int(line.symbol): np.concatenate(line.parts, axis=1) for line in drawn.lines(grid, *axes)}
     assert set(lines) == set(found.level.values)
+    points = [found.isel(point=i) for i in range(found.sizes["point"])]
     off = [
         np.hypot(*((lines[int(p.level)].T - [p.b.item(), p.mu.item()]) / [1.0, 12.0]).T).min()
-        for p in (found.isel(point=i) for i in range(found.sizes["point"]))
+        for p in points
+        if p.b.item() in AXES["b"] or p.mu.item() in AXES["mu"]
     ]
+    assert len(off) >= 4
     assert np.median(off) < 0.15
     assert max(off) < 0.5
     assert "by the margins" in " ".join(
@@ -148,7 +155,7 @@ def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> Non
     done, sittings = None, 0
     while done is None:
         try:
-            done = sweep.boundaries(SCENE, output=tmp_path, reporter=Stop(120), **AXES)
+            done = sweep.boundaries(SCENE, width=1e-4, output=tmp_path, reporter=Stop(120), **AXES)
         except KeyboardInterrupt:
             sittings += 1
     assert sittings > 1
@@ -162,7 +169,7 @@ def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> Non
 
 
 def test_what_does_not_end_is_open() -> None:
-    early = sweep.boundaries(SCENE, **AXES, t_end=4500.0)
+    early = sweep.boundaries(SCENE, width=1e-4, **AXES, t_end=4500.0)
     assert (early.outcome == OPEN).any()
     assert "did not end" in " ".join(t.get_text() for k in picture.plot(early).legends for t in k.get_texts())
 
@@ -182,3 +189,70 @@ def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
     assert "for each point" in invoke("boundaries", tmp_path / "two.yaml", "--dry-run").output
     both = invoke("boundaries", tmp_path / "two.yaml", "--workers", "2", "--scheduler", "tcp://x")
     refused(both, "cannot be combined with --scheduler")
+
+
+def traced(edge: Callable[[Array], Array], points: int, deviation: float) -> tuple[Curve, int]:
+    """The curve y = edge(x) over the unit square, followed from points on lines of a grid; how many cells it took."""
+    x, y = (Axis(name, np.linspace(0, 1, points)) for name in "xy")
+
+    def cell(at: Mapping[str, float]) -> Cell:
+        return Cell(at["y"] - float(edge(np.array(at["x"]))), 0, True, True)
+
+    def point(across: float) -> Point:
+        cells = {place: cell({"x": across, "y": place}) for place in (0.0, 1.0)}
+        return Point.between(y, {"x": across}, cells, (0.0, 1.0), 1e-9)
+
+    return followed(Curve(1, False, (x, y), [point(across) for across in x.values.tolist()]), cell, deviation)
+
+
+def followed(curve: Curve, cell: Callable[[Mapping[str, float]], Cell], deviation: float) -> tuple[Curve, int]:
+    """The curve when no more cells are asked for, and how many were."""
+    calls = 0
+    while wanted := [(each, place) for each in curve.searched() for place in each.wanted()] or calls == 0:
+        for each, place in wanted:
+            each.learn(place, cell(each.parameters(place)))
+        calls += len(wanted)
+        curve.grow(1e-9, deviation)
+    return curve, calls
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_curve_gets_points_where_it_is_not_as_smooth_as_its_points(sign: int) -> None:
+    """A spike a hundredth wide between points a twentieth apart, such as resonances make."""
+
+    def edge(x: Array) -> Array:
+        return np.asarray(0.5 + 0.1 * x**2 + sign * 0.2 / (1 + ((x - 0.52) / 0.005) ** 2))
+
+    curve, calls = traced(edge, 20, 1e-4)
+    places = np.array([[point.parameters(point.root.low)[name] for name in "xy"] for point in curve.points])
+    true = np.linspace(0, 1, 200_000)
+    off, _ = cKDTree(np.stack([true, edge(true)], axis=1)).query(np.stack(smoothed(*places.T, closed=False), axis=1))
+    assert np.quantile(off, 0.99) < 1e-4
+    assert off.max() < 3e-4
+    assert len(places) < 80
+    assert calls < 10 * len(places)
+    assert all(middle.confirmed for middle in curve.middles.values())
+
+
+def test_a_smooth_curve_gets_none() -> None:
+    curve, _ = traced(lambda x: 0.5 + 0.1 * np.sin(3 * x), 20, 1e-3)
+    assert len(curve.points) == 20
+    assert len(curve.middles) == 19
+
+
+def test_a_closed_curve_is_followed_all_around() -> None:
+    axes = Axis("x", np.linspace(0, 1, 2)), Axis("y", np.linspace(0, 1, 2))
+
+    def cell(at: Mapping[str, float]) -> Cell:
+        return Cell(np.hypot(at["x"] - 0.5, at["y"] - 0.5) - 0.3, 0, True, True)
+
+    points = []
+    for i, ends in ((0, (0.5, 1.0)), (1, (0.5, 1.0)), (0, (0.0, 0.5)), (1, (0.0, 0.5))):
+        other = {axes[1 - i].name: 0.5}
+        cells = {place: cell(other | {axes[i].name: place}) for place in ends}
+        points.append(Point.between(axes[i], other, cells, ends, 1e-9))
+    curve = followed(Curve(1, True, axes, points), cell, 1e-4)[0]
+    places = np.array([[point.parameters(point.root.low)[name] for name in "xy"] for point in curve.points])
+    off = np.hypot(*(np.stack(smoothed(*places.T, closed=True)) - 0.5)) - 0.3
+    assert np.abs(off).max() < 2e-4
+    assert 8 <= len(curve.points) <= 64

@@ -1,0 +1,220 @@
+"""A curve on which a count changes: points between simulated cells, and the look at the middle between two of them.
+
+Where the smooth curve through the points passes between two simulated cells that count as it says, it is confirmed
+there.  Where it does not, a point is found beside it, and the halves are looked at in their turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.ndimage import minimum_filter1d
+
+from sweep.axis import Axis
+from sweep.grid import Array
+from sweep.results.margins import FOUND, OPEN, UNCERTAIN, smoothed
+from sweep.studies.roots import Root
+
+# How much farther from an expected place the next two cells are, where the last two lie on one side of the curve.
+_FARTHER = 8.0
+
+# A part of a curve that is longer than the next one by this factor gets a point in its middle all the same: beside a
+# peak a smooth curve may pass a single place by chance.
+_UNEVEN = 4.0
+
+
+class Cell(NamedTuple):
+    """What is known of a cell beside a curve."""
+
+    distance: float
+    """From the boundary, in spin; NaN where there is no count."""
+    reversals: int
+    decided: bool
+    measured: bool
+    """Whether the distance is the measured one, not a guess."""
+
+
+@dataclass
+class Line:
+    """A line along one axis that crosses a curve, and what is known on it."""
+
+    along: Axis
+    cell: dict[str, float]
+    """The other parameters."""
+    cells: dict[float, Cell]
+    """What is known along the line, by place; places are straight (`Axis.straight`)."""
+
+    def parameters(self, place: float) -> dict[str, float]:
+        """All parameters of the cell at a place."""
+        return {**self.cell, self.along.name: float(self.along.bent(np.array(place)))}
+
+
+@dataclass
+class Point(Line):
+    """A place of a curve that is being narrowed."""
+
+    root: Root
+
+    @classmethod
+    def between(
+        cls, along: Axis, cell: dict[str, float], cells: dict[float, Cell], ends: Sequence[float], width: float
+    ) -> Point:
+        """A point between two cells on either side of a curve; `width` is relative to the parameter."""
+        values = {place: cell.distance for place, cell in cells.items()}
+        smooth = {place: values[place] for place, cell in cells.items() if cell.measured}
+        size = np.abs(along.bent(np.array(ends)))
+        unit = 1.0 if along.spacing == "log" else float(size.min() or size.max())
+        return cls(along, cell, cells, Root(min(ends), max(ends), width * unit, values, smooth))
+
+    @property
+    def found(self) -> bool:
+        return self.root.ended and not self.root.unknown
+
+    def wanted(self) -> list[float]:
+        return [] if self.root.ended else self.root.wanted()
+
+    def learn(self, place: float, cell: Cell) -> None:
+        self.root.learn(place, cell.distance, smooth=cell.measured)
+        self.cells[place] = cell
+
+    def row(self) -> dict[str, Any]:
+        """What a dataset tells of it (`sweep.results.margins.POINTS`)."""
+        root = self.root
+        ends = sorted((root.low, root.high), key=lambda place: root.values[place])
+        cells = [self.cells[place] for place in ends]
+        fewer, more = (self.parameters(place) for place in ends)
+        name = self.along.name
+        decided = all(cell.decided for cell in cells) and cells[1].distance > 0 >= cells[0].distance
+        sure = FOUND if decided else UNCERTAIN
+        row: dict[str, Any] = {"end_fewer": fewer[name], "end_more": more[name], "bracket": name}
+        row |= {"outcome": OPEN if root.unknown else sure}
+        row |= {"reversals_fewer": cells[0].reversals, "reversals_more": cells[1].reversals}
+        return fewer | row | {name: (fewer[name] + more[name]) / 2}
+
+
+@dataclass
+class Middle(Line):
+    """A place between two points at which the curve is expected: two cells beside it tell whether it is there.
+
+    If not, it is looked for between the points, where it crosses the line if it goes straight from one to the other.
+    Then it is looked for ever farther away: peaks that resonances make are narrow and high.
+    """
+
+    at: float
+    beside: tuple[float, float]
+    """The places of the two cells that are asked for."""
+    between: tuple[float, float]
+    """The places of the two points, as far as they lie along the line."""
+    confirmed: bool | None = None
+    """Whether the curve passes between the first two cells; None while that is open."""
+
+    def wanted(self) -> list[float]:
+        return [] if self.confirmed is not None else [place for place in self.beside if place not in self.cells]
+
+    def learn(self, place: float, cell: Cell) -> None:
+        self.cells[place] = cell
+
+    def settled(self, width: float) -> Middle | Point:
+        """What it is after the last cells: itself, confirmed or not, or a point on a line."""
+        if self.confirmed is not None or not self.cells:
+            return self
+        more = {place: cell.distance > 0 for place, cell in self.cells.items()}
+        nearest = min(more, key=lambda place: abs(place - self.at))
+        other = next((place for place in self.beside if more[place] != more[nearest]), None)
+        if any(np.isnan(cell.distance) for cell in self.cells.values()):
+            self.confirmed = False
+        elif other is None:
+            self._look_farther()
+        elif len(more) == 2:
+            self.confirmed = True
+        else:
+            this = min((place for place in more if more[place] != more[other]), key=lambda place: abs(place - other))
+            return Point.between(self.along, self.cell, self.cells, (this, other), width)
+        return self
+
+    def _look_farther(self) -> None:
+        """Choose the next two cells: those of the two points, or farther by a factor, as far as the axis goes."""
+        low, high = self.along.straight(self.along.values)[[0, -1]].tolist()
+        inner, outer = self.beside
+        if self.between[0] < inner or outer < self.between[1]:
+            inner, outer = min(inner, self.between[0]), max(outer, self.between[1])
+        else:
+            off = _FARTHER * max(outer - self.at, self.at - inner)
+            inner, outer = max(low, self.at - off), min(high, self.at + off)
+        self.confirmed = False if (inner, outer) == self.beside else None
+        self.beside = inner, outer
+
+
+@dataclass
+class Curve:
+    """Points in order, and the middles that are or were looked at."""
+
+    level: int
+    closed: bool
+    across: tuple[Axis, Axis]
+    points: list[Point]
+    middles: dict[int, Middle] = field(default_factory=dict)
+    """By the `id` of the point before each."""
+
+    @cached_property
+    def spans(self) -> Array:
+        return np.array([np.ptp(axis.straight(axis.values)) for axis in self.across])
+
+    def searched(self) -> list[Point | Middle]:
+        return [*self.points, *self.middles.values()]
+
+    def grow(self, width: float, deviation: float) -> None:
+        """Take in the middles of which new cells are known, and look at those between points that have been found."""
+        settled = {before: middle.settled(width) for before, middle in self.middles.items()}
+        self._insert({before: point for before, point in settled.items() if isinstance(point, Point)})
+        rank = {id(point): i for i, point in enumerate(self.points)}
+        found, places = self._found()
+        if len(found) < (3 if self.closed else 2):
+            return
+        after = np.roll(places, -1, axis=0)[: None if self.closed else -1]
+        ways = after - places[: len(after)]
+        long = np.hypot(*ways.T)
+        around = np.minimum(np.roll(long, 1), np.roll(long, -1)) if self.closed else minimum_filter1d(long, 3)
+        expected = np.stack(smoothed(*places.T, closed=self.closed, parts=2), axis=1)[1::2]
+        new = {}
+        for i in np.flatnonzero(long > _FARTHER * deviation).tolist():
+            this, following = found[i], found[(i + 1) % len(found)]
+            if (rank[id(following)] - rank[id(this)]) % len(self.points) != 1:
+                continue  # a point between them is being looked for
+            if (middle := self.middles.get(id(this))) is None:
+                self.middles[id(this)] = self._middle(this, expected[i], (places[i], after[i]), deviation)
+            elif middle.confirmed and long[i] > _UNEVEN * around[i]:
+                new[id(this)] = Point.between(middle.along, middle.cell, middle.cells, middle.beside, width)
+        self._insert(new)
+
+    def _insert(self, after: dict[int, Point]) -> None:
+        """Put points behind those with these ids, in place of the middles there."""
+        self.points = [each for point in self.points for each in (point, after.get(id(point))) if each is not None]
+        self.middles = {before: middle for before, middle in self.middles.items() if before not in after}
+
+    def _found(self) -> tuple[list[Point], Array]:
+        """The points that have been found, each once, and their places, shape (points, 2), in lengths of the axes."""
+        found = [point for point in self.points if point.found]
+        places = np.array([self._place(point) for point in found]).reshape(-1, 2)
+        apart = np.append(True, np.hypot(*np.diff(places, axis=0).T) > 0)[: len(found)]
+        return [point for point, here in zip(found, apart, strict=True) if here], places[apart]
+
+    def _place(self, point: Point) -> Array:
+        middle = point.parameters((point.root.low + point.root.high) / 2)
+        return np.array([axis.straight(np.array(middle[axis.name])) for axis in self.across]) / self.spans
+
+    def _middle(self, before: Point, expected: Array, ends: tuple[Array, Array], deviation: float) -> Middle:
+        """A middle on a line across the way between two ends, by their places in lengths of the axes."""
+        way = np.abs(ends[1] - ends[0])
+        across = int(way[0] > way[1])
+        along, other = self.across[across], self.across[1 - across]
+        at, off, *between = (
+            self.spans[across] * each for each in (expected[across], deviation, *np.array(ends)[:, across])
+        )
+        place = np.array(expected[1 - across] * self.spans[1 - across])
+        cell = before.cell | {other.name: float(other.bent(place))}
+        return Middle(along, cell, {}, at, (at - off, at + off), (min(between), max(between)))
