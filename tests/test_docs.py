@@ -97,7 +97,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (tmp_path / "configs").mkdir()
     for path in (ROOT / "configs").glob("*.yaml"):
         small = _coarsen(yaml.load(path))
-        small["integrator"] = {**small.get("integrator", {}), "t_end": 300}
+        small["integrator"] = {**small.get("integrator", {}), "t_end": 10 if small.get("units") == "SI" else 300}
         if path.stem != "celtic_stone":  # whose exponents a page draws
             small.pop("measure", None)
         yaml.dump(small, tmp_path / "configs" / path.name)

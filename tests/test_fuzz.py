@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return fuzzing.prepare(tmp_path_factory.mktemp("fuzz"))
 
 
-@pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.campaign)], ids=["some", "many"])
+@pytest.mark.parametrize("times", [1, pytest.param(12, marks=pytest.mark.campaign)], ids=["some", "many"])
 @pytest.mark.parametrize("kind", fuzzing.KINDS)
 def test_any_input_is_accepted_or_refused(kind: str, times: int, folder: Path) -> None:
     """Within seconds; a campaign draws other inputs each time."""

@@ -1,5 +1,6 @@
 """The package as a user installs it: a wheel in a fresh environment, every verb run from another folder."""
 
+import fcntl
 import json
 import os
 import re
@@ -40,11 +41,20 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The interpreter of a fresh environment that has the wheel and what it depends on, and nothing else."""
-    environment = tmp_path_factory.mktemp("environment")
-    subprocess.run([sys.executable, "-m", "venv", environment], check=True)
-    interpreter = environment / "bin" / "python"
-    subprocess.run([interpreter, "-m", "pip", "install", "-q", wheel], check=True, env=ENVIRONMENT)
+    """The interpreter of a fresh environment that has the wheel and what it depends on, and nothing else.
+
+    Processes that share the tests share it, with the kernels that it compiles: one makes it, and the others wait.
+    """
+    own = tmp_path_factory.getbasetemp()
+    environment = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "environment"
+    made = environment / "made"
+    with environment.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        interpreter = environment / "bin" / "python"
+        if not made.exists():
+            subprocess.run([sys.executable, "-m", "venv", environment], check=True)
+            subprocess.run([interpreter, "-m", "pip", "install", "-q", wheel], check=True, env=ENVIRONMENT)
+            made.touch()
     return interpreter
 
 

@@ -146,9 +146,10 @@ class Boundaries(Search):
     def _columns(self) -> dict[str, list[Any]]:
         """The variables and coordinates of all points, by name."""
         columns: dict[str, list[Any]] = {name: [] for name in (*POINTS, "bracket", *self.config.axes)}
-        for number, curve in enumerate(self.curves):
-            for point in curve.points:
-                row = {"level": curve.level, "curve": number, "closed": curve.closed, **point.row()}
+        pieces = ((curve.level, *piece) for curve in self.curves for piece in curve.pieces())
+        for number, (level, points, closed) in enumerate(pieces):
+            for point in points:
+                row = {"level": level, "curve": number, "closed": closed, **point.row()}
                 for name, values in columns.items():
                     values.append(row[name])
         return columns

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -190,6 +191,19 @@ class Curve:
             elif middle.confirmed and long[i] > _UNEVEN * around[i]:
                 new[id(this)] = Point.between(middle.along, middle.cell, middle.cells, middle.beside, width)
         self._insert(new)
+
+    def pieces(self) -> list[tuple[list[Point], bool]]:
+        """The points between which it could be followed, piece by piece, and whether a piece is closed."""
+        middles = [self.middles.get(id(point)) for point in self.points]
+        ends = [i for i, middle in enumerate(middles, start=1) if middle and not middle.confirmed]
+        if not ends:
+            return [(self.points, self.closed)]
+        if self.closed:
+            first, count = ends[0], len(self.points)
+            points, ends = [*self.points[first:], *self.points[:first]], [*(end - first for end in ends[1:]), count]
+        else:
+            points, ends = self.points, [*ends, len(self.points)]
+        return [(points[start:end], False) for start, end in pairwise([0, *ends]) if start < end]
 
     def _insert(self, after: dict[int, Point]) -> None:
         """Put points behind those with these ids, in place of the middles there."""

@@ -256,3 +256,20 @@ def test_a_closed_curve_is_followed_all_around() -> None:
     off = np.hypot(*(np.stack(smoothed(*places.T, closed=True)) - 0.5)) - 0.3
     assert np.abs(off).max() < 2e-4
     assert 8 <= len(curve.points) <= 64
+
+
+def test_a_curve_that_leaves_the_map_between_two_lines_is_in_pieces() -> None:
+    def edge(x: Array) -> Array:
+        return np.asarray(0.5 + 0.8 * np.exp(-(((x - 0.4) / 0.05) ** 2)))
+
+    curve, _ = traced(edge, 5, 1e-3)
+    (left, open_), (right, _) = curve.pieces()
+    assert not open_
+    assert (len(left) > 2, len(right) > 2) == (True, True)
+    assert max(point.parameters(point.root.low)["x"] for point in left) < 0.4
+    assert min(point.parameters(point.root.low)["x"] for point in right) > 0.4
+    round_ = Curve(1, True, curve.across, curve.points, curve.middles)
+    ((whole, closed),) = round_.pieces()
+    assert not closed
+    assert {*map(id, whole)} == {*map(id, curve.points)}
+    assert whole[0] is right[0]
