@@ -28,7 +28,7 @@ from typing import Any
 import heyoka
 import numpy as np
 from reference_spins import Extended, Rhs, first_times, problem, radau, radau_step
-from reversals import window_and_ripple
+from reversals import reversal_times, window_and_ripple
 
 from sweep.models import find
 from sweep.models.model import Array
@@ -277,11 +277,10 @@ def radau_run(case: Case, times: Array, edges: Array, steps: int) -> tuple[Array
 # --- reversals --------------------------------------------------------------------------------
 
 
-def reversal_times(integrals: Array, half: float, shift: int) -> tuple[Array, bool]:
+def means_reverse(integrals: Array, half: float, shift: int) -> tuple[Array, bool]:
     """Times of the reversals, with windows that begin `shift` halves late; and whether no mean grazes zero."""
     means = np.diff(np.concatenate([[0], integrals])[shift::2]).astype(float)
-    k = np.flatnonzero(means[1:] * means[:-1] < 0)
-    times = half * (2 * (k + 0.5 + means[k] / (means[k] - means[k + 1])) + shift)
+    times = reversal_times(means, 2 * half) + shift * half
     rise = np.diff(means)
     turns = means[1:-1][rise[:-1] * rise[1:] <= 0]
     closest = np.abs(np.append(turns, means[-1])).min()
@@ -291,7 +290,7 @@ def reversal_times(integrals: Array, half: float, shift: int) -> tuple[Array, bo
 def firm_reversals(ours: Array, others: Array, half: float) -> tuple[Array, float] | None:
     """Times of the reversals and the largest difference of the two methods; None if the count is not firm."""
     (times, clear), (again, _), (late, clear_late) = (
-        reversal_times(integrals, half, shift) for integrals, shift in ((ours, 0), (others, 0), (ours, 1))
+        means_reverse(integrals, half, shift) for integrals, shift in ((ours, 0), (others, 0), (ours, 1))
     )
     if not (clear and clear_late) or not len(times) == len(again) == len(late):
         return None

@@ -74,11 +74,14 @@ def sign_changes(averages: Array) -> NDArray[np.int64]:
     return np.flatnonzero(averages[1:] * averages[:-1] < 0)
 
 
+def reversal_times(averages: Array, window: float) -> Array:
+    """Zeros of the lines between two averages of opposite sign, each at its window's centre."""
+    k = sign_changes(averages)
+    here, after = averages[k], averages[k + 1]
+    return np.asarray(window * (k + 0.5 + here / (here - after)))
+
+
 def last_reversal(averages: Array, window: float) -> float:
-    """Zero of the line between the last averages of opposite sign, each at its window's centre; NaN for none."""
-    changes = sign_changes(averages)
-    if not len(changes):
-        return float("nan")
-    k = changes[-1]
-    here, after = averages[k : k + 2]
-    return float(window * (k + 0.5 + here / (here - after)))
+    """The last of these times; NaN for none."""
+    times = reversal_times(averages, window)
+    return float(times[-1]) if len(times) else float("nan")

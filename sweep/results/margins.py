@@ -105,7 +105,7 @@ def smoothed(x: Array, y: Array, *, closed: bool, parts: int = 8) -> tuple[Array
     parts : straight lines that are drawn between two points
     """
     points = np.stack([x, y], axis=1)
-    if len(points) < 2:
+    if len(points) < (3 if closed else 2):
         return x, y
     if closed:
         points = np.concatenate([points[-2:], points, points[:3]])

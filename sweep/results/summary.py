@@ -47,7 +47,7 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
     if open_:
         yield f"open {open_}: a cell near them failed, or did not end before the time limit"
     if off := int(dataset.attrs.get("middles_off", 0)):
-        yield f"in {off} places between two points the boundary was not found; a curve ends there, and another begins"
+        yield f"lost {off}: the boundary was not found halfway between two points; one curve ends there, another begins"
     if uncertain := int((dataset["outcome"] == UNCERTAIN).sum()):
         yield f"uncertain {uncertain}: the count of an end is not decided; it may be as near to the other as its error"
 

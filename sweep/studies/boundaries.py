@@ -102,6 +102,7 @@ class Boundaries(Search):
                 (curve, point, place)
                 for curve in self.curves
                 for point in curve.points
+                if point.found
                 for place in (point.root.low, point.root.high)
             ]
         rows = [each.parameters(place) for _, each, place in self._asked]

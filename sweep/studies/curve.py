@@ -13,7 +13,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
 
 from sweep.axis import Axis
 from sweep.grid import Array
@@ -97,6 +96,17 @@ class Point(Line):
         return fewer | row | {name: (fewer[name] + more[name]) / 2}
 
 
+def _within(axis: Axis, places: Any) -> Array:
+    """The nearest places on the axis: what lies beyond it was not asked for, and may be no body."""
+    return np.asarray(np.clip(places, *axis.straight(axis.values)[[0, -1]]))
+
+
+def _beside(axis: Axis, at: float, off: float) -> tuple[float, float]:
+    """The places on both sides of one."""
+    inner, outer = _within(axis, [at - off, at + off]).tolist()
+    return inner, outer
+
+
 @dataclass
 class Middle(Line):
     """A place between two points at which the curve is expected: two cells beside it tell whether it is there.
@@ -139,13 +149,12 @@ class Middle(Line):
 
     def _look_farther(self) -> None:
         """Choose the next two cells: those of the two points, or farther by a factor, as far as the axis goes."""
-        low, high = self.along.straight(self.along.values)[[0, -1]].tolist()
         inner, outer = self.beside
         if self.between[0] < inner or outer < self.between[1]:
             inner, outer = min(inner, self.between[0]), max(outer, self.between[1])
         else:
             off = _FARTHER * max(outer - self.at, self.at - inner)
-            inner, outer = max(low, self.at - off), min(high, self.at + off)
+            inner, outer = _beside(self.along, self.at, off)
         self.confirmed = False if (inner, outer) == self.beside else None
         self.beside = inner, outer
 
@@ -179,7 +188,8 @@ class Curve:
         after = np.roll(places, -1, axis=0)[: None if self.closed else -1]
         ways = after - places[: len(after)]
         long = np.hypot(*ways.T)
-        around = np.minimum(np.roll(long, 1), np.roll(long, -1)) if self.closed else minimum_filter1d(long, 3)
+        padded = np.pad(long, 1, mode="wrap" if self.closed else "edge")
+        around = np.minimum(padded[:-2], padded[2:])
         expected = np.stack(smoothed(*places.T, closed=self.closed, parts=2), axis=1)[1::2]
         new = {}
         for i in np.flatnonzero(long > _FARTHER * deviation).tolist():
@@ -226,9 +236,8 @@ class Curve:
         way = np.abs(ends[1] - ends[0])
         across = int(way[0] > way[1])
         along, other = self.across[across], self.across[1 - across]
-        at, off, *between = (
-            self.spans[across] * each for each in (expected[across], deviation, *np.array(ends)[:, across])
-        )
-        place = np.array(expected[1 - across] * self.spans[1 - across])
-        cell = before.cell | {other.name: float(other.bent(place))}
-        return Middle(along, cell, {}, at, (at - off, at + off), (min(between), max(between)))
+        places, off, from_, to = (self.spans * each for each in (expected, deviation, *ends))
+        at, place = (float(_within(axis, places[i])) for axis, i in ((along, across), (other, 1 - across)))
+        cell = before.cell | {other.name: float(other.bent(np.array(place)))}
+        between = _within(along, np.sort([from_[across], to[across]])).tolist()
+        return Middle(along, cell, {}, at, _beside(along, at, float(off[across])), (between[0], between[1]))

@@ -9,11 +9,11 @@ from sweep.results.memory import Memory
 from sweep.studies import SPIN_WIDTH, boundaries, critical
 from sweep.studies.search import measuring
 
-_A_POINT = 8
-"""Simulations that narrow a bracket from a cell of a grid to the usual width of boundaries, as a rule."""
+_A_POINT = 10
+"""Simulations that narrow a bracket of a boundary to the usual width and look at its ends once more, as a rule."""
 
 _A_SPIN = 4
-"""The same from the spins of the way outwards, for the usual width of critical spins."""
+"""Simulations that narrow the bracket of a critical spin to the usual width, as a rule."""
 
 
 def of_boundaries(config: Config, x: str | None = None, y: str | None = None) -> str:

@@ -31,7 +31,7 @@ SCENE = {
 
 @pytest.fixture(scope="module")
 def found() -> xr.Dataset:
-    return sweep.boundaries(SCENE, width=1e-4, **AXES)
+    return sweep.boundaries(SCENE, **AXES)
 
 
 def narrowed(function: Any, low: float, high: float, width: float) -> tuple[Root, int]:
@@ -121,7 +121,7 @@ def test_both_ends_of_each_bracket_count_what_another_method_counts(found: xr.Da
     assert (found.outcome == FOUND).all()
     assert found.sizes["point"] >= 4
     width = np.abs(found.end_more - found.end_fewer) / np.minimum(found.end_more, found.end_fewer)
-    assert float(width.max()) <= 1e-4
+    assert float(width.max()) <= 1e-6
     assert (found.reversals_more - found.reversals_fewer == 1).all()
     assert (found.reversals_more == found.level).all()
     for end, counted in (("end_fewer", "reversals_fewer"), ("end_more", "reversals_more")):
@@ -155,7 +155,7 @@ def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> Non
     done, sittings = None, 0
     while done is None:
         try:
-            done = sweep.boundaries(SCENE, width=1e-4, output=tmp_path, reporter=Stop(120), **AXES)
+            done = sweep.boundaries(SCENE, output=tmp_path, reporter=Stop(120), **AXES)
         except KeyboardInterrupt:
             sittings += 1
     assert sittings > 1
@@ -169,7 +169,7 @@ def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> Non
 
 
 def test_what_does_not_end_is_open() -> None:
-    early = sweep.boundaries(SCENE, width=1e-4, **AXES, t_end=4500.0)
+    early = sweep.boundaries(SCENE, **AXES, t_end=4500.0)
     assert (early.outcome == OPEN).any()
     assert "did not end" in " ".join(t.get_text() for k in picture.plot(early).legends for t in k.get_texts())
 
@@ -210,7 +210,9 @@ def followed(curve: Curve, cell: Callable[[Mapping[str, float]], Cell], deviatio
     calls = 0
     while wanted := [(each, place) for each in curve.searched() for place in each.wanted()] or calls == 0:
         for each, place in wanted:
-            each.learn(place, cell(each.parameters(place)))
+            at = each.parameters(place)
+            assert all(axis.values[0] <= at[axis.name] <= axis.values[-1] for axis in curve.across)
+            each.learn(place, cell(at))
         calls += len(wanted)
         curve.grow(1e-9, deviation)
     return curve, calls
@@ -256,6 +258,13 @@ def test_a_closed_curve_is_followed_all_around() -> None:
     off = np.hypot(*(np.stack(smoothed(*places.T, closed=True)) - 0.5)) - 0.3
     assert np.abs(off).max() < 2e-4
     assert 8 <= len(curve.points) <= 64
+
+
+def test_no_cell_beyond_the_map_is_asked_for() -> None:
+    """The curve runs along its upper edge, nearer than the deviation."""
+    curve, _ = traced(lambda x: 0.9995 + 4e-4 * np.sin(7 * x), 9, 1e-3)
+    assert curve.middles
+    assert all(middle.confirmed for middle in curve.middles.values())
 
 
 def test_a_curve_that_leaves_the_map_between_two_lines_is_in_pieces() -> None:
