@@ -3,7 +3,7 @@
 BOUNDARY_WIDTH = 1e-6
 """Relative distance of the two simulated cells between which a count changes."""
 
-BOUNDARY_DEVIATION = 1e-3
+BOUNDARY_DEVIATION = 1e-2
 """How far a boundary may be from the smooth curve in the middle between two points, relative to the axes' lengths."""
 
 SPIN_WIDTH = 1e-3

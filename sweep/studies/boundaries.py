@@ -1,7 +1,8 @@
 """The curves on which a count changes: cells of a grid tell where they pass, and simulations how exactly.
 
 On each edge of the grid whose ends count differently, the distance in spin from the boundary (`sweep.results.margins`)
-has a root.  All roots are narrowed side by side, until two simulated cells on either side are as near as is asked.
+has a root.  The curves are followed from edge to edge, with brackets around roots no narrower than that needs.  Then
+all brackets are narrowed side by side, until two simulated cells on either side are as near as is asked.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH
 from sweep.studies.curve import Cell, Curve, Middle, Point
 from sweep.studies.kept import kept
 from sweep.studies.search import Search, measuring, require_certain, require_simulated
+
+Asked = tuple[Curve, Point | Middle, float]
+"""A cell that is asked for: for which part of which curve, and its place along the line."""
 
 
 @deferred()
@@ -83,30 +87,44 @@ class Boundaries(Search):
         self.across, self.deviation = across, deviation
         self.axes = {name: Axis(name, np.array(sorted(config.axes[name]))) for name in across}
         self.curves: list[Curve] = []
-        self._asked: list[tuple[Curve, Point | Middle, float]] = []
-        """The curves and places of the cells that were asked for last."""
+        self._asked: list[Asked] = []
+        """The cells that were asked for last."""
+        self._asking = self._search()
 
     def ask(self) -> Mapping[str, Array]:
         if not self.rounds:
             columns = self.grid.columns()
             return {name: columns[name] for name in self.config.axes}
-        self.narrows = True
+        self._asked = next(self._asking, [])
+        rows = [each.parameters(place) for _, each, place in self._asked]
+        return {name: np.array([row[name] for row in rows]) for name in self.config.axes}
+
+    def _search(self) -> Iterator[list[Asked]]:
+        """Follow the curves, narrow all brackets, and simulate their ends once more with their errors."""
+        self.tolerance, self.estimates = self.sharp(self.deviation), False
+        yield from iter(self._followed, [])
+        self.tolerance = self.sharp(self.width)
         for curve in self.curves:
-            curve.grow(self.width, self.deviation)
-        self._asked = [
-            (curve, each, place) for curve in self.curves for each in curve.searched() for place in each.wanted()
-        ]
-        if not (self._asked or self.confirms) and self.config.integrator.estimate_errors:
-            self.confirms = True
-            self._asked = [
-                (curve, point, place)
+            for point in curve.points:
+                point.narrow(self.width)
+        yield from iter(self._wanted, [])
+        if self.config.integrator.estimate_errors:
+            self.estimates = True
+            yield [
+                (curve, point, end)
                 for curve in self.curves
                 for point in curve.points
                 if point.found
-                for place in (point.root.low, point.root.high)
+                for end in (point.root.low, point.root.high)
             ]
-        rows = [each.parameters(place) for _, each, place in self._asked]
-        return {name: np.array([row[name] for row in rows]) for name in self.config.axes}
+
+    def _followed(self) -> list[Asked]:
+        for curve in self.curves:
+            curve.grow(self.deviation)
+        return self._wanted()
+
+    def _wanted(self) -> list[Asked]:
+        return [(curve, each, place) for curve in self.curves for each in curve.searched() for place in each.wanted()]
 
     def learn(self, found: Mapping[str, Array]) -> None:
         counts = Counts.of(found)
@@ -117,10 +135,7 @@ class Boundaries(Search):
         levels = np.array([curve.level for curve, *_ in self._asked])
         cells = map(Cell, counts.distance(levels), counts.reversals, sure, counts.borders(levels))
         for (_, each, place), cell in zip(self._asked, cells, strict=True):
-            if self.confirms:
-                each.cells[place] = cell
-            else:
-                each.learn(place, cell)
+            each.learn(place, cell)
 
     def labelled(self) -> xr.Dataset:
         """The points, with what their search has cost."""
@@ -187,7 +202,7 @@ class Boundaries(Search):
         pair = (whole, slice(first, first + 2)) if horizontal else (slice(first, first + 2), whole)
         places = along.straight(along.values[first : first + 2]).tolist()
         cells = dict(zip(places, map(Cell, *(each[pair].tolist() for each in known)), strict=True))
-        return Point.between(along, others | {other.name: float(other.values[whole])}, cells, places, self.width)
+        return Point.between(along, others | {other.name: float(other.values[whole])}, cells, places, self.deviation)
 
 
 def _sorted(table: Array, y: tuple[float, ...], x: tuple[float, ...]) -> Array:

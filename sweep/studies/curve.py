@@ -7,7 +7,7 @@ there.  Where it does not, a point is found beside it, and the halves are looked
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -21,6 +21,9 @@ from sweep.studies.roots import Root
 
 # How much farther from an expected place the next two cells are, where the last two lie on one side of the curve.
 _FARTHER = 8.0
+
+# Width of the brackets between which a curve is followed, at most, relative to the axis.
+_COARSE = 1e-3
 
 # A part of a curve that is longer than the next one by this factor gets a point in its middle all the same: beside a
 # peak a smooth curve may pass a single place by chance.
@@ -58,17 +61,23 @@ class Point(Line):
     """A place of a curve that is being narrowed."""
 
     root: Root
+    halvings: int = 0
+    """How often the way between two points of the grid was halved before this one was found."""
 
     @classmethod
     def between(
-        cls, along: Axis, cell: dict[str, float], cells: dict[float, Cell], ends: Sequence[float], width: float
+        cls, along: Axis, cell: dict[str, float], cells: dict[float, Cell], ends: Sequence[float], deviation: float
     ) -> Point:
-        """A point between two cells on either side of a curve; `width` is relative to the parameter."""
+        """A point between two cells on either side of a curve, good enough to follow it within `deviation`."""
         values = {place: cell.distance for place, cell in cells.items()}
         smooth = {place: values[place] for place, cell in cells.items() if cell.measured}
-        size = np.abs(along.bent(np.array(ends)))
-        unit = 1.0 if along.spacing == "log" else float(size.min() or size.max())
-        return cls(along, cell, cells, Root(min(ends), max(ends), width * unit, values, smooth))
+        width = min(deviation / 2, _COARSE) * float(np.ptp(along.straight(along.values)))
+        return cls(along, cell, cells, Root(min(ends), max(ends), width, values, smooth))
+
+    def narrow(self, width: float) -> None:
+        """Set the final width of the bracket, relative to the parameter."""
+        size = np.abs(self.along.bent(np.array([self.root.low, self.root.high])))
+        self.root.width = width * (1.0 if self.along.spacing == "log" else float(size.min() or size.max()))
 
     @property
     def found(self) -> bool:
@@ -101,6 +110,14 @@ def _within(axis: Axis, places: Any) -> Array:
     return np.asarray(np.clip(places, *axis.straight(axis.values)[[0, -1]]))
 
 
+def _most_halvings(deviation: float) -> float:
+    """How often the way between two points is halved: as often as leads from an axis' length to the deviation.
+
+    Where two parts of a curve are near each other, points are found now on one and now on the other, without end.
+    """
+    return -float(np.log2(deviation))
+
+
 def _beside(axis: Axis, at: float, off: float) -> tuple[float, float]:
     """The places on both sides of one."""
     inner, outer = _within(axis, [at - off, at + off]).tolist()
@@ -120,6 +137,7 @@ class Middle(Line):
     """The places of the two cells that are asked for."""
     between: tuple[float, float]
     """The places of the two points, as far as they lie along the line."""
+    halvings: int = 0
     confirmed: bool | None = None
     """Whether the curve passes between the first two cells; None while that is open."""
 
@@ -129,7 +147,7 @@ class Middle(Line):
     def learn(self, place: float, cell: Cell) -> None:
         self.cells[place] = cell
 
-    def settled(self, width: float) -> Middle | Point:
+    def settled(self, deviation: float) -> Middle | Point:
         """What it is after the last cells: itself, confirmed or not, or a point on a line."""
         if self.confirmed is not None or not self.cells:
             return self
@@ -142,10 +160,16 @@ class Middle(Line):
             self._look_farther()
         elif len(more) == 2:
             self.confirmed = True
+        elif self.halvings > _most_halvings(deviation):
+            self.confirmed = False
         else:
             this = min((place for place in more if more[place] != more[other]), key=lambda place: abs(place - other))
-            return Point.between(self.along, self.cell, self.cells, (this, other), width)
+            return self.point((this, other), deviation)
         return self
+
+    def point(self, ends: Sequence[float], deviation: float) -> Point:
+        """A point between two of its cells, on either side of the curve."""
+        return replace(Point.between(self.along, self.cell, self.cells, ends, deviation), halvings=self.halvings)
 
     def _look_farther(self) -> None:
         """Choose the next two cells: those of the two points, or farther by a factor, as far as the axis goes."""
@@ -177,9 +201,9 @@ class Curve:
     def searched(self) -> list[Point | Middle]:
         return [*self.points, *self.middles.values()]
 
-    def grow(self, width: float, deviation: float) -> None:
+    def grow(self, deviation: float) -> None:
         """Take in the middles of which new cells are known, and look at those between points that have been found."""
-        settled = {before: middle.settled(width) for before, middle in self.middles.items()}
+        settled = {before: middle.settled(deviation) for before, middle in self.middles.items()}
         self._insert({before: point for before, point in settled.items() if isinstance(point, Point)})
         rank = {id(point): i for i, point in enumerate(self.points)}
         found, places = self._found()
@@ -197,9 +221,10 @@ class Curve:
             if (rank[id(following)] - rank[id(this)]) % len(self.points) != 1:
                 continue  # a point between them is being looked for
             if (middle := self.middles.get(id(this))) is None:
-                self.middles[id(this)] = self._middle(this, expected[i], (places[i], after[i]), deviation)
-            elif middle.confirmed and long[i] > _UNEVEN * around[i]:
-                new[id(this)] = Point.between(middle.along, middle.cell, middle.cells, middle.beside, width)
+                middle = self._middle(this, expected[i], (places[i], after[i]), deviation)
+                self.middles[id(this)] = replace(middle, halvings=1 + max(this.halvings, following.halvings))
+            elif middle.confirmed and long[i] > _UNEVEN * around[i] and middle.halvings <= _most_halvings(deviation):
+                new[id(this)] = middle.point(middle.beside, deviation)
         self._insert(new)
 
     def pieces(self) -> list[tuple[list[Point], bool]]:
@@ -228,7 +253,7 @@ class Curve:
         return [point for point, here in zip(found, apart, strict=True) if here], places[apart]
 
     def _place(self, point: Point) -> Array:
-        middle = point.parameters((point.root.low + point.root.high) / 2)
+        middle = point.parameters(point.root.expected)
         return np.array([axis.straight(np.array(middle[axis.name])) for axis in self.across]) / self.spans
 
     def _middle(self, before: Point, expected: Array, ends: tuple[Array, Array], deviation: float) -> Middle:

@@ -55,6 +55,11 @@ class Root:
         """True if the function has no value somewhere in the bracket; that ends the search."""
         return any(self.low < place < self.high for place in self.blank)
 
+    @property
+    def expected(self) -> float:
+        """The place in the bracket where the root is, as far as the values tell."""
+        return min(max(self._proposed()[0], self.low), self.high)
+
     def wanted(self) -> list[float]:
         """The places to evaluate next."""
         inside = not self._pair or (self._pair[0] <= self.low and self.high <= self._pair[-1])

@@ -26,7 +26,7 @@ from sweep.results.store import Store
 # What is measured of a cell, where its model allows.
 _MEASURED = ("reversals", "margin", "energy_error")
 
-# Tolerance while brackets are narrowed, relative to their final width: near a boundary a spin is that small.
+# Tolerance while brackets are narrowed, relative to the width aimed at: near a boundary a spin is that small.
 _FINER = 1e-4
 
 
@@ -68,14 +68,14 @@ class Search(Study):
         self.width = width
         self.rounds: list[Mapping[str, Array]] = []
         """The parameters that vary, of the cells of each round."""
-        self.narrows = False
-        """Whether the cells that were asked for last narrow brackets, not only find them.
+        self.tolerance = config.integrator.tolerance
+        """That of the cells that were asked for last."""
+        self.estimates = config.integrator.estimate_errors
+        """Whether their errors are estimated.
 
-        Their errors are not estimated: next to a boundary many are above the tolerance however short the steps are, and
-        would be run again and again.
+        While brackets are narrowed they are not: next to a boundary many are above the tolerance however short the
+        steps are, and would be run again and again.
         """
-        self.confirms = False
-        """Whether they are the ends of all brackets, once more, whose errors are."""
         self.apart: list[Apart] = []
         """What the tiles that the search has learned from hold apart from their cells."""
 
@@ -91,9 +91,8 @@ class Search(Study):
         """The configuration whose cases are all cells so far."""
         cases = {n: tuple(np.concatenate([each[n] for each in self.rounds]).tolist()) for n in self.rounds[0]}
         constants = {name: values for name, values in self.config.parameters.items() if name not in cases}
-        tolerance = self._finer() if self.narrows else self.config.integrator.tolerance
-        estimates = self.config.integrator.estimate_errors and (self.confirms or not self.narrows)
-        integrator = self.config.integrator.model_copy(update={"tolerance": tolerance, "estimate_errors": estimates})
+        update = {"tolerance": self.tolerance, "estimate_errors": self.estimates}
+        integrator = self.config.integrator.model_copy(update=update)
         return replace(self.config, parameters=constants, cases=cases, integrator=integrator)
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
@@ -110,11 +109,12 @@ class Search(Study):
             self.rounds.append(asked)
         return self._cut(cells, tile_size)
 
-    def _finer(self) -> float:
-        return min(self.config.integrator.tolerance, max(_FINER * self.width, ROUND_OFF))
+    def sharp(self, width: float) -> float:
+        """The tolerance with which brackets are narrowed to a width."""
+        return min(self.config.integrator.tolerance, max(_FINER * width, ROUND_OFF))
 
     def told(self) -> dict[str, Any]:
         """The attributes of a dataset: how exact it is, where it comes from, what it has cost."""
         simulations = self.tiles[-1][0].stop if self.tiles else 0
-        exact = {"relative_width": self.width, "bracket_tolerance": self._finer(), "trajectories": simulations}
+        exact = {"relative_width": self.width, "bracket_tolerance": self.sharp(self.width), "trajectories": simulations}
         return exact | self._attributes(simulations, self.apart)

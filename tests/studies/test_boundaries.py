@@ -200,7 +200,7 @@ def traced(edge: Callable[[Array], Array], points: int, deviation: float) -> tup
 
     def point(across: float) -> Point:
         cells = {place: cell({"x": across, "y": place}) for place in (0.0, 1.0)}
-        return Point.between(y, {"x": across}, cells, (0.0, 1.0), 1e-9)
+        return Point.between(y, {"x": across}, cells, (0.0, 1.0), deviation)
 
     return followed(Curve(1, False, (x, y), [point(across) for across in x.values.tolist()]), cell, deviation)
 
@@ -214,7 +214,7 @@ def followed(curve: Curve, cell: Callable[[Mapping[str, float]], Cell], deviatio
             assert all(axis.values[0] <= at[axis.name] <= axis.values[-1] for axis in curve.across)
             each.learn(place, cell(at))
         calls += len(wanted)
-        curve.grow(1e-9, deviation)
+        curve.grow(deviation)
     return curve, calls
 
 
@@ -226,7 +226,7 @@ def test_a_curve_gets_points_where_it_is_not_as_smooth_as_its_points(sign: int) 
         return np.asarray(0.5 + 0.1 * x**2 + sign * 0.2 / (1 + ((x - 0.52) / 0.005) ** 2))
 
     curve, calls = traced(edge, 20, 1e-4)
-    places = np.array([[point.parameters(point.root.low)[name] for name in "xy"] for point in curve.points])
+    places = np.array([[point.parameters(point.root.expected)[name] for name in "xy"] for point in curve.points])
     true = np.linspace(0, 1, 200_000)
     off, _ = cKDTree(np.stack([true, edge(true)], axis=1)).query(np.stack(smoothed(*places.T, closed=False), axis=1))
     assert np.quantile(off, 0.99) < 1e-4
@@ -252,9 +252,9 @@ def test_a_closed_curve_is_followed_all_around() -> None:
     for i, ends in ((0, (0.5, 1.0)), (1, (0.5, 1.0)), (0, (0.0, 0.5)), (1, (0.0, 0.5))):
         other = {axes[1 - i].name: 0.5}
         cells = {place: cell(other | {axes[i].name: place}) for place in ends}
-        points.append(Point.between(axes[i], other, cells, ends, 1e-9))
+        points.append(Point.between(axes[i], other, cells, ends, 1e-4))
     curve = followed(Curve(1, True, axes, points), cell, 1e-4)[0]
-    places = np.array([[point.parameters(point.root.low)[name] for name in "xy"] for point in curve.points])
+    places = np.array([[point.parameters(point.root.expected)[name] for name in "xy"] for point in curve.points])
     off = np.hypot(*(np.stack(smoothed(*places.T, closed=True)) - 0.5)) - 0.3
     assert np.abs(off).max() < 2e-4
     assert 8 <= len(curve.points) <= 64
@@ -275,8 +275,8 @@ def test_a_curve_that_leaves_the_map_between_two_lines_is_in_pieces() -> None:
     (left, open_), (right, _) = curve.pieces()
     assert not open_
     assert (len(left) > 2, len(right) > 2) == (True, True)
-    assert max(point.parameters(point.root.low)["x"] for point in left) < 0.4
-    assert min(point.parameters(point.root.low)["x"] for point in right) > 0.4
+    assert max(point.parameters(point.root.expected)["x"] for point in left) < 0.4
+    assert min(point.parameters(point.root.expected)["x"] for point in right) > 0.4
     round_ = Curve(1, True, curve.across, curve.points, curve.middles)
     ((whole, closed),) = round_.pieces()
     assert not closed
