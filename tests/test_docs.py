@@ -106,6 +106,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
             shutil.copy(path, tmp_path / "configs")
     (tmp_path / "docs" / "tutorial").mkdir(parents=True)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sweep.plots.animation.FRAMES_A_SECOND", 3)
     monkeypatch.setattr(mpl, "rcParams", mpl.RcParams(mpl.rcParams | {"figure.max_open_warning": 0}))
     mpl.use("Agg")
     yield tmp_path

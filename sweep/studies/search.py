@@ -19,20 +19,24 @@ from sweep.config.faults import either
 from sweep.engine.errors import ROUND_OFF
 from sweep.engine.whole import Apart, Whole, apart_from
 from sweep.grid import Array
-from sweep.kernels.measures import possible
+from sweep.kernels.measures import default
 from sweep.models import MODELS
 from sweep.results.store import Store
 
-# What is measured of a cell, where its model allows.
-_MEASURED = ("reversals", "margin", "energy_error")
+# What a search has to know of a cell, where its model allows.
+_NEEDED = ("reversals", "margin")
 
 # Tolerance while brackets are narrowed, relative to the width aimed at: near a boundary a spin is that small.
 _FINER = 1e-4
 
 
 def measuring(config: Config) -> Config:
-    """`config` with what a search needs to know of a cell, and no more; margins are those of cells that settle."""
-    measure = tuple(name for name in _MEASURED if name in possible(config.equations))
+    """`config` with what a search needs to know of a cell; margins are those of cells that settle.
+
+    What else a run measures unasked stays, so that both have one kernel, which takes longer to compile than a search.
+    """
+    usual = default(config.equations)
+    measure = tuple(spec for spec in usual if spec in _NEEDED or spec in config.measure)
     integrator = config.integrator.model_copy(update={"stop_when_settled": True})
     return replace(config, measure=measure, verify=0.0, refine=0, integrator=integrator)
 

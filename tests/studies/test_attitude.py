@@ -33,7 +33,7 @@ ROLLING = {**PAPERS, "model": "noslip", "friction": {}}
 @pytest.mark.parametrize(
     ("scene", "law", "t_end"),
     [
-        (PAPERS, "viscous", 40.0),
+        (PAPERS, "viscous", 20.0),
         pytest.param(ROLLING, None, 40.0, marks=pytest.mark.campaign),
         (STONE, "coulomb-tanh", 1.0),
         pytest.param(BOWL, "coulomb-tanh", 1.0, marks=pytest.mark.campaign),

@@ -33,10 +33,10 @@ def test_a_start_by_angles_has_no_spin_to_search(write: Write) -> None:
 
 def test_vectors_of_a_trajectory_are_along_the_same_axes_with_any_equations() -> None:
     """Those of the paper's model are along the axes of inertia; the general equations know those of the surface."""
-    scene = {"body": {"a": 10, "b": 3, "delta": 0.3}, "start": {"n0": 0.2, "x0": 0.3, "y0": -0.1}}
+    body, scene = {"a": 10, "b": 3, "delta": 0.3}, {"start": {"n0": 0.2, "x0": 0.3, "y0": -0.1}}
     papers, general = (
-        sweep.trajectory(scene | {"friction": {"mu": 3} | couple}, t_end=20, every=0.5)
-        for couple in ({}, {"sigma": 1e-14})
+        sweep.trajectory(scene | {"body": body | more, "friction": {"mu": 3}}, t_end=20, every=0.5)
+        for more in ({}, {"offset": 1e-300})
     )
     assert float(general.contact_x[0, 0]) == pytest.approx(0.3)
     turned = ("heading", "roll_angle", "pitch_angle", "table_x", "table_y")

@@ -101,7 +101,7 @@ def test_trajectories_of_every_model(model: str, write: Write) -> None:
 
 
 def test_first_reversal_is_measured_on_request(write: Write) -> None:
-    dataset = sweep.run(write(STANDARD), measure=["reversals", "first_reversal"])
+    dataset = sweep.run(write(STANDARD), method="dopri5", measure=["reversals", "first_reversal"])
     one = sweep.trajectory(write(STANDARD), mu=60).isel(trajectory=0)
     assert float(dataset.t_first_reversal[0]) == pytest.approx(reversal_times(one)[0], abs=0.05)
     with pytest.raises(ConfigError, match="add reversals"):
