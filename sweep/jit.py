@@ -165,7 +165,7 @@ def on_all_threads(function: Callable[[Any], Any], items: Sequence[Any]) -> list
     It has to spend its time in functions of `serial`, or in those of NumPy that let other threads run, as LAPACK's do.
     """
     shares = [items[i :: 4 * threads()] for i in range(min(len(items), 4 * threads()))]
-    over = map if INTERPRETED else _pool(threads()).map
+    over = map if INTERPRETED or len(shares) == 1 else _pool(threads()).map
     found: list[Any] = [None] * len(items)
     for i, results in enumerate(over(lambda share: [*map(function, share)], shares)):
         found[i :: len(shares)] = results

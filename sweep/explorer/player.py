@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -93,9 +94,15 @@ class Player:
 
 def _projection(moving: body.Moving) -> Array:
     """The matrix of the perspective of `sweep animate`, shape (4, 4)."""
-    shown: Any = Figure().add_axes((0, 0, 1, 1), projection="3d")
+    shown = _camera()
     moving.look(shown)
     return np.asarray(shown.get_proj())
+
+
+@cache
+def _camera() -> Any:
+    """Axes that know the perspective; to make them takes 30 ms."""
+    return Figure().add_axes((0, 0, 1, 1), projection="3d")
 
 
 def _seen(matrix: Array, points: Array) -> Array:
