@@ -24,7 +24,7 @@ from sweep.engine.local import Done, run_batch
 from sweep.engine.plan import kernels
 from sweep.grid import Tile
 from sweep.interrupt import point
-from sweep.kernels.build import build
+from sweep.kernels.build import APPROACH, build
 from sweep.results.identity import Identity
 from sweep.results.provenance import identify, sources
 from sweep.results.store import StoreError
@@ -69,7 +69,7 @@ class Cluster:
         from distributed.comm import CommClosedError
 
         if self.local and config.simulated:
-            build(kernels(config))
+            build(kernels(config), APPROACH)
         # A task's result rather than scattered data, which would be lost along with the workers that hold it.
         shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
         waiting, numbers = iter(todo), dict[Any, int]()

@@ -54,8 +54,8 @@ APART = 0.1
 """The same for the difference of the two spins relative to their size: they have nothing in common any more."""
 
 OF_RATTLE = 1 / 20
-"""Least share of the error of the rattle that the error of the spin is taken to be.  With a tenth, fewer errors are told
-ten times too small (0.8 % for 1.2 % of wide cells), but one in twenty ten times too large."""
+"""Least share of the error of the rattle that the error of the spin is taken to be.  With a tenth, fewer errors are
+told ten times too small (0.8 % for 1.2 % of wide cells), but one in twenty is ten times too large."""
 
 _MILD = 2.0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -136,14 +137,14 @@ class Plan:
         ]
 
 
-def plan(config: Config, *grids: Grid, paths: bool = False) -> Plan:
+def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     """Give each cell of `grids`, by default all cells of `config`, its method, step, limits and start.
 
-    What these cells need and no cache holds is compiled first; `paths` as of `sweep.kernels.build.build`.
+    What these cells need and no cache holds is compiled first; `also` as of `sweep.kernels.build.build`.
     """
     grids = grids or (Grid.of(config),)
     chosen = choose(config, *grids)
-    build(needed(config, chosen), paths)
+    build(needed(config, chosen), *also)
     return fill(config, grids, chosen)
 
 

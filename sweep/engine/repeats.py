@@ -18,6 +18,7 @@ from sweep.engine import final
 from sweep.engine.plan import Part
 from sweep.engine.work import Work
 from sweep.grid import Array
+from sweep.kernels.build import APPROACH, build
 from sweep.kernels.failure import approach
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.status import DIVERGED, RUNNING
@@ -155,6 +156,7 @@ def _meet(part: Part, work: Work, name: str) -> Met:
         states[:, late] = part.kernel.model_states(again.images)
     constants = model.constants.of(ahead.columns)
     stretch = end + _BEYOND * step - begin
+    build([part.kernel], APPROACH)
     for first in range(0, len(rows), _AT_A_TIME):
         some = slice(first, first + _AT_A_TIME)
         kind, passed = approach(model, states[:, some], take(constants, some), stretch[some])

@@ -2,8 +2,9 @@
 
     python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
-A PIECE is `kernel`, or what else runs need: `images`, `approach`, `endings`, or `path` for single trajectories.  A
-MODEL that a user brings is "name@digest", and the record of its origin comes as a line of standard input.
+A PIECE is `kernel`, or what else runs need: `images` and `endings`, `path` for single trajectories, and `approach` once
+a trajectory has failed.  A MODEL that a user brings is "name@digest", and the record of its origin comes as a line of
+standard input.
 
 Processes, because the code that Numba executes right after compiling is not the code that it caches: functions that a
 kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of sums differ (seen
@@ -13,6 +14,7 @@ as the run after it.
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import subprocess
@@ -41,17 +43,19 @@ from sweep.parameters import PAPER_PARAMETERS
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and where the model comes from."""
 
-_SECONDS = {"images": 4.0, "approach": 4.0, "endings": 3.0, "path": 4.0}
+PATH, APPROACH = "path", "approach"
+
+_SECONDS = {"images": 4.0, "endings": 3.0, PATH: 4.0, APPROACH: 4.0}
 """Time to compile a piece that is no kernel (`scripts/run_costs.py`)."""
 
 _POLL = 0.05
 """Time in seconds between two looks at the processes."""
 
 
-def build(kernels: Iterable[Kernel], paths: bool = False) -> None:
+def build(kernels: Iterable[Kernel], *also: str) -> None:
     """Compile what the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
 
-    With `paths` also what it lacks to follow how their bodies turn and travel.
+    `also` names further pieces: `PATH` to follow how bodies turn and travel, `APPROACH` to look at failures.
 
     What is missing after that, because a process failed or there is no folder for a cache, is compiled where it is
     first used.
@@ -65,14 +69,14 @@ def build(kernels: Iterable[Kernel], paths: bool = False) -> None:
     if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.is_compiled()]:
         with compiling():
             try_compiling(users[0])
-    if jobs := missing(kernels, paths):
+    if jobs := missing(kernels, *also):
         with compiling():
             _compile(jobs)
 
 
-def missing(kernels: Sequence[Kernel], paths: bool = False) -> list[Job]:
-    """List what the cache lacks to run `kernels`; `paths` as of `build`."""
-    return list(dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel, paths)))
+def missing(kernels: Sequence[Kernel], *also: str) -> list[Job]:
+    """List what the cache lacks to run `kernels`; `also` as of `build`."""
+    return list(dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel, also)))
 
 
 def compile_seconds(jobs: Sequence[Job]) -> float:
@@ -91,19 +95,19 @@ def try_compiling(model: Model) -> None:
             compiled(function).compile(tuple(map(numba.typeof, arguments)))
 
 
-def _missing(kernel: Kernel, paths: bool) -> Iterator[tuple[str, ...]]:
+def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """Name what the cache lacks to run `kernel`, by the arguments of this module, the longest first."""
     model = kernel.model.key
     if kernel.advancing.is_missing():
         yield "kernel", kernel.method, model, *(each.spec for each in kernel.measurements if each.in_kernel)
     if any(function.is_missing() for function in kernel.filling()):
         yield "images", kernel.method, model
-    if compiled_approach(kernel.model).is_missing():
-        yield "approach", PLAIN, model
     if MODES in kernel.model.offers and compiled_following().is_missing():
         yield "endings", PLAIN, model
-    if paths and kernel.model.path and compiled_path(kernel.model).is_missing():
-        yield "path", PLAIN, model
+    if PATH in also and kernel.model.path and compiled_path(kernel.model).is_missing():
+        yield PATH, PLAIN, model
+    if APPROACH in also and compiled_approach(kernel.model).is_missing():
+        yield APPROACH, PLAIN, model
 
 
 def _compile(jobs: list[Job]) -> None:
@@ -143,11 +147,12 @@ def main(piece: str, method: str, name: str, *measure: str) -> None:
     else:
         model = find(name)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    if piece == "approach":
+    gc.disable()  # to look for cycles among what Numba keeps takes a twentieth of the time
+    if piece == APPROACH:
         compile_approach(model)
     elif piece == "endings":
         compile_following()
-    elif piece == "path":
+    elif piece == PATH:
         compile_path(model)
     else:
         kernel = make_kernel(method, model, measure)

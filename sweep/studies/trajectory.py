@@ -30,6 +30,7 @@ from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import threads
 from sweep.kernels import path
+from sweep.kernels.build import PATH
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
@@ -147,7 +148,7 @@ def trajectory(
 
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
     """`trajectory` of all cells of `chosen`."""
-    job = plan(chosen, paths=True)
+    job = plan(chosen, also=[PATH])
     (part,), (grid,) = job.parts, job.grids
     kernel, images, columns = part.kernel, part.images, grid.columns()
     t_end, settles, began = chosen.integrator.t_end, chosen.integrator.stop_when_settled, time.perf_counter()

@@ -53,7 +53,7 @@ def long_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(("method", "step"), [("dopri5", 0.01), ("adams", 0.05)])
 def test_estimates_are_near_true_errors(method: str, step: float) -> None:
-    """The last loses the phase of its rattle in long steps of adams and keeps its spin, so its error is told too large: by as much as fifty times."""
+    """The last keeps its spin in long steps of adams, but not the phase of its rattle: told fifty times too large."""
     found = cells([BODY, *WIDE], method=method, step=step)
     ratio = found.spin_error.values / np.abs(found.spin_final.values - SPINS)
     assert np.all((ratio > 0.1) & (ratio < [20, 20, 20, 20, 60])), ratio

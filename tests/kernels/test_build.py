@@ -12,12 +12,14 @@ from pathlib import Path
 import pytest
 from support import ROOT, Write
 from support.kernels import kernel, threads
+from support.runs import run_cells
 
 import sweep
 from sweep.engine.estimate import estimate
 from sweep.jit import Cached, showing
 from sweep.kernels import build as builder
 from sweep.kernels.build import build
+from sweep.kernels.status import LIFT_OFF
 
 AUTO = "body: {b: [2, 3]}\nfriction: {mu: [1, 1000]}\nintegrator: {method: auto, t_end: 10}\nname: auto\n"
 """Its cells need both methods."""
@@ -43,10 +45,19 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
     assert started == [
         ("kernel", "adams", "slip", "reversals"),
         ("images", "adams", "slip"),
-        ("approach", "dopri5", "slip"),
         ("endings", "dopri5", "slip"),
         ("kernel", "dopri5", "slip", "reversals"),
     ]
+
+
+def test_what_only_failures_need_is_compiled_when_one_is_met(started: list[tuple[str, ...]]) -> None:
+    plain = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 33.0, "n0": 0.02, "x0": 0.01, "y0": 0.01}
+    lifts_off = {"a": 15.7, "b": 1.05, "c": 0.732, "delta": 0.171, "mu": 33.0, "n0": 1.0, "x0": -3.49, "y0": 0.576}
+    piece = ("approach", "dopri5", "slip")
+    run_cells([plain], t_end=10.0)
+    assert piece not in started
+    assert run_cells([lifts_off], t_end=10.0).status == LIFT_OFF
+    assert piece in started
 
 
 @pytest.mark.usefixtures("started")
@@ -63,7 +74,7 @@ def test_no_more_processes_at_once_than_threads(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(builder, "_start", start)
     with threads(1):
         build([kernel("adams"), kernel()])
-    assert (len(alive), most) == (5, 1)
+    assert (len(alive), most) == (4, 1)
 
 
 def test_what_is_compiled_is_shown(started: list[tuple[str, ...]]) -> None:
@@ -78,7 +89,7 @@ def test_what_is_compiled_is_shown(started: list[tuple[str, ...]]) -> None:
     with showing(show):
         build([kernel()])
     build([kernel()])
-    assert told == ["begins", 3]
+    assert told == ["begins", 2]
 
 
 def test_an_estimate_compiles_nothing(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
