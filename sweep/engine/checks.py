@@ -79,7 +79,7 @@ def results(job: Plan, errors: Errors | None, work: Work) -> dict[str, Array]:
     found = job.results()
     if errors is None:
         return found | _counted(job, None, work)
-    found |= {"spin_error": errors.spin} | _counted(job, errors.reversals, work)
+    found |= {"spin_error": errors.told} | _counted(job, errors.reversals, work)
     return found | ({"decided": _decided(found, errors)} if "margin_more" in found else {})
 
 

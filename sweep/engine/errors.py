@@ -76,7 +76,7 @@ class Errors:
     """What the companions of a run's cells tell, each of shape (cells,)."""
 
     spin: Array
-    """Estimated error of the spin at the end; NaN for runs that failed, or whose companion did."""
+    """Error of the spin at the end by the spin of the companion; NaN for runs that failed, infinite if that did."""
     least: Array
     """What it is at least, by the error of the rattle; NaN where there is no companion."""
     reversals: Array
@@ -87,6 +87,11 @@ class Errors:
     """Estimated error of the margin to one reversal fewer; NaN where it is not measured, or there is no companion."""
     nearest_approach: Array
     """The same to one more."""
+
+    @property
+    def told(self) -> Array:
+        """Estimated error of the spin at the end, shape (cells,)."""
+        return np.asarray(np.fmax(self.spin, self.least))
 
     @classmethod
     def none(cls, cells: int) -> Errors:
@@ -153,13 +158,13 @@ def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None
         errors, limit = compare(now, other), allowed(now)
         shorter = np.fmax((errors.spin / (AIM * limit)) ** (1 / _ORDER), 1.0)
         large = errors.spin > AIM * limit
-        by_chance, ratio = errors.spin == errors.least, METHODS[part.method].companion
-        shorter = np.where(np.isinf(errors.spin), ratio, np.where(by_chance, np.fmax(shorter, ratio), shorter))
+        by_chance = ~large & (errors.least > AIM * limit)
+        shorter = np.where(np.isinf(errors.spin) | by_chance, METHODS[part.method].companion, shorter)
         hopeless = (shorter > SHORTEST) | (errors.spin > most)
         hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
         long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
-        again = large & ~hopeless & ~long & (round_ < ROUNDS) & (not part.fixed)
-        missed = (errors.spin > limit) & (not part.fixed)
+        again = (large | by_chance) & ~hopeless & ~long & (round_ < ROUNDS) & (not part.fixed)
+        missed = (errors.told > limit) & (not part.fixed)
         done = now.take(~again)
         part.put(rows[~again], done, np.where(missed, MISSED, rules)[~again])
         found.put(rows[~again], errors.take(~again))
@@ -205,7 +210,7 @@ def compare(part: Part, companion: Part) -> Errors:
         margins = np.stack([np.abs(table[name] - other[name]) for name in EXTREMES]) / larger
     margins[:, failed] = np.nan
     least = np.where(failed, np.nan, OF_RATTLE * rattle / larger)
-    spin = np.where(failed, np.inf, np.maximum(difference / larger, least))
+    spin = np.where(failed, np.inf, difference / larger)
     return Errors(spin, least, np.where(failed, np.nan, counts), apart, *margins)
 
 
