@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -14,16 +13,15 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar, make_axes
 from matplotlib.patches import Patch
 
-from sweep.axis import Axis
 from sweep.plots import hatches, labels, lines
 from sweep.plots.description import Map, common_scale, describe
 from sweep.plots.figure import BESIDE, RATIO, Picture, arrangement, fits, panel_width, set_scale
-from sweep.plots.marks import legend, of_all
+from sweep.plots.marks import legend, of_all, with_results
 from sweep.plots.panels import MAX_PANELS, Panel, Panels, title
 from sweep.plots.quantities import COMPARISONS
 from sweep.plots.scales import Limits, Scale
 
-_MAX_VALUES = 1000
+MAX_VALUES = 1000
 """Values drawn of an axis, taken evenly: more would be less than a pixel each."""
 
 _WIDEST = 4.4
@@ -154,9 +152,8 @@ def _scales(maps: Maps, k: int, limits: Limits | None, cmap: str | None) -> dict
     return {name: common if name in together else common_scale([each]) for name, each in shown.items()}
 
 
-def _map(axes: Axes, whole: Map, scale: Scale, *, alone: bool, labelled: bool, contours: bool) -> dict[str, Artist]:
+def _map(axes: Axes, shown: Map, scale: Scale, *, alone: bool, labelled: bool, contours: bool) -> dict[str, Artist]:
     """Draw one map, alone or with others of the same cells; returns the entries that its lines need in the legend."""
-    shown = _thinned(whole)
     set_scale(axes, "x", shown.x.values)
     set_scale(axes, "y", shown.y.values)
     values = np.ma.masked_where(shown.blank, shown.values)
@@ -172,15 +169,6 @@ def _map(axes: Axes, whole: Map, scale: Scale, *, alone: bool, labelled: bool, c
     if contours:
         lines.draw_contours(axes, shown, scale)
     return dict(lines.draw(axes, shown, labelled=labelled))
-
-
-def _thinned(shown: Map) -> Map:
-    """The map with as many values of the axes as can be seen."""
-    x, y = (slice(None, None, -(-len(axis.values) // _MAX_VALUES)) for axis in (shown.x, shown.y))
-    return replace(
-        shown, x=Axis(shown.x.name, shown.x.values[x]), y=Axis(shown.y.name, shown.y.values[y]),
-        values=shown.values[y, x], marks={kind: where[y, x] for kind, where in shown.marks.items()},
-    )  # fmt: skip
 
 
 def _title(panels: Panels, name: str, panel: Panel, *, small: bool) -> str:
@@ -217,15 +205,15 @@ def _meanings(each: list[Panels], maps: list[Maps], scales: dict[str, Scale]) ->
     """Say what the colours of flags and the marks of cells mean, and how many cells of each dataset have them."""
     handles: list[Artist] = []
     names = list(scales)
+    datasets = [panels.whole for panels in each]
     if maps[0][0][names[0]].flags:
+        each_found = [with_results(dataset, names[0]) for dataset in datasets]
         for value, words in (scales[names[0]].ticks or {}).items():
-            shown = [[panel[names[0]] for panel in of_one] for of_one in maps]
-            counts = [sum(int((one.shown == value).sum()) for one in of_one) for of_one in shown]
+            counts = [int((found == value).sum()) for found, _ in each_found]
             if any(counts):
-                told = of_all(counts, [sum(one.values.size for one in of_one) for of_one in shown])
+                told = of_all(counts, [size for _, size in each_found])
                 colour = scales[names[0]].rgba(np.array(value)).tolist()
                 handles.append(Patch(facecolor=colour, edgecolor="0.3", label=f"{words} ({told})"))
-    datasets = [panels.dataset for panels in each]
     kinds = legend(datasets[0], names[0], *datasets[1:])
     if "no_value" in (compared := legend(datasets[0], names[-1])):
         kinds["no_value"] = compared["no_value"]

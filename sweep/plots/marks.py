@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from sweep.grid import Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.plots.labels import is_code
 from sweep.plots.quantities import DERIVED, field
@@ -96,6 +97,13 @@ def legend(dataset: xr.Dataset, name: str, *others: xr.Dataset) -> dict[str, str
             first = next(each for each, count in zip(datasets, counts, strict=True) if count)
             entries[kind] = f"{meaning(first, name, kind)} ({of_all(counts, [kinds[kind].size for kinds in found])})"
     return entries
+
+
+def with_results(dataset: xr.Dataset, name: str) -> tuple[Array, int]:
+    """The values of the cells that have a result to draw, shape (cells,), and the number of all cells."""
+    found, kinds = field(dataset, name), marks(dataset, name)
+    blank = np.any([kinds[kind].values for kind in BLANK], axis=0)
+    return found.values[~blank], found.size
 
 
 def of_all(counts: list[int], sizes: list[int]) -> str:

@@ -39,6 +39,9 @@ class Panels:
     """What to draw, and where."""
 
     dataset: xr.Dataset
+    """Of the cells that are drawn."""
+    whole: xr.Dataset
+    """Of all cells."""
     names: list[str]
     """Variables, among them perhaps `difference`."""
     across: list[str]
@@ -53,8 +56,13 @@ def choose(
     x: str | None = None,
     y: str | None = None,
     sel: Mapping[str, float] | None = None,
+    most: int | None = None,
 ) -> Panels:
-    """Choose what to draw of a dataset; parameters as of `sweep.plots.picture.plot`.
+    """Choose what to draw of a dataset; other parameters as of `sweep.plots.picture.plot`.
+
+    Parameters
+    ----------
+    most : values of an axis that a map has at most, taken evenly; by default all.  The others are not read
 
     Raises
     ------
@@ -78,9 +86,12 @@ def choose(
     if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
         shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
         raise ValueError(f"{count} panels ({shown}) are more than {MAX_PANELS}; select one value of an axis")
+    whole = dataset
+    if most and len(across) == 2:
+        dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // most)) for d in across})
     dataset = dataset.assign({name: field(dataset, name) for name in names})
     dataset = dataset.sortby([d for d in across if d in dataset.coords])
-    return Panels(dataset, names, across, list(indices(dataset, rest)))
+    return Panels(dataset, whole, names, across, list(indices(dataset, rest)))
 
 
 def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:

@@ -159,7 +159,7 @@ def _drawn(
         if kinds != {RUN} or histogram:
             raise ValueError("several datasets can be drawn side by side only if each is of a run, and as maps")
         common = variable or subject(datasets[0])
-        return maps.draw_beside([panels.choose(each, common, **axes) for each in datasets], **how)
+        return maps.draw_beside([panels.choose(each, common, **axes, most=maps.MAX_VALUES) for each in datasets], **how)
     (dataset,), (found,) = datasets, kinds
     if found in _OWN and (found != CRITICAL or variable is None):
         if found != TRAJECTORY and variable is not None:
@@ -167,7 +167,7 @@ def _drawn(
         if given := [name for name, value in {**axes, **how, "histogram": histogram}.items() if value]:
             raise ValueError(f"{given[0]}: not for a figure of {found}; name it for the maps of a run alone")
         return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
-    chosen = panels.choose(dataset, variable, **axes)
+    chosen = panels.choose(dataset, variable, **axes, most=None if histogram else maps.MAX_VALUES)
     if len(chosen.across) == 2 and not histogram:
         return maps.draw(chosen, **how)
     figure, frames = framed(chosen.dataset, chosen.each, _over(chosen, histogram=histogram))
@@ -182,7 +182,7 @@ def _draw_in(
     """Draw one map or curve into axes of the user."""
     if {kind(each) for each in datasets} != {RUN} or len(datasets) > 1:
         raise ValueError("ax: only a map or a curve of one run is drawn into given axes")
-    chosen = panels.choose(datasets[0], variable, **axes)
+    chosen = panels.choose(datasets[0], variable, **axes, most=None if histogram else maps.MAX_VALUES)
     if len(chosen.each) > 1 or "probability" in chosen.names:
         raise ValueError(f"ax: {chosen.names[0]} needs more than one panel; select a value of each other axis")
     if len(chosen.across) == 2 and not histogram:

@@ -1,5 +1,6 @@
 """What the pictures of a dataset contain, told by the artists of the figures."""
 
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,10 @@ from support.figures import constants, entries, made
 
 import sweep
 from sweep.kernels.status import DIVERGED, TIME_LIMIT
-from sweep.plots import picture, scales
+from sweep.plots import panels, picture, scales
 from sweep.plots.hatches import outline
 from sweep.results.dataset import VARIABLES, described
-from sweep.results.netcdf import write
+from sweep.results.netcdf import open_dataset, write
 
 
 def maps(figure: Figure) -> list[Axes]:
@@ -40,6 +41,22 @@ def test_simulated_predicted_and_their_difference_stand_side_by_side() -> None:
     simulated, predicted, difference = map(mesh, maps(figure))
     assert simulated.norm is predicted.norm or (simulated.norm.boundaries == predicted.norm.boundaries).all()
     assert (difference.get_array() == -2).all()
+
+
+def test_a_map_reads_no_more_of_a_file_than_it_shows(tmp_path: Path) -> None:
+    axes = {"mu": np.arange(4000.0), "n0": np.arange(3000.0)}
+    counts = np.add.outer(np.arange(4000), np.arange(3000)).astype("int16")
+    names = ("reversals", "reversals_predicted")
+    whole = xr.Dataset({name: (tuple(axes), counts) for name in names}, axes)
+    write(tmp_path / "large.nc", whole)
+    with open_dataset(tmp_path / "large.nc", load=False) as lazy:
+        tracemalloc.start()
+        shown = panels.choose(lazy, most=1000).dataset.load()
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert most < counts.nbytes
+    xr.testing.assert_equal(shown.drop_vars("difference"), whole.isel(mu=slice(None, None, 4), n0=slice(None, None, 3)))
+    assert (shown.difference == 0).all()
 
 
 def test_a_difference_is_coloured_evenly_about_zero() -> None:
