@@ -35,6 +35,8 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 KERNELS = [
     ("adams", "slip", default_measures("slip")),
     ("dopri5", "slip", default_measures("slip")),
+    ("adams", "slip", ("reversals", "margin")),
+    ("adams", "slip", ("reversals", "reversal_times=3")),
     ("dopri5", "noslip", default_measures("noslip")),
     ("dopri5", "effective", default_measures("effective")),
     ("dopri5", "averaged", default_measures("averaged")),

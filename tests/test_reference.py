@@ -6,7 +6,6 @@
 import numpy as np
 import pytest
 from support import ROOT, kernels
-from support.kernels import default_measures
 
 import sweep
 from sweep.bench.reference import Spins, read_spins, spin_errors
@@ -39,7 +38,7 @@ def test_firm_counts_of_500_random_cells_agree(method: str, every: int) -> None:
     assert (len(rows), rows["firm"].sum()) == (500, 499)
     sample = rows[rows["firm"] == 1][::every]
     columns = {name: sample[name].astype(float) for name in MODELS["slip"].parameters}
-    ends = simulate(columns, LONGEST, method=method, measure=default_measures("slip"), settle=True)
+    ends = simulate(columns, LONGEST, method=method, settle=True)
     np.testing.assert_array_equal(ends["reversals"], sample["reversals"])
 
 

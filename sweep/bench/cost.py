@@ -16,7 +16,7 @@ from sweep.kernels.layout import LANES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import METHODS, allowed, automatic_step
 from sweep.models import MODELS
-from sweep.report.direct import MEASURE, make_kernel, standard
+from sweep.report.direct import make_kernel, standard
 
 MU = 60.0
 
@@ -36,7 +36,7 @@ def step_times(effort: Effort) -> BenchSection:
     works, cells = {}, LANES * threads
     for name, model in MODELS.items():
         for method in allowed(model):
-            for measure in ((), MEASURE):
+            for measure in ((), None):
                 kernel = make_kernel(method, model, measure)
                 what = " and ".join(kernel.measure) or "nothing"
                 works[name, method, what] = Work(kernel, standard(mu=np.full(cells, MU)), np.full(cells, STEP))

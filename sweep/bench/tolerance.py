@@ -13,7 +13,7 @@ from sweep.bench.timing import Effort
 from sweep.grid import Array
 from sweep.kernels import methods
 from sweep.models import MODELS
-from sweep.report.direct import MEASURE, make_kernel
+from sweep.report.direct import make_kernel
 
 Key = tuple[str, str]
 """A model and a method."""
@@ -24,7 +24,7 @@ def tolerance(effort: Effort) -> BenchSection:
     lines = [["model", "method", "body", *(f"{t:g}" for t in asked)]]
     kept: dict[Key, Array] = {}
     for name, method, reference in comparisons():
-        model, kernel = MODELS[name], make_kernel(method, MODELS[name], MEASURE)
+        model, kernel = MODELS[name], make_kernel(method, MODELS[name])
         steps = [methods.automatic_step(method, model, reference.columns, t)[0] for t in asked]
         # Of shape (bodies, tolerances).
         found = [spin_errors(kernel, reference, whole_steps(reference, step)) for step in steps]

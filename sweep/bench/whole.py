@@ -27,7 +27,7 @@ from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
-from sweep.report.direct import MEASURE, simulate, standard
+from sweep.report.direct import simulate, standard
 from sweep.report.rows import Table
 
 PLACES: dict[Place, str] = {
@@ -97,7 +97,7 @@ def whole(effort: Effort) -> BenchSection:
         file.write_text(BASE, encoding="utf-8")
         runs = list(_runs(file, effort))
         some = REFERENCE | {"mu": REFERENCE["mu"][: effort.reference_frictions]}
-        reference = WholeRun(file, some | {"method": AUTO, "t_end": LONGEST, "measure": list(MEASURE)})
+        reference = WholeRun(file, some | {"method": AUTO, "t_end": LONGEST})
         for settings in (*({"method": method} for method in METHODS), reference.settings):
             run(file, **settings | {"t_end": 1.0})  # compiles the kernels
         times = list(in_turn(dict(enumerate(runs)), effort).values())

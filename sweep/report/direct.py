@@ -24,8 +24,6 @@ from sweep.parameters import PAPER_PARAMETERS
 from sweep.prediction import predict
 from sweep.results.dataset import measured
 
-MEASURE = ("reversals", "energy_error")
-
 
 @dataclass(frozen=True)
 class Ends:
@@ -53,9 +51,9 @@ def standard(**parameters: Any) -> dict[str, Array]:
 
 
 @cache
-def make_kernel(method: str, model: Model, measure: tuple[str, ...]) -> Kernel:
-    """The compiled kernel, with those of the measurements that the model knows."""
-    kernel = methods.make_kernel(method, model, [name for name in measure if name in measures.possible(model)])
+def make_kernel(method: str, model: Model, measure: tuple[str, ...] | None = None) -> Kernel:
+    """The compiled kernel, with these measurements, by default with those of a run."""
+    kernel = methods.make_kernel(method, model, measures.default(model) if measure is None else measure)
     build([kernel])
     kernel.compile()
     return kernel
@@ -69,26 +67,24 @@ def simulate(
     method: str = methods.PLAIN,
     step: float | Array | None = None,
     tolerance: float = TOLERANCE,
-    measure: tuple[str, ...] = MEASURE,
     ranges: bool = True,
     settle: bool = False,
     decide: bool = False,
 ) -> Ends:
-    """Run trajectories to their ends.
+    """Run trajectories to their ends, with the measurements of a run.
 
     Parameters
     ----------
     columns : physical parameters by name, each of shape (cells,)
     t_end : time limit in sqrt(c/g)
     step : in sqrt(c/g), for all or of shape (cells,); by default the automatic one of `tolerance`
-    measure : measurements, of which those that the model knows are taken
     ranges : whether the kernel gets the spins at which the rattle decays; without them nothing settles
     settle : whether a trajectory ends as soon as it has settled
     decide : whether a failure is repeated with shorter steps until it is certain, as `sweep.run` does it;
         not without `ranges`
     """
     chosen = MODELS[model]
-    kernel = make_kernel(method, chosen, measure)
+    kernel = make_kernel(method, chosen)
     cells = len(columns["a"])
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
     stability = predict(chosen, Grid({}, {}, dict(columns))).stability if ranges else None

@@ -63,7 +63,7 @@ def test_estimates_are_near_true_errors(method: str, step: float) -> None:
 @pytest.mark.usefixtures("long_steps")
 def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is measured."""
-    for measure in (default_measures("slip"), ["reversals"]):
+    for measure in (default_measures("slip"), ["reversals", "margin"]):
         repeated = cells([BODY], method="adams", measure=measure)
         assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8
         assert float(repeated.spin_error[0]) < 1e-8
