@@ -1,6 +1,6 @@
 """Compares the counts of decided cells with those of an independent integrator.
 
-    python scripts/decided_counts.py NEAR WIDE
+    python scripts/decided_counts.py NEAR WIDE [SEED]
 
 NEAR cells lie beside the boundaries of `configs/mu_b.yaml` at n0 = 0.05, by 1e-4 to 1e-2 of their place; WIDE cells are
 drawn from a domain much wider than the paper's.  Counts are those of `scripts/reference_counts_500.py`: Taylor series
@@ -69,6 +69,9 @@ def compare(label: str, columns: dict[str, Array]) -> None:
 
 
 if __name__ == "__main__":
-    generator = np.random.default_rng(20261123)
-    compare("wide", wide(generator, int(sys.argv[2])))
-    compare("near", near(generator, int(sys.argv[1])))
+    beside, far = map(int, sys.argv[1:3])
+    generator = np.random.default_rng(int(sys.argv[3]) if sys.argv[3:] else 20261123)
+    if far:
+        compare("wide", wide(generator, far))
+    if beside:
+        compare("near", near(generator, beside))
