@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import ROOT, Write
-from support.runs import in_sittings, same_numbers
+from support.runs import in_sittings, run_cells, same_numbers
 
 import sweep
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -42,6 +42,21 @@ def test_to_have_paused_changes_no_count(run: xr.Dataset, write: Write) -> None:
     whole = sweep.run(write(SCENE), t_end=1e6, method="adams", estimate_errors=False)
     np.testing.assert_array_equal(run.reversals[[0, 2]], whole.reversals)
     np.testing.assert_allclose(run.margin_more[[0, 2]], whole.margin_more, rtol=1e-4)
+
+
+def test_a_strong_rattle_that_hardly_decays_does_not_let_a_cell_settle() -> None:
+    """It turns the spin by more than its energy at any one time would; counts by Taylor series at 1e-13."""
+    body = {"a": [21.2915, 42.6078], "b": [13.6769, 34.6993], "c": [1.66529, 1.14081], "delta": [0.193173, -0.123207]}
+    start = {
+        "mu": [3.79616, 1.13196],
+        "n0": [-0.0487141, 0.0211796],
+        "x0": [-1.44812, 5.01597],
+        "y0": [-1.94482, -2.69675],
+    }
+    cells = [dict(zip(body | start, values, strict=True)) for values in zip(*(body | start).values(), strict=True)]
+    found = run_cells(cells, t_end=3000.0)
+    assert list(found.reversals) == [1, 3]
+    assert list(found.decided) == [1, 1]
 
 
 @pytest.mark.usefixtures("short_chunks")
