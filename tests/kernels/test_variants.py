@@ -174,9 +174,10 @@ def test_the_stiff_method_takes_any_body_with_viscous_friction(tmp_path: Path) -
     stiff = run(tmp_path, text, method="adams")
     against_newton(tmp_path, stiff, [0], atol=1e-8)
     plain = run(tmp_path, text, method="dopri5")
-    told = stiff["spin_error"] + plain["spin_error"]
-    assert float(told.max()) < 2e-8 * UNIT
-    assert bool((abs(stiff["spin_final"] - plain["spin_final"]) < 10 * told).all())
+    told, apart = stiff["spin_error"] + plain["spin_error"], abs(stiff["spin_final"] - plain["spin_final"])
+    assert float(apart.max()) < 1e-8 * UNIT
+    assert float(told.max()) < 3e-8 * UNIT  # one of four is told by its rattle, three times too large
+    assert bool((apart < 10 * told).all())
     np.testing.assert_array_equal(stiff["reversals"], plain["reversals"])
     assert float(stiff["energy_error"].max()) < 1e-6
     assert (stiff["step"] > 3 * plain["step"]).sel(mu=1000).all()

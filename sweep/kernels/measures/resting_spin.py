@@ -50,7 +50,7 @@ def endings(table: Table, which: Array) -> Ending:
     """How the trajectories of a mask end that is left to their rattle; arrays over all, NaN where that is not known."""
     result = Ending(*np.full((4, len(table.images)), np.nan))
     if set(table.layout.names) >= _NEEDED:
-        cells = np.flatnonzero(which)
+        cells = np.flatnonzero(which & np.isfinite(table["energy"]))
 
         def find(first: int) -> None:
             some = cells[first : first + _AT_A_TIME]
