@@ -50,7 +50,7 @@ def endings(table: Table, which: Array) -> Ending:
     """How the trajectories of a mask end that is left to their rattle; arrays over all, NaN where that is not known."""
     result = Ending(*np.full((4, len(table.images)), np.nan))
     if set(table.layout.names) >= _NEEDED:
-        cells = np.flatnonzero(which & np.isfinite(table["energy"]))
+        cells = np.flatnonzero(which & np.isfinite(table.columns(_states(table))).all(axis=1))
 
         def find(first: int) -> None:
             some = cells[first : first + _AT_A_TIME]
@@ -66,6 +66,13 @@ def slow_states(table: Table) -> tuple[Array, Constants]:
     """States and constants of `stiff.slip`, from images of a model with modes in either set of variables."""
     kept = {name: table[f"constant.{name}"] for name in slip.Constants._fields}
     constants = Constants(*(1 / kept[f"inv_{name}"] for name in ("I1", "I2", "I3")), **kept)
-    if STIFF_MODEL.states[2] in table.layout:
-        return table.columns(STIFF_MODEL.states).T, constants
-    return stack(momentum(tuple(table.columns(slip.MODEL.states).T), constants)), constants
+    states = table.columns(_states(table)).T
+    return (states if _is_stiff(table) else stack(momentum(tuple(states), constants))), constants
+
+
+def _states(table: Table) -> tuple[str, ...]:
+    return STIFF_MODEL.states if _is_stiff(table) else slip.MODEL.states
+
+
+def _is_stiff(table: Table) -> bool:
+    return STIFF_MODEL.states[2] in table.layout
