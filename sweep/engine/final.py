@@ -48,8 +48,7 @@ def run(part: Part, work: Work, name: str, most: Array | float = np.inf) -> None
     if len(rows):
         later = part.take(rows)
         later.kernel.table(later.images)["status"] = RUNNING
-        most = most if np.ndim(most) == 0 else np.asarray(most)[rows]
-        _until_settled(later, work, f"{name} later", most)
+        _until_settled(later, work, f"{name} later", np.broadcast_to(most, len(part.cells))[rows])
         settle(later)
         part.images[rows] = later.images
 
@@ -64,8 +63,7 @@ def _until_settled(part: Part, work: Work, name: str, most: Array | float) -> No
     if len(early):
         on = part.take(early)
         on.kernel.table(on.images)["status"] = RUNNING
-        most = np.broadcast_to(most, len(part.cells))[early]
-        work.run(f"{name} unsettled", on.kernel, on.images, most=most)
+        work.run(f"{name} unsettled", on.kernel, on.images, most=np.broadcast_to(most, len(part.cells))[early])
         part.images[early] = on.images
 
 
