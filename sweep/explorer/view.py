@@ -224,6 +224,8 @@ class View:
 
     def _draw_curves(self) -> None:
         curves = self._drawn.curves
+        if not any(curves) and any(self._drawn.running()):
+            return  # the last curves stay until the first is there: figures that went and came back took 0.3 s
         names = [
             f"{k}: {name}{_counted(curve) if curve else ''}"
             for k, (name, curve) in enumerate(zip(self._names(), curves, strict=True), 1)

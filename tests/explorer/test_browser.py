@@ -443,9 +443,11 @@ def test_cells_are_overlaid_and_removed(visit: Callable[..., Page]) -> None:
     control(page, "remove 1", "button").click()
     wait_for_curves(page, 1)
     assert curves(page)[0].startswith("1: μ = 70")
+    model(page, "spin", "m.properties.visible.change.connect(() => { window.flickers = true })")
     page.mouse.click(*place(page, 2, 2))
     wait(page, "curve legend", "/μ = 60/.test(m.items[0].label.value)")
     assert page.url.count("cell=") == 1
+    assert not page.evaluate("window.flickers")  # the old curve stays until there is something of the new one
 
 
 def test_parameters_leave_the_grid(visit: Callable[..., Page]) -> None:
