@@ -12,7 +12,8 @@ N² + A² + B², with N = sqrt(I3) n, and A^γ B, with γ = k4/k1, are conserved
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -22,14 +23,8 @@ from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.rocking import slower_period
 
 
-class Constants(NamedTuple):
+class Constants(namedtuple("Constants", "half_k1 half_k4 half_m1 half_m4 I3")):
     """Half of k1, k4, m1 and m4, and I3: for the body scaled to c = 1, but with time as in the states."""
-
-    half_k1: Any
-    half_k4: Any
-    half_m1: Any
-    half_m4: Any
-    I3: Any
 
     @classmethod
     def of(cls, columns: Columns) -> Constants:

@@ -14,7 +14,8 @@ q = u × x_p is computed only once: (x_p × α) · u = q · α.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -26,21 +27,11 @@ from sweep.models.theory.ripple import FORM, form, ripple
 from sweep.models.theory.rocking import Body, frequencies, rocking, slower_period
 
 
-class Constants(NamedTuple):
-    """Shape, inverse moments of inertia, the ratios in Euler's equations, and μ of the friction."""
+class Constants(namedtuple("Constants", "A11 A12 A22 A33 inv_I1 inv_I2 inv_I3 ratio1 ratio2 ratio3 mu")):
+    """Shape, inverse moments of inertia, the ratios in Euler's equations, and μ of the friction.
 
-    A11: Any
-    A12: Any
-    A22: Any
-    A33: Any
-    inv_I1: Any
-    inv_I2: Any
-    inv_I3: Any
-    ratio1: Any
-    """(I2 - I3) / I1; the others follow by cyclic permutation."""
-    ratio2: Any
-    ratio3: Any
-    mu: Any
+    `ratio1` is (I2 - I3) / I1; the others follow by cyclic permutation.
+    """
 
     @classmethod
     def of(cls, columns: Columns) -> Constants:
