@@ -7,7 +7,7 @@ states, as plain assignments, which the compiler keeps in registers.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -104,31 +104,27 @@ def make_step(tableau: Tableau, rhs: Any, n_states: int) -> Any:
 
 def step_source(tableau: Tableau, n_states: int) -> str:
     """The Python source of a step."""
-    last = tableau.stages - 1
     lines = ["def step(y, p, h):", "    k0, m0 = rhs(y, p)"]
     for stage, row in enumerate(tableau.a, start=1):
         weights = {j: f"h{stage}_{j}" for j, w in enumerate(row) if w}
         lines += [f"    {name} = h * {float(row[j])!r}" for j, name in weights.items()]
-        sums = [_sum(f"{name} * k{j}[{i}]" for j, name in weights.items()) for i in range(n_states)]
+        sums = [" + ".join(f"{name} * k{j}[{i}]" for j, name in weights.items()) for i in range(n_states)]
         lines.append(f"    k{stage}, m{stage} = rhs({tuple_of(f'y[{i}] + ({sums[i]})' for i in range(n_states))}, p)")
     b = {j: repr(float(w)) for j, w in enumerate(tableau.b) if w}
-    stages = range(last + 1)
-    sums = [_sum(f"{w} * k{j}[{i}]" for j, w in b.items()) for i in range(n_states)]
+    stages = range(tableau.stages)
+    power = " + ".join(f"{w} * m{j}[1]" for j, w in b.items())
+    sums = [" + ".join(f"{w} * k{j}[{i}]" for j, w in b.items()) for i in range(n_states)]
     result = tuple_of(f"y[{i}] + h * ({sums[i]})" for i in range(n_states))
     return "\n".join(
         [
             *lines,
-            f"    work = h * ({_sum(f'{w} * m{j}[1]' for j, w in b.items())})",
+            f"    work = h * ({power})",
             f"    sound = {' & '.join(f'(m{j}[2] > 0.0) & (m{j}[3] > 0.0)' for j in stages)}",
             f"    airborne = {' | '.join(f'(m{j}[2] <= 0.0)' for j in stages)}",
             f"    jammed = {' | '.join(f'(m{j}[3] <= 0.0)' for j in stages)}",
             f"    return {result}, m0[0], work, sound, airborne, jammed",
         ]
     )
-
-
-def _sum(terms: Iterable[str]) -> str:
-    return " + ".join(terms)
 
 
 _STABILITY_SHARE = 0.9

@@ -48,14 +48,7 @@ from sweep.models.theory.ripple import matrix
 from sweep.models.theory.rocking import frequencies
 
 PREDICTED, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL, NOT_KNOWN = range(6)
-REASONS = {
-    PREDICTED: "predicted",
-    NO_COUPLING: "no_coupling",
-    NO_SPIN: "no_spin",
-    NO_RATTLE: "no_rattle",
-    NO_REVERSAL: "no_reversal",
-    NOT_KNOWN: "not_known",
-}
+REASONS = dict(enumerate(("predicted", "no_coupling", "no_spin", "no_rattle", "no_reversal", "not_known")))
 """Whether there is a time, and why not: nothing couples spin and rattle; there is no spin to reverse; the mode that
 would grow has no energy; friction stops the reversal; or body or friction have what the formula does not know."""
 
