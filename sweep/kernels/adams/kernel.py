@@ -27,10 +27,12 @@ from sweep.kernels.adams import start_up, stretches, weights
 from sweep.kernels.adams.start_up import count_levels, duration
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
+    CORRECT,
     CORRECTOR_NODES,
     HISTORY,
     MATRIX,
     POINT,
+    PREDICT,
     PREDICTOR_NODES,
     advance_lines,
     load_lines,
@@ -49,8 +51,6 @@ from sweep.models.stiff.modes import bending
 from sweep.models.theory import linear
 from sweep.models.theory.rocking import frequencies, implicit
 
-_PREDICT = tuple(f"predict{j}" for j in range(len(PREDICTOR_NODES)))
-_CORRECT = tuple(f"correct{j}" for j in range(len(CORRECTOR_NODES)))
 _HISTORY = tuple(name.format(slot) for slot in range(HISTORY) for name in POINT)
 
 
@@ -72,7 +72,7 @@ class AdamsKernel(Kernel):
         self.form, self.tolerance = form, tolerance
         powers = stretches.POWERS if any(each.follows_work for each in measurements) else ()
         looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if form.resolves_modes else ()
-        method = ("gamma", "per_weight", *_PREDICT, *_CORRECT, *MATRIX)
+        method = ("gamma", "per_weight", *PREDICT, *CORRECT, *MATRIX)
         self._lay_out(form.model, measurements, (*looks, "begin", "spin", *powers, *method, *_HISTORY))
         self._compile_with(self._make_run_block())
 
@@ -109,8 +109,8 @@ class AdamsKernel(Kernel):
         _, fastest = frequencies(rocking)
         phase = fastest * step
         correct = step[:, None] * weights.fitted_weights(CORRECTOR_NODES, phase)
-        table.set_columns(_PREDICT, step[:, None] * weights.fitted_weights(PREDICTOR_NODES, phase))
-        table.set_columns(_CORRECT, correct)
+        table.set_columns(PREDICT, step[:, None] * weights.fitted_weights(PREDICTOR_NODES, phase))
+        table.set_columns(CORRECT, correct)
         table.set_columns(MATRIX, stack(implicit(correct[:, 0], rocking)).T)
         table["per_weight"] = 1 / correct[:, 0]
         table["gamma"] = BDF_GAMMA * step

@@ -59,10 +59,6 @@ def energy(y: Any, p: Any) -> Any:
     return n, 0.5 * (A * A + B * B), p.I3
 
 
-def observe(y: Array, p: Constants) -> dict[str, Array]:  # noqa: ARG001
-    return {"amplitude_1": y[0], "amplitude_2": y[1]}
-
-
 MODEL = Model(
     name="averaged",
     summary="slow amplitudes of the two rattles and the spin (Takano 2011, ndotab, abdot)",
@@ -77,5 +73,5 @@ MODEL = Model(
     upright=upright,
     rhs=rhs,
     energy=energy,
-    observe=observe,
+    observe=lambda y, p: {"amplitude_1": y[0], "amplitude_2": y[1]},  # noqa: ARG005
 )

@@ -95,10 +95,6 @@ def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
     return ripple(X, Y, dX, dY, k)
 
 
-def observe(y: Array, p: Constants) -> dict[str, Array]:  # noqa: ARG001
-    return {"mode_1": y[0], "mode_2": y[1]}
-
-
 MODEL = Model(
     name="effective",
     summary="two coupled oscillators and the spin, slip eliminated (Takano 2011, eqx, eqy, eqn)",
@@ -114,5 +110,5 @@ MODEL = Model(
     rhs=rhs,
     energy=energy,
     ripple=Ripple(FORM, ripple_coefficients, _ripple),
-    observe=observe,
+    observe=lambda y, p: {"mode_1": y[0], "mode_2": y[1]},  # noqa: ARG005
 )
