@@ -198,6 +198,7 @@ class Measurement:
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
         """Values of the variables, by name, from the images of trajectories that ended at `times`, shape (cells,).
 
-        Each is of shape (cells,), or (cells, length) for a variable `along` a further dimension.
+        Each is of shape (cells,), or (cells, length) for a variable `along` a further dimension.  By default they are
+        the quantities of the same names.
         """
-        return {}
+        return {name: table[name] for name in self.variables if name in self.quantities}

@@ -43,7 +43,7 @@ import numpy as np
 
 from sweep.models.general import rigid_body, starts
 from sweep.models.general.surfaces import ELLIPSOID, Surface
-from sweep.models.model import Array, Columns
+from sweep.models.model import Array, Columns, zeros
 from sweep.models.theory.ripple import matrix
 from sweep.models.theory.rocking import frequencies
 
@@ -108,8 +108,5 @@ def first_reversal(columns: Columns, n_c: tuple[Array, Array], surface: Surface 
 
 def _unknown(columns: Columns) -> Array:
     """Where a couple resists the motion, or upright spin is no steady motion, shape (cells,)."""
-    names = ("sigma", "mu_rolling", "mu_spinning", "Ixz", "Iyz")
-    found = np.zeros(len(columns["a"]), bool)
-    for name in names:
-        found |= columns.get(name, 0) != 0
-    return found
+    named = [columns[name] for name in ("sigma", "mu_rolling", "mu_spinning", "Ixz", "Iyz") if name in columns]
+    return np.asarray(np.any([zeros(columns), *named], axis=0))
