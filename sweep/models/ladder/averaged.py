@@ -40,11 +40,6 @@ def start(columns: Columns) -> tuple[Array, ...]:
 
 
 @inline
-def upright(n: Any) -> Any:
-    return (0.0, 0.0, n)
-
-
-@inline
 def rhs(y: Any, p: Any) -> Any:
     A, B, n = y
     half_a1, half_a4 = p.half_m1 - n * p.half_k1, p.half_m4 + n * p.half_k4
@@ -70,7 +65,7 @@ MODEL = Model(
     constants=Constants,
     start=start,
     slower_period=slower_period,
-    upright=upright,
+    upright=lambda spin: (0.0, 0.0, spin),
     rhs=rhs,
     energy=energy,
     observe=lambda y, p: {"amplitude_1": y[0], "amplitude_2": y[1]},  # noqa: ARG005

@@ -49,11 +49,6 @@ def start(columns: Columns) -> tuple[Array, ...]:
 
 
 @inline
-def upright(n: Any) -> Any:
-    return (0.0, 0.0, 0.0, 0.0, n)
-
-
-@inline
 def rhs(y: Any, p: Any) -> Any:
     X, Y, dX, dY, n = y
     k1, k2, k3, k4, nu1, nu2, root, slip = p.k1, p.k2, p.k3, p.k4, p.nu1_squared, p.nu2_squared, p.root_J, p.slip
@@ -106,7 +101,7 @@ MODEL = Model(
     constants=Constants,
     start=start,
     slower_period=slower_period,
-    upright=upright,
+    upright=lambda spin: (0.0, 0.0, 0.0, 0.0, spin),
     rhs=rhs,
     energy=energy,
     ripple=Ripple(FORM, ripple_coefficients, _ripple),

@@ -31,11 +31,6 @@ class Constants(namedtuple("Constants", "A11 A12 A22 A33 inv_I1 inv_I2 inv_I3"))
 
 
 @inline
-def upright(n: Any) -> Any:
-    return (0.0, 0.0, 0.0, 0.0, -n)
-
-
-@inline
 def rhs(y: Any, p: Any) -> Any:
     u1, u2, w1, w2, w3 = y
     (u3, _), (x, y_, z), (du1, du2, _), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
@@ -65,7 +60,7 @@ def rhs(y: Any, p: Any) -> Any:
 @inline
 def energy(y: Any, p: Any) -> Any:
     u1, u2, w1, w2, w3 = y
-    return ellipsoid.energy(u1, u2, w1, w2, w3, 0.0, 0.0, p)
+    return ellipsoid.energy((u1, u2, w1, w2, w3, 0.0, 0.0), p)
 
 
 def ripple_coefficients(columns: Columns) -> tuple[Array, ...]:
@@ -99,7 +94,7 @@ MODEL = Model(
     constants=Constants,
     start=ellipsoid.start,
     slower_period=slower_period,
-    upright=upright,
+    upright=lambda spin: (0.0, 0.0, 0.0, 0.0, -spin),
     rhs=rhs,
     energy=energy,
     tilt=ellipsoid.tilt,

@@ -40,16 +40,14 @@ class Constants(namedtuple("Constants", "A11 A12 A22 A33 inv_I1 inv_I2 inv_I3 ra
         return cls(*ellipsoid.shape(columns), 1 / I1, 1 / I2, 1 / I3, *ratios, columns["mu"])
 
 
+energy = ellipsoid.energy
+
+
 def start(columns: Columns) -> tuple[Array, ...]:
     """As that of the body, and v_p = 0."""
     states = ellipsoid.start(columns)
     rest = np.zeros_like(states[0])
     return *states, rest, rest
-
-
-@inline
-def upright(n: Any) -> Any:
-    return (0.0, 0.0, 0.0, 0.0, -n, 0.0, 0.0)
 
 
 @inline
@@ -96,12 +94,6 @@ def motion(y: Any, u3: Any, v3: Any, x_p: Any, du: Any, dx: Any, g: Any, alpha: 
     dv1 = R * g1 - gravity * u1 - (y_ * dw3 - z * dw2) - (w2 * s3 - w3 * s2)
     dv2 = R * g2 - gravity * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
     return (du1, du2, dw1, dw2, dw3, dv1, dv2), u1 * w1 + u2 * w2 + u3 * w3, R, denominator
-
-
-@inline
-def energy(y: Any, p: Any) -> Any:
-    u1, u2, w1, w2, w3, v1, v2 = y
-    return ellipsoid.energy(u1, u2, w1, w2, w3, v1, v2, p)
 
 
 def ripple_coefficients(columns: Columns) -> tuple[Array, ...]:
@@ -202,7 +194,7 @@ MODEL = Model(
     start=start,
     slower_period=slower_period,
     fastest_decay=fastest_decay,
-    upright=upright,
+    upright=lambda spin: (0.0, 0.0, 0.0, 0.0, -spin, 0.0, 0.0),
     rhs=rhs,
     energy=energy,
     ripple=Ripple((*FORM, "J1", "J2", "c"), ripple_coefficients, _ripple),
