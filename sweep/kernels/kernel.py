@@ -105,10 +105,6 @@ class Kernel:
 
         return watch
 
-    def _make_note(self) -> Any:
-        """Inline (group, number): what all measurements do when all lanes have taken a step."""
-        return call_all("note", "group, number", self._hooks("make_note"))
-
     def _hooks(self, make: str, *more: Any) -> list[Any]:
         """The functions that a hook of `Measurement` gives; `more` are its arguments beside the layout."""
         return [hook for each in self.measurements if (hook := getattr(each, make)(self.layout, *more))]

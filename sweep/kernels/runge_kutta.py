@@ -15,7 +15,7 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels import tangent
-from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.codegen import call_all, compile_inline, make_load, make_store, tuple_of
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, steps_to
 from sweep.kernels.layout import BLOCK, LANES
@@ -66,7 +66,7 @@ class RungeKuttaKernel(Kernel):
         load_constants = make_load(self.constants, layout, model.constants)
         store_states = make_store(model.states, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), self._make_watch()
-        note = self._make_note()
+        note = call_all("note", "group, number", self._hooks("make_note"))
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         block, lanes, wide = BLOCK, LANES, full_width()
 
@@ -133,13 +133,14 @@ _STABILITY_SHARE = 0.9
 
 def method(tableau: Tableau) -> Method:
     """The record of the method of a tableau."""
+    longest = _STABILITY_SHARE * tableau.real_stability
     return Method(
         name=tableau.name,
         code=tableau.code,
         summary=tableau.summary,
         kernel=lambda model, measurements, tolerance: RungeKuttaKernel(model, tableau, measurements),  # noqa: ARG005
         accurate_step=partial(_accurate_step, tableau),
-        stable_step=partial(_stable_step, tableau),
+        stable_step=lambda model, columns: np.asarray(longest / model.fastest_decay(columns)),
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",
         step_cost=tableau.stages / DOPRI5.stages,
         error_order=tableau.order,
@@ -159,7 +160,3 @@ def _accurate_step(tableau: Tableau, model: Model, columns: Columns, motion: Arr
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         moved = tableau.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
         return np.asarray(np.fmin(step, LAYER_STEP / decay * (tolerance / moved) ** power))
-
-
-def _stable_step(tableau: Tableau, model: Model, columns: Columns) -> Array:
-    return np.asarray(_STABILITY_SHARE * tableau.real_stability / model.fastest_decay(columns))
