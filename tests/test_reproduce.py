@@ -57,7 +57,7 @@ def test_a_wrong_coefficient_of_a_model_is_found(name: str, index: int, monkeypa
 def test_a_wrong_coefficient_of_the_formulas_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(columns: Any) -> coefficients.Coefficients:
         k = coefficients.coefficients(columns)
-        return replace(k, m1=1.01 * k.m1)
+        return k._replace(m1=1.01 * k.m1)
 
     monkeypatch.setattr(analytic, "coefficients", wrong)
     assert failures(lambda: theory.formulas().rows)

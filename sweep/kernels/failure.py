@@ -60,8 +60,7 @@ def approach(model: Model, states: Array, constants: Any, stretch: Array) -> tup
 
 def compile_approach(model: Model) -> None:
     """Compile `approach` for a model, or load it from disk."""
-    width = len(model.states) + len(model.constants._fields)
-    compiled_approach(model)(np.empty((0, width)), *3 * [np.empty(0)])
+    compiled_approach(model)(np.empty((0, 0)), *3 * [np.empty(0)])
 
 
 @cache

@@ -20,7 +20,7 @@ from sweep.kernels.codegen import all_true, call_all, make_load
 from sweep.kernels.lanes import STABLE, make_advance, make_look
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement
-from sweep.models.model import Array, Columns, Model, stack
+from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
 _FAILED_AT = "failed_at"
 """The time of a failure, which the engine finds out (`sweep.engine.repeats`); 0 if there is none."""
@@ -65,7 +65,8 @@ class Kernel:
         self.model, self.measurements = model, tuple(measurements)
         self.constants = tuple(f"constant.{name}" for name in model.constants._fields)
         measured = (name for each in self.measurements for name in each.quantities)
-        self.ripple = tuple(f"ripple.{name}" for name in model.ripple.names if self.follows_ripple)
+        self._ripple = model.ripple if self.follows_ripple else NO_RIPPLE
+        self.ripple = tuple(f"ripple.{name}" for name in self._ripple.names)
         self.layout = Layout((*model.states, *self.constants, *_BASE, *self.ripple, *measured, *more))
 
     @property
@@ -93,43 +94,29 @@ class Kernel:
 
         y, p, spin : states, constants and spin before the step; the others as in `Measurement.make_step`
         """
-        hooks = [hook for each in self.measurements if (hook := each.make_at_reversal(self.layout))]
-        at_reversal = call_all("at_reversal", "group, lane, reverses, count, crossing", hooks)
-        steps = [step for each in self.measurements if (step := each.make_step(self.layout, at_reversal))]
+        at_reversal = call_all("at_reversal", "group, lane, reverses, count, crossing", self._hooks("make_at_reversal"))
+        steps = self._hooks("make_step", at_reversal)
         measure = call_all("measure", "group, lane, accepted, spin, steady, work, h, now", steps)
-        steady = self._make_steady()
+        load, ripple = make_load(self.ripple, self.layout), self._ripple.value
 
         @inline
         def watch(group: Any, lane: int, accepted: Any, y: Any, p: Any, spin: Any, work: Any, h: Any, now: Any) -> None:
-            measure(group, lane, accepted, spin, steady(group, lane, y, p, spin), work, h, now)
+            measure(group, lane, accepted, spin, spin - ripple(y, p, load(group, lane)), work, h, now)
 
         return watch
 
-    def _make_note(self) -> Any:
-        """Inline (group, number): what all measurements do when all lanes have taken a step."""
-        return call_all("note", "group, number", [f for m in self.measurements if (f := m.make_note(self.layout))])
-
-    def _make_steady(self) -> Any:
-        """Inline (group, lane, y, p, spin) -> the ripple-free spin, or the spin if no measurement needs that."""
-        if not self.follows_ripple:
-            return _as_it_is
-        load, ripple = make_load(self.ripple, self.layout), self.model.ripple.value
-
-        @inline
-        def steady(group: Any, lane: int, y: Any, p: Any, spin: Any) -> Any:
-            return spin - ripple(y, p, load(group, lane))
-
-        return steady
+    def _hooks(self, make: str, *more: Any) -> list[Any]:
+        """The functions that a hook of `Measurement` gives; `more` are its arguments beside the layout."""
+        return [hook for each in self.measurements if (hook := getattr(each, make)(self.layout, *more))]
 
     def _compile_with(self, run_block: Any) -> None:
         """Set up `advance` around `run_block`, compiled (group) -> None."""
-        settles = [f for each in self.measurements if (f := each.make_may_settle(self.layout))]
-        looks = [f for each in self.measurements if (f := each.make_look(self.layout))]
-        compares = [f for each in self.measurements if (f := each.make_compare(self.layout))]
-        may_settle = all_true("may_settle", "group, lane, spin, at_rest", settles)
+        may_settle = all_true("may_settle", "group, lane, spin, at_rest", self._hooks("make_may_settle"))
+        looks = self._hooks("make_look")
         measure = call_all("measure", "group, lane, running, ended, spin, rattle, J, total", looks)
         look = make_look(self.model, self.constants, self.layout, may_settle, measure, self.energy_gain)
-        advance = make_advance(run_block, look, call_all("compare", "group, lane, shared", compares), self.layout)
+        compare = call_all("compare", "group, lane, shared", self._hooks("make_compare"))
+        advance = make_advance(run_block, look, compare, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
         self.advancing = parallel(advance, name, *self.model.files)
@@ -160,13 +147,11 @@ class Kernel:
         images = np.zeros((len(step), len(self.layout.names)))
         table = self.table(images)
         images[:, : len(states)] = states.T
-        for name, values in zip(self.constants, constants, strict=True):
-            table[name] = values
+        table.set_columns(self.constants, stack(constants).T)
         spin, rattle, inertia = self.model.energy(states, constants)
         table["goal"], table["stable_step"], table["step"] = goal, stable_step, step
         table["energy_start"] = table["energy"] = rattle + 0.5 * inertia * spin**2
-        for name, row in zip(STABLE, np.full((6, len(step)), np.nan) if stable is None else stable, strict=True):
-            table[name] = row
+        table.set_columns(STABLE, np.nan if stable is None else stable.T)
         if self.ripple:
             table.set_columns(self.ripple, stack(self.model.ripple.of(columns)).T)
         for each in self.measurements:
@@ -197,9 +182,7 @@ class Kernel:
         """The ripple-free spin of the images, shape (cells,); the spin itself if no measurement needs the former."""
         table, (states, constants) = self.table(images), self.unpack(images)
         spin, _, _ = self.model.energy(states, constants)
-        if not self.ripple:
-            return np.asarray(spin)
-        return np.asarray(spin - self.model.ripple.value(states, constants, [table[name] for name in self.ripple]))
+        return np.asarray(spin - self._ripple.value(states, constants, [table[name] for name in self.ripple]))
 
     def model_states(self, images: Array) -> Array:
         """The states as the right-hand side of the model takes them, shape (states, cells)."""
@@ -226,8 +209,3 @@ class Kernel:
     def filling(self) -> tuple[Cached, ...]:
         """The compiled functions that `images` calls."""
         return ()
-
-
-@inline
-def _as_it_is(group: Any, lane: int, y: Any, p: Any, spin: Any) -> Any:  # noqa: ARG001
-    return spin

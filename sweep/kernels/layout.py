@@ -59,6 +59,6 @@ class Table:
         columns: Array = self.images[:, [self.layout.index(name) for name in names]]
         return columns
 
-    def set_columns(self, names: Iterable[str], values: Array) -> None:
-        """Set several quantities to `values`, of shape (cells, names)."""
+    def set_columns(self, names: Iterable[str], values: Array | float) -> None:
+        """Set several quantities to `values`, of shape (cells, names) or one number for all."""
         self.images[:, [self.layout.index(name) for name in names]] = values

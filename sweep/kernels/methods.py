@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from sweep.kernels import measures, runge_kutta
-from sweep.kernels.adams import method as adams
+from sweep.kernels.adams import kernel as adams
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.measures.misfit import Film
 from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method

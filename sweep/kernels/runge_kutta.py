@@ -7,7 +7,7 @@ states, as plain assignments, which the compiler keeps in registers.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels import tangent
-from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.codegen import call_all, compile_inline, make_load, make_store, tuple_of
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, steps_to
 from sweep.kernels.layout import BLOCK, LANES
@@ -66,7 +66,7 @@ class RungeKuttaKernel(Kernel):
         load_constants = make_load(self.constants, layout, model.constants)
         store_states = make_store(model.states, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), self._make_watch()
-        note = self._make_note()
+        note = call_all("note", "group, number", self._hooks("make_note"))
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         block, lanes, wide = BLOCK, LANES, full_width()
 
@@ -104,21 +104,21 @@ def make_step(tableau: Tableau, rhs: Any, n_states: int) -> Any:
 
 def step_source(tableau: Tableau, n_states: int) -> str:
     """The Python source of a step."""
-    last = tableau.stages - 1
     lines = ["def step(y, p, h):", "    k0, m0 = rhs(y, p)"]
     for stage, row in enumerate(tableau.a, start=1):
         weights = {j: f"h{stage}_{j}" for j, w in enumerate(row) if w}
         lines += [f"    {name} = h * {float(row[j])!r}" for j, name in weights.items()]
-        sums = [_sum(f"{name} * k{j}[{i}]" for j, name in weights.items()) for i in range(n_states)]
+        sums = [" + ".join(f"{name} * k{j}[{i}]" for j, name in weights.items()) for i in range(n_states)]
         lines.append(f"    k{stage}, m{stage} = rhs({tuple_of(f'y[{i}] + ({sums[i]})' for i in range(n_states))}, p)")
     b = {j: repr(float(w)) for j, w in enumerate(tableau.b) if w}
-    stages = range(last + 1)
-    sums = [_sum(f"{w} * k{j}[{i}]" for j, w in b.items()) for i in range(n_states)]
+    stages = range(tableau.stages)
+    power = " + ".join(f"{w} * m{j}[1]" for j, w in b.items())
+    sums = [" + ".join(f"{w} * k{j}[{i}]" for j, w in b.items()) for i in range(n_states)]
     result = tuple_of(f"y[{i}] + h * ({sums[i]})" for i in range(n_states))
     return "\n".join(
         [
             *lines,
-            f"    work = h * ({_sum(f'{w} * m{j}[1]' for j, w in b.items())})",
+            f"    work = h * ({power})",
             f"    sound = {' & '.join(f'(m{j}[2] > 0.0) & (m{j}[3] > 0.0)' for j in stages)}",
             f"    airborne = {' | '.join(f'(m{j}[2] <= 0.0)' for j in stages)}",
             f"    jammed = {' | '.join(f'(m{j}[3] <= 0.0)' for j in stages)}",
@@ -127,23 +127,20 @@ def step_source(tableau: Tableau, n_states: int) -> str:
     )
 
 
-def _sum(terms: Iterable[str]) -> str:
-    return " + ".join(terms)
-
-
 _STABILITY_SHARE = 0.9
 """Share of the stability interval that an automatic step uses for the fastest decay."""
 
 
 def method(tableau: Tableau) -> Method:
     """The record of the method of a tableau."""
+    longest = _STABILITY_SHARE * tableau.real_stability
     return Method(
         name=tableau.name,
         code=tableau.code,
         summary=tableau.summary,
         kernel=lambda model, measurements, tolerance: RungeKuttaKernel(model, tableau, measurements),  # noqa: ARG005
         accurate_step=partial(_accurate_step, tableau),
-        stable_step=partial(_stable_step, tableau),
+        stable_step=lambda model, columns: np.asarray(longest / model.fastest_decay(columns)),
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",
         step_cost=tableau.stages / DOPRI5.stages,
         error_order=tableau.order,
@@ -163,7 +160,3 @@ def _accurate_step(tableau: Tableau, model: Model, columns: Columns, motion: Arr
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         moved = tableau.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
         return np.asarray(np.fmin(step, LAYER_STEP / decay * (tolerance / moved) ** power))
-
-
-def _stable_step(tableau: Tableau, model: Model, columns: Columns) -> Array:
-    return np.asarray(_STABILITY_SHARE * tableau.real_stability / model.fastest_decay(columns))

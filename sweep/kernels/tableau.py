@@ -1,30 +1,21 @@
-"""Explicit Runge-Kutta methods as data: Butcher tableaus, which check themselves when they are made.
+"""Explicit Runge-Kutta methods as data: Butcher tableaus.
 
 A record says what the kernel and the choice of the step need.  To add a method, write its record and enter it in
-`TABLEAUS`.
+`TABLEAUS`; `tests/kernels/test_tableau.py` then checks it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction as F
-from math import prod
 
 
 @dataclass(frozen=True)
 class Tableau:
     """The Butcher tableau of an explicit Runge-Kutta method for autonomous systems, and how long its steps may be.
 
-    `a[i]` holds the weights of the slopes 0 … i in the argument of slope i + 1, `b` those in the
-    result, and `c` the abscissae.  They are exact fractions, so that a mistyped entry is found at once.
-
-    Raises
-    ------
-    ValueError
-        if the lengths do not match, a row sum differs from its abscissa, an order condition up to `order`
-        (Butcher 2016, section 31: one for each rooted tree) is not met exactly, or `real_stability` is not the end
-        of the real stability interval.
+    `a[i]` holds the weights of the slopes 0 … i in the argument of slope i + 1, `b` those in the result, and `c` the
+    abscissae.  They are exact fractions, so that the tests find a mistyped entry.
     """
 
     name: str
@@ -46,64 +37,9 @@ class Tableau:
     """Error constant of the start: the share of the slip's change that steps of `LAYER_STEP` decay times get wrong
     while the slip, at first zero, comes to the value that the slow motion asks for.  It falls with the same power."""
 
-    def __post_init__(self) -> None:
-        if not len(self.a) + 1 == len(self.b) == len(self.c):
-            raise ValueError(f"{self.name}: rows, weights and abscissae do not match")
-        for row, node in zip(self.a, self.c[1:], strict=True):
-            if sum(row) != node:
-                raise ValueError(f"{self.name}: row {row} does not sum to its abscissa {node}")
-        for tree in (each for order in range(1, self.order + 1) for each in trees(order)):
-            weights = zip(self.b, self._weights(tree), strict=True)
-            if sum((b * weight for b, weight in weights), F(0)) != F(1, _density(tree)):
-                raise ValueError(f"{self.name}: the order condition of the tree {tree} = 1/{_density(tree)} fails")
-        inside, outside = (abs(self.stability(-self.real_stability * s)) for s in (0.999, 1.001))
-        if not inside < 1 < outside:
-            raise ValueError(f"{self.name}: {self.real_stability} does not bound the real stability interval")
-
     @property
     def stages(self) -> int:
         return len(self.b)
-
-    def stability(self, z: complex) -> complex:
-        """The stability function R(z): one step of y' = λ y multiplies y by R(hλ)."""
-        slopes: list[complex] = [1]
-        for row in self.a:
-            slopes.append(1 + z * sum(float(w) * k for w, k in zip(row, slopes, strict=True)))
-        return 1 + z * sum(float(w) * k for w, k in zip(self.b, slopes, strict=True))
-
-    def _weights(self, tree: Tree) -> list[F]:
-        """The elementary weights of a rooted tree, one for each stage."""
-        product = [F(1)] * self.stages
-        for branch in tree:
-            inner = self._weights(branch)
-            sums = [sum((w * x for w, x in zip(row, inner, strict=False)), F(0)) for row in ((), *self.a)]
-            product = [x * y for x, y in zip(product, sums, strict=True)]
-        return product
-
-
-Tree = tuple["Tree", ...]
-"""A rooted tree: the trees that its root carries, in order."""
-
-
-def trees(order: int) -> set[Tree]:
-    """All rooted trees of so many nodes."""
-    return {grown for tree in trees(order - 1) for grown in _grown(tree)} if order > 1 else {()}
-
-
-def _grown(tree: Tree) -> Iterator[Tree]:
-    """All trees that one more leaf makes of a tree."""
-    yield tuple(sorted((*tree, ())))
-    for i, branch in enumerate(tree):
-        for grown in _grown(branch):
-            yield tuple(sorted((*tree[:i], grown, *tree[i + 1 :])))
-
-
-def _nodes(tree: Tree) -> int:
-    return 1 + sum(map(_nodes, tree))
-
-
-def _density(tree: Tree) -> int:
-    return _nodes(tree) * prod(map(_density, tree))
 
 
 LAYER_STEP = 3.0

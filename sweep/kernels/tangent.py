@@ -29,23 +29,18 @@ _DONE = "tangent_done"
 
 def quantities(model: Model) -> tuple[str, ...]:
     """Names of the quantities that a tangent adds to an image."""
-    return (*_foot(model), *_direction(model), _DONE, GROWTH)
+    return (*_places(model), _DONE, GROWTH)
 
 
 def start(model: Model, states: Array) -> dict[str, Array | float]:
     """Values of the quantities that do not start at zero; `states` of shape (states, cells)."""
-    foot, direction = _foot(model), _direction(model)
-    return {**dict(zip(foot, states, strict=True)), **dict.fromkeys(direction, len(states) ** -0.5)}
+    values = (*states, *[len(states) ** -0.5] * len(states))
+    return dict(zip(_places(model), values, strict=True))
 
 
-def _foot(model: Model) -> tuple[str, ...]:
-    """Names of the point at which the tangent has arrived."""
-    return tuple(f"foot.{name}" for name in model.states)
-
-
-def _direction(model: Model) -> tuple[str, ...]:
-    """Names of the tangent's components."""
-    return tuple(f"tangent.{name}" for name in model.states)
+def _places(model: Model) -> tuple[str, ...]:
+    """Names of the point at which the tangent has arrived, and of the tangent's components."""
+    return tuple(f"{what}.{name}" for what in ("foot", "tangent") for name in model.states)
 
 
 def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Layout) -> Any:
@@ -56,7 +51,7 @@ def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Lay
     step : of the equations and their derivative, as made by `sweep.kernels.runge_kutta.make_step`
     constants : names of the constants in the image
     """
-    n, names = len(model.states), (*_foot(model), *_direction(model))
+    n, names = len(model.states), _places(model)
     own, load, store = make_load(model.states, layout), make_load(names, layout), make_store(names, layout)
     load_constants = make_load(constants, layout, model.constants)
     squares = " + ".join(f"z[{i}] * z[{i}]" for i in range(n, 2 * n))

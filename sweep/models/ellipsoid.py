@@ -75,11 +75,12 @@ def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
 
 
 @inline
-def energy(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, v1: Any, v2: Any, p: Any) -> Any:
+def energy(y: Any, p: Any) -> Any:
     """(spin n, energy of the rattle, I3), where the energy above rest is the energy of the rattle + I3 n²/2.
 
-    `p` holds A11 … A33 and the inverse moments of inertia, inv_I1 … inv_I3.
+    `y` are the states of `slip`, and `p` holds A11 … A33 and the inverse moments of inertia, inv_I1 … inv_I3.
     """
+    u1, u2, w1, w2, w3, v1, v2 = y
     A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
     I1, I2, I3 = 1.0 / p.inv_I1, 1.0 / p.inv_I2, 1.0 / p.inv_I3
 

@@ -164,7 +164,7 @@ class Theory:
     """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none.  The
     spin is averaged over it before its changes of sign are counted."""
     upright: Callable[..., tuple[Any, ...]] = never_upright
-    """Inline, (spin) -> the states of steady upright spin without rattle.  A model that does not offer `LINEAR` may
+    """(spin) -> the states of steady upright spin without rattle.  A model that does not offer `LINEAR` may
     have `fastest_motion` instead."""
     fastest_motion: Callable[[Columns], Array] | None = None
     """(columns) -> bound on the rate of the fastest motion that steps have to follow, in sqrt(g/c), shape (cells,); by

@@ -5,7 +5,6 @@ import pytest
 
 from sweep.models import find
 from sweep.models.model import Columns
-from sweep.models.stiff import forms
 from sweep.models.stiff import general as stiff_general
 from sweep.models.theory import linear
 from sweep.models.theory.rocking import frequencies, implicit
@@ -38,7 +37,7 @@ def states(name: str = "") -> np.ndarray:
 def test_they_are_the_equations_of_the_full_model(name: str) -> None:
     sides = {"a": 0.005, "b": 0.22} if name.endswith("paraboloid") else {}
     model, body, y = find(name), bodies(name, **sides), states(name)
-    split = forms.of(model)
+    split = stiff_general.form_of(model)
     assert split is not None
     full, p = model.constants.of(body), split.model.constants.of(body)
     slopes, (_, power, R, denominator) = model.rhs(y, full)
@@ -63,7 +62,7 @@ def test_they_are_the_equations_of_the_full_model(name: str) -> None:
 def test_newton_leaves_little_of_the_residual(name: str) -> None:
     model, body, y = find(name), bodies(name, mu=500), states(name)
     y[5:] *= 0.01
-    split = forms.of(model)
+    split = stiff_general.form_of(model)
     assert split is not None
     full, p = model.constants.of(body), split.model.constants.of(body)
     z, gamma, v = np.array(split.momentum(y, p)), 0.01, y[5:]
@@ -81,7 +80,7 @@ def test_newton_leaves_little_of_the_residual(name: str) -> None:
 def test_rocking_and_the_matrix_of_the_corrector_against_derivatives(name: str) -> None:
     """At zero angular momentum about the vertical."""
     body = bodies(name) | ({} if name == "slip" else {"Ixz": np.zeros(COUNT), "Iyz": np.zeros(COUNT)})
-    split = forms.of(find(name))
+    split = stiff_general.form_of(find(name))
     assert split is not None
     p = split.model.constants.of(body)
     slopes = [split.slow(*(1e-30j * np.eye(7)[i][:, None] * np.ones(COUNT)), p)[0][:4] for i in range(4)]
@@ -94,7 +93,7 @@ def test_rocking_and_the_matrix_of_the_corrector_against_derivatives(name: str) 
 
 
 def test_products_of_inertia_with_the_vertical_are_allowed_for_in_the_frequencies() -> None:
-    skew, rolling, split = bodies(), find("noslip+solid"), forms.of(find("slip+viscous"))
+    skew, rolling, split = bodies(), find("noslip+solid"), stiff_general.form_of(find("slip+viscous"))
     assert split is not None
     fastest = np.abs(np.linalg.eigvals(linear.jacobian(rolling, rolling.constants.of(skew), np.zeros(COUNT))).imag)
     _, higher = frequencies(split.rocking(split.model.constants.of(skew)))
@@ -105,7 +104,7 @@ def test_the_ripple_is_that_of_the_full_model() -> None:
     """To first order in the rattle, which is all that it is good for."""
     for body in (bodies(Ixz=0.0, Iyz=0.0), bodies()):
         model, y = find("slip+viscous"), states()
-        split = forms.of(model)
+        split = stiff_general.form_of(model)
         assert split is not None
         y[[0, 1, 2, 3, 5, 6]] *= 1e-6
         full, p = model.constants.of(body), split.model.constants.of(body)

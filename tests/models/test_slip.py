@@ -56,7 +56,7 @@ def test_start_puts_the_contact_where_asked(x0: float, y0: float, n0: float, del
 
 
 def test_upright_spin_is_an_equilibrium() -> None:
-    slopes, (spin, dissipation, R, _) = slip.rhs(slip.upright(0.3), take(slip.Constants.of(columns()), 0))
+    slopes, (spin, dissipation, R, _) = slip.rhs(slip.MODEL.upright(0.3), take(slip.Constants.of(columns()), 0))
     assert not any(slopes)
     assert (spin, dissipation, R) == (0.3, 0, 1)
 

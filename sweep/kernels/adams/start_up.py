@@ -16,10 +16,12 @@ import numpy as np
 from sweep.jit import Cached, on_all_threads, serial
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
+    CORRECT,
     CORRECTOR_NODES,
     HISTORY,
     MATRIX,
     POINT,
+    PREDICT,
     PREDICTOR_NODES,
     SLIPS,
     SLOPES,
@@ -138,7 +140,7 @@ def _places(form: StiffForm) -> At:
     def at(name: str) -> str:
         if name in _POINTS:
             return f"points[{_POINTS[name]} + lane]"
-        if name.startswith(("gamma", "predict", "correct")):
+        if name in _weights():
             return f"({_weights()[name]!r} * h)"
         return f"group[{kept.at(name)} + lane]"
 
@@ -156,12 +158,8 @@ _POINTS = {
 @cache
 def _weights() -> dict[str, float]:
     """The plain weights, in steps; they take as long as the rest of this module to make."""
-    predict, correct = plain_weights(PREDICTOR_NODES), plain_weights(CORRECTOR_NODES)
-    return {
-        "gamma": BDF_GAMMA,
-        **{f"predict{j}": float(w) for j, w in enumerate(predict)},
-        **{f"correct{j}": float(w) for j, w in enumerate(correct)},
-    }
+    weights = (*plain_weights(PREDICTOR_NODES), *plain_weights(CORRECTOR_NODES), BDF_GAMMA)
+    return dict(zip((*PREDICT, *CORRECT, "gamma"), map(float, weights), strict=True))
 
 
 def _begin_step(form: StiffForm, at: At) -> list[str]:

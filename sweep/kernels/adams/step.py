@@ -18,6 +18,10 @@ HISTORY = 8
 PREDICTOR_NODES = tuple(-j for j in range(8))
 CORRECTOR_NODES = tuple(1 - j for j in range(9))
 
+PREDICT = tuple(f"predict{j}" for j in range(len(PREDICTOR_NODES)))
+CORRECT = tuple(f"correct{j}" for j in range(len(CORRECTOR_NODES)))
+"""The weights of the slopes at these nodes, in steps."""
+
 # BDF5, and its predictor, which extrapolates from five points; both are exact for polynomials of degree 4.
 BDF = (300 / 137, -300 / 137, 200 / 137, -75 / 137, 12 / 137)
 BDF_GAMMA = 60 / 137

@@ -151,7 +151,6 @@ class Measurement:
         `at_reversal` calls what all measurements do at a reversal (see `make_at_reversal`).  It is for the
         measurement that detects reversals.
         """
-        return None
 
     def make_at_reversal(self, layout: Layout) -> Any:
         """Inline (group, lane, reverses, count, crossing) -> None, called after every step.
@@ -159,11 +158,9 @@ class Measurement:
         `reverses` says whether a reversal was detected in this step; if not, no quantity may change.  `count` is the
         number of reversals so far, including this one, and `crossing` its time.
         """
-        return None
 
     def make_note(self, layout: Layout) -> Any:
         """Inline (group, number) -> None, called when all lanes have taken the step of this number in their block."""
-        return None
 
     def make_may_settle(self, layout: Layout) -> Any:
         """Inline (group, lane, spin, at_rest) -> bool: whether what is measured is final if the rattle only decays.
@@ -171,7 +168,6 @@ class Measurement:
         A trajectory settles only if this holds for all measurements.  `at_rest` says that spin and rattle are
         exactly zero.
         """
-        return None
 
     def make_look(self, layout: Layout) -> Any:
         """Inline (group, lane, running, ended, spin, rattle, J, total) -> None, called at every look.
@@ -183,11 +179,9 @@ class Measurement:
         J : moment of inertia of the spin
         total : energy above rest, rattle + J spin²/2
         """
-        return None
 
     def make_compare(self, layout: Layout) -> Any:
         """Inline (group, lane, shared) -> None, called after every look with the numbers `shared`."""
-        return None
 
     def skip(self, table: Table, stretch: Stretch) -> None:
         """Account, in `table`, for a stretch that its images have covered without steps: start-up or a leap.
@@ -204,6 +198,7 @@ class Measurement:
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
         """Values of the variables, by name, from the images of trajectories that ended at `times`, shape (cells,).
 
-        Each is of shape (cells,), or (cells, length) for a variable `along` a further dimension.
+        Each is of shape (cells,), or (cells, length) for a variable `along` a further dimension.  By default they are
+        the quantities of the same names.
         """
-        return {}
+        return {name: table[name] for name in self.variables if name in self.quantities}

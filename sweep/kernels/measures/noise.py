@@ -117,9 +117,6 @@ class NoiseLimited(Measurement):
     def mode_lost(self, table: Table, images: Array) -> None:
         table["noise_limited"] = np.where(images, 1.0, table["noise_limited"])
 
-    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        return {"noise_limited": table["noise_limited"]}
-
 
 def growth_coefficients(columns: Columns) -> Array:
     """Coefficients c_i of Re λ(n) = Σ c_i n^i for the slower and the faster mode, shape (2, nodes, cells).

@@ -37,6 +37,3 @@ class RawReversals(Measurement):
     def skip(self, table: Table, stretch: Stretch) -> None:
         table["raw_reversals"] += stretch.spin * table["earlier_spin"] < 0
         table["earlier_spin"] = stretch.spin
-
-    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        return {"raw_reversals": table["raw_reversals"]}

@@ -164,10 +164,6 @@ def _coulomb(regularisation: str, resistance: Callable[..., Any], steepest: floa
     )  # fmt: skip
 
 
-def _below_both_speeds(columns: Columns) -> Array:
-    return np.asarray(_LINEAR * np.minimum(columns["speed"], columns["speed_stick"]))
-
-
 LAWS: dict[str, Law] = {
     law.name: law
     for law in (
@@ -179,7 +175,8 @@ LAWS: dict[str, Law] = {
         Law(
             "stribeck", ("mu", "mu_static", "speed", "speed_stick", "mu_viscous"), _stribeck,
             lambda columns: columns["mu_static"] / columns["speed_stick"] + columns["mu_viscous"],
-            linear_to=_below_both_speeds, pure=frozenset({"mu"}),
+            linear_to=lambda columns: np.asarray(_LINEAR * np.minimum(columns["speed"], columns["speed_stick"])),
+            pure=frozenset({"mu"}),
         ),
         Law(
             "contensou", ("mu", "radius_contact", "speed"), _sqrt, lambda columns: columns["mu"] / columns["speed"],

@@ -43,19 +43,12 @@ import numpy as np
 
 from sweep.models.general import rigid_body, starts
 from sweep.models.general.surfaces import ELLIPSOID, Surface
-from sweep.models.model import Array, Columns
+from sweep.models.model import Array, Columns, zeros
 from sweep.models.theory.ripple import matrix
 from sweep.models.theory.rocking import frequencies
 
 PREDICTED, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL, NOT_KNOWN = range(6)
-REASONS = {
-    PREDICTED: "predicted",
-    NO_COUPLING: "no_coupling",
-    NO_SPIN: "no_spin",
-    NO_RATTLE: "no_rattle",
-    NO_REVERSAL: "no_reversal",
-    NOT_KNOWN: "not_known",
-}
+REASONS = dict(enumerate(("predicted", "no_coupling", "no_spin", "no_rattle", "no_reversal", "not_known")))
 """Whether there is a time, and why not: nothing couples spin and rattle; there is no spin to reverse; the mode that
 would grow has no energy; friction stops the reversal; or body or friction have what the formula does not know."""
 
@@ -115,8 +108,5 @@ def first_reversal(columns: Columns, n_c: tuple[Array, Array], surface: Surface 
 
 def _unknown(columns: Columns) -> Array:
     """Where a couple resists the motion, or upright spin is no steady motion, shape (cells,)."""
-    names = ("sigma", "mu_rolling", "mu_spinning", "Ixz", "Iyz")
-    found = np.zeros(len(columns["a"]), bool)
-    for name in names:
-        found |= columns.get(name, 0) != 0
-    return found
+    named = [columns[name] for name in ("sigma", "mu_rolling", "mu_spinning", "Ixz", "Iyz") if name in columns]
+    return np.asarray(np.any([zeros(columns), *named], axis=0))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.ellipsoid import split_energy
+from sweep.models import ellipsoid
 from sweep.models.general.surfaces import ELLIPSOID, Surface, offset
 from sweep.models.model import Array, Columns
 from sweep.models.theory.rocking import Rocking, longer_period
@@ -53,8 +53,7 @@ def inertia(columns: Columns) -> tuple[Array, ...]:
     if MOMENTS[0] in columns:
         given = (columns.get(name, nothing) for name in (*MOMENTS, *PRODUCTS))
         return tuple(element / mass(columns) for element in given)
-    a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
-    J1, J2, J3 = (b2 + c2) / 5, (a2 + c2) / 5, (a2 + b2) / 5
+    J1, J2, J3 = ellipsoid.inertia(columns)
     cos, sin = np.cos(columns["delta"]), np.sin(columns["delta"])
     return J1 * cos**2 + J2 * sin**2, J1 * sin**2 + J2 * cos**2, J3, (J1 - J2) * sin * cos, nothing, nothing
 
@@ -151,7 +150,7 @@ def energy_on(surface: Surface) -> Any:
         u1, u2, w1, w2, w3, v1, v2 = y
         (u3, _), x_p, _, _ = contact(u1, u2, w1, w2, w3, p)
         height = p.g * elevation(u1, u2, u3, p)
-        n, rattle = split_energy((u1, u2, u3), (w1, w2, w3), (v1, v2), x_p, (p.J11, p.J22, p.J33), height)
+        n, rattle = ellipsoid.split_energy((u1, u2, u3), (w1, w2, w3), (v1, v2), x_p, (p.J11, p.J22, p.J33), height)
         return n, rattle + (p.J12 * w1 * w2 + p.J13 * w1 * w3 + p.J23 * w2 * w3), p.J33
 
     return energy

@@ -72,11 +72,6 @@ def offset(columns: Columns) -> Array:
     return columns["offset"] if "offset" in columns else np.zeros_like(columns["a"])
 
 
-def _semi_axes(columns: Columns) -> tuple[Array, ...]:
-    a, b, c = columns["a"], columns["b"], columns["c"]
-    return a**2, b**2, c**2, offset(columns)
-
-
 def _ellipsoid_excess(columns: Columns) -> tuple[Array, Array]:
     a, b, c = columns["a"], columns["b"], columns["c"]
     return (a**2 - c**2) / c, (b**2 - c**2) / c
@@ -156,7 +151,7 @@ def _paraboloid_normal(columns: Columns, x: Array, y: Array) -> tuple[Array, Arr
 ELLIPSOID = Surface(
     name="ellipsoid",
     constants=("a2", "b2", "c2", "offset"),
-    of=_semi_axes,
+    of=lambda columns: (*(columns[axis] ** 2 for axis in "abc"), offset(columns)),
     excess=_ellipsoid_excess,
     contact=contact,
     elevation=_ellipsoid_elevation,

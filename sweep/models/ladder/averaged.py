@@ -12,7 +12,8 @@ N² + A² + B², with N = sqrt(I3) n, and A^γ B, with γ = k4/k1, are conserved
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -22,14 +23,8 @@ from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.rocking import slower_period
 
 
-class Constants(NamedTuple):
+class Constants(namedtuple("Constants", "half_k1 half_k4 half_m1 half_m4 I3")):
     """Half of k1, k4, m1 and m4, and I3: for the body scaled to c = 1, but with time as in the states."""
-
-    half_k1: Any
-    half_k4: Any
-    half_m1: Any
-    half_m4: Any
-    I3: Any
 
     @classmethod
     def of(cls, columns: Columns) -> Constants:
@@ -42,11 +37,6 @@ def start(columns: Columns) -> tuple[Array, ...]:
     k = coefficients(columns)
     X, Y = normal_coordinates(columns)
     return np.sqrt(k.nu1**2 + 1) * X, np.sqrt(k.nu2**2 + 1) * Y, columns["n0"]
-
-
-@inline
-def upright(n: Any) -> Any:
-    return (0.0, 0.0, n)
 
 
 @inline
@@ -64,10 +54,6 @@ def energy(y: Any, p: Any) -> Any:
     return n, 0.5 * (A * A + B * B), p.I3
 
 
-def observe(y: Array, p: Constants) -> dict[str, Array]:  # noqa: ARG001
-    return {"amplitude_1": y[0], "amplitude_2": y[1]}
-
-
 MODEL = Model(
     name="averaged",
     summary="slow amplitudes of the two rattles and the spin (Takano 2011, ndotab, abdot)",
@@ -79,8 +65,8 @@ MODEL = Model(
     constants=Constants,
     start=start,
     slower_period=slower_period,
-    upright=upright,
+    upright=lambda spin: (0.0, 0.0, spin),
     rhs=rhs,
     energy=energy,
-    observe=observe,
+    observe=lambda y, p: {"amplitude_1": y[0], "amplitude_2": y[1]},  # noqa: ARG005
 )

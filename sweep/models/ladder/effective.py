@@ -10,40 +10,25 @@ above them lacks its friction terms: it has to be N = [[1/(J2 μ), -n], [n, 1/(J
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.model import COUNT, FORMULAS, LINEAR, SPIN, Array, Columns, Model, Ripple
+from sweep.models.model import COUNT, FORMULAS, LINEAR, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.ripple import FORM, ripple
 from sweep.models.theory.rocking import slower_period
 
+_CONSTANTS = "rate1_squared rate2_squared k1 k2 k3 k4 m1 m2 m3 m4 nu1_squared nu2_squared root_J slip gravity I3"
 
-class Constants(NamedTuple):
-    """The paper's coefficients, for the body scaled to c = 1, but with time as in the states."""
 
-    rate1_squared: Any
-    """ν1²/c, the square of the frequency with time as in the states."""
-    rate2_squared: Any
-    k1: Any
-    k2: Any
-    k3: Any
-    k4: Any
-    m1: Any
-    m2: Any
-    m3: Any
-    m4: Any
-    nu1_squared: Any
-    nu2_squared: Any
-    root_J: Any
-    """sqrt(J1 J2)."""
-    slip: Any
-    """1/μ."""
-    gravity: Any
-    """1/c: gravity with lengths in units of c and time as in the states."""
-    I3: Any
+class Constants(named(*_CONSTANTS.split())):  # type: ignore[misc]
+    """The paper's coefficients, for the body scaled to c = 1, but with time as in the states.
+
+    `rate1_squared` is ν1²/c, the square of the frequency with time as in the states; `root_J` is sqrt(J1 J2), `slip` is
+    1/μ, and `gravity` is 1/c, with lengths in units of c and time as in the states.
+    """
 
     @classmethod
     def of(cls, columns: Columns) -> Constants:
@@ -61,11 +46,6 @@ def start(columns: Columns) -> tuple[Array, ...]:
     X, Y = normal_coordinates(columns)
     rest = np.zeros_like(X)
     return X, Y, rest, rest, columns["n0"]
-
-
-@inline
-def upright(n: Any) -> Any:
-    return (0.0, 0.0, 0.0, 0.0, n)
 
 
 @inline
@@ -110,10 +90,6 @@ def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
     return ripple(X, Y, dX, dY, k)
 
 
-def observe(y: Array, p: Constants) -> dict[str, Array]:  # noqa: ARG001
-    return {"mode_1": y[0], "mode_2": y[1]}
-
-
 MODEL = Model(
     name="effective",
     summary="two coupled oscillators and the spin, slip eliminated (Takano 2011, eqx, eqy, eqn)",
@@ -125,9 +101,9 @@ MODEL = Model(
     constants=Constants,
     start=start,
     slower_period=slower_period,
-    upright=upright,
+    upright=lambda spin: (0.0, 0.0, 0.0, 0.0, spin),
     rhs=rhs,
     energy=energy,
     ripple=Ripple(FORM, ripple_coefficients, _ripple),
-    observe=observe,
+    observe=lambda y, p: {"mode_1": y[0], "mode_2": y[1]},  # noqa: ARG005
 )

@@ -10,8 +10,9 @@ a 3 × 3 system whose matrix is diagonal plus rank one, which the Sherman-Morris
 
 from __future__ import annotations
 
+from collections import namedtuple
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from sweep.jit import inline
 from sweep.models import attitude, ellipsoid
@@ -21,25 +22,12 @@ from sweep.models.theory.ripple import FORM, form, ripple
 from sweep.models.theory.rocking import slower_period
 
 
-class Constants(NamedTuple):
+class Constants(namedtuple("Constants", "A11 A12 A22 A33 inv_I1 inv_I2 inv_I3")):
     """Shape and inverse moments of inertia."""
-
-    A11: Any
-    A12: Any
-    A22: Any
-    A33: Any
-    inv_I1: Any
-    inv_I2: Any
-    inv_I3: Any
 
     @classmethod
     def of(cls, columns: Columns) -> Constants:
         return cls(*ellipsoid.shape(columns), *(1 / moment for moment in ellipsoid.inertia(columns)))
-
-
-@inline
-def upright(n: Any) -> Any:
-    return (0.0, 0.0, 0.0, 0.0, -n)
 
 
 @inline
@@ -72,7 +60,7 @@ def rhs(y: Any, p: Any) -> Any:
 @inline
 def energy(y: Any, p: Any) -> Any:
     u1, u2, w1, w2, w3 = y
-    return ellipsoid.energy(u1, u2, w1, w2, w3, 0.0, 0.0, p)
+    return ellipsoid.energy((u1, u2, w1, w2, w3, 0.0, 0.0), p)
 
 
 def ripple_coefficients(columns: Columns) -> tuple[Array, ...]:
@@ -106,7 +94,7 @@ MODEL = Model(
     constants=Constants,
     start=ellipsoid.start,
     slower_period=slower_period,
-    upright=upright,
+    upright=lambda spin: (0.0, 0.0, 0.0, 0.0, -spin),
     rhs=rhs,
     energy=energy,
     tilt=ellipsoid.tilt,

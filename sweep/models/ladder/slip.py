@@ -14,7 +14,8 @@ q = u × x_p is computed only once: (x_p × α) · u = q · α.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -26,21 +27,11 @@ from sweep.models.theory.ripple import FORM, form, ripple
 from sweep.models.theory.rocking import Body, frequencies, rocking, slower_period
 
 
-class Constants(NamedTuple):
-    """Shape, inverse moments of inertia, the ratios in Euler's equations, and μ of the friction."""
+class Constants(namedtuple("Constants", "A11 A12 A22 A33 inv_I1 inv_I2 inv_I3 ratio1 ratio2 ratio3 mu")):
+    """Shape, inverse moments of inertia, the ratios in Euler's equations, and μ of the friction.
 
-    A11: Any
-    A12: Any
-    A22: Any
-    A33: Any
-    inv_I1: Any
-    inv_I2: Any
-    inv_I3: Any
-    ratio1: Any
-    """(I2 - I3) / I1; the others follow by cyclic permutation."""
-    ratio2: Any
-    ratio3: Any
-    mu: Any
+    `ratio1` is (I2 - I3) / I1; the others follow by cyclic permutation.
+    """
 
     @classmethod
     def of(cls, columns: Columns) -> Constants:
@@ -49,16 +40,14 @@ class Constants(NamedTuple):
         return cls(*ellipsoid.shape(columns), 1 / I1, 1 / I2, 1 / I3, *ratios, columns["mu"])
 
 
+energy = ellipsoid.energy
+
+
 def start(columns: Columns) -> tuple[Array, ...]:
     """As that of the body, and v_p = 0."""
     states = ellipsoid.start(columns)
     rest = np.zeros_like(states[0])
     return *states, rest, rest
-
-
-@inline
-def upright(n: Any) -> Any:
-    return (0.0, 0.0, 0.0, 0.0, -n, 0.0, 0.0)
 
 
 @inline
@@ -105,12 +94,6 @@ def motion(y: Any, u3: Any, v3: Any, x_p: Any, du: Any, dx: Any, g: Any, alpha: 
     dv1 = R * g1 - gravity * u1 - (y_ * dw3 - z * dw2) - (w2 * s3 - w3 * s2)
     dv2 = R * g2 - gravity * u2 - (z * dw1 - x * dw3) - (w3 * s1 - w1 * s3)
     return (du1, du2, dw1, dw2, dw3, dv1, dv2), u1 * w1 + u2 * w2 + u3 * w3, R, denominator
-
-
-@inline
-def energy(y: Any, p: Any) -> Any:
-    u1, u2, w1, w2, w3, v1, v2 = y
-    return ellipsoid.energy(u1, u2, w1, w2, w3, v1, v2, p)
 
 
 def ripple_coefficients(columns: Columns) -> tuple[Array, ...]:
@@ -211,7 +194,7 @@ MODEL = Model(
     start=start,
     slower_period=slower_period,
     fastest_decay=fastest_decay,
-    upright=upright,
+    upright=lambda spin: (0.0, 0.0, 0.0, 0.0, -spin, 0.0, 0.0),
     rhs=rhs,
     energy=energy,
     ripple=Ripple((*FORM, "J1", "J2", "c"), ripple_coefficients, _ripple),

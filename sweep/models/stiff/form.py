@@ -6,9 +6,10 @@ it, so neither friction nor the normal force appears in u' and M'.  See `sweep.m
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,34 +19,12 @@ from sweep.models.model import Array, Columns, Model, Ripple
 STATES = ("u1", "u2", "M1", "M2", "M3", "v1", "v2")
 
 
-class Geometry(NamedTuple):
-    """What `slow` computes on its way and `newton` needs as well; components along the body axes."""
+Geometry = namedtuple("Geometry", "u3 x y z t1 t2 v3 w1 w2 w3 du1 du2 du3 s1 s2 s3 q1 q2 q3")
+"""What `slow` computes on its way and `newton` needs as well; components along the body axes.
 
-    u3: Any
-    x: Any
-    """Contact point x_p."""
-    y: Any
-    z: Any
-    t1: Any
-    """u1/u3; t2 is u2/u3, so that v3 = -(t1 v1 + t2 v2)."""
-    t2: Any
-    v3: Any
-    w1: Any
-    """ω."""
-    w2: Any
-    w3: Any
-    du1: Any
-    """u'."""
-    du2: Any
-    du3: Any
-    s1: Any
-    """s = v_0 - x_p'."""
-    s2: Any
-    s3: Any
-    q1: Any
-    """u × x_p."""
-    q2: Any
-    q3: Any
+They are of u; the contact point x_p = (x, y, z); t = u/u3, so that v3 = -(t1 v1 + t2 v2); v_p; ω; u'; s = v_0 - x_p';
+and q = u × x_p.
+"""
 
 
 @dataclass(frozen=True)

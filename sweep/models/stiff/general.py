@@ -26,8 +26,10 @@ from sweep.models.general.couples import Couple, damping_of
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.rigid_body import about_centre, about_contact, gyroscopic
 from sweep.models.general.surfaces import Surface
+from sweep.models.ladder import slip
 from sweep.models.model import Array, Columns, Model, named
 from sweep.models.stiff.form import StiffForm, in_momentum, newton_step, slopes
+from sweep.models.stiff.slip import PAPER_FORM
 from sweep.models.theory.ripple import ripple as rippling
 from sweep.models.theory.rocking import Rocking
 
@@ -36,12 +38,16 @@ ROCKING = ("B11", "B12", "B21", "B22", "C12", "C21")
 
 
 def form_of(model: Model) -> StiffForm | None:
-    """The stiff form of a variant with slip; None for other models, and for those that have none.
+    """The stiff form of the paper's slip model or of a variant with slip; None for all others, and for a user's.
 
     The law has to be viscous.  A step that may be long compared with the decay of the slip is of use only where the
     slip remains at the value that follows from the slow motion.  With the other laws slip sets in and ends within times
     that dopri5's steps are short enough for.
     """
+    if model.origin:
+        return None
+    if model.name == slip.MODEL.name:
+        return PAPER_FORM
     base, law, couples, surface = variants.parts(model.name)
     if (base, law) != ("slip", "viscous") or any(couple.needs_normal_force for couple in couples):
         return None

@@ -161,7 +161,7 @@ def _rocking(constants: Constants, spin: Array) -> tuple[Array, Array, Array]:
     order = falling[:, 1::-1]
     rates = np.take_along_axis(rates, order, axis=1)
     modes = np.take_along_axis(modes, order[:, None, :], axis=2).astype(complex)
-    to_momentum = linear.derivative(lambda y: momentum(y, constants), stack(slip.upright(spin)), RATTLE)
+    to_momentum = linear.derivative(lambda y: momentum(y, constants), stack(slip.MODEL.upright(spin)), RATTLE)
     return rates, to_momentum @ modes, np.asarray(gone & (rates.imag > 0).all(axis=1))
 
 

@@ -6,40 +6,19 @@ so that every coefficient is the paper's for a body of the same shape.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import namedtuple
 
 import numpy as np
 
 from sweep.models.model import Array, Columns
 
+Coefficients = namedtuple("Coefficients", "p q s I3 J1 J2 theta nu1 nu2 f k1 k2 k3 k4 m1 m2 m3 m4")
+"""The paper's symbols, each an array of shape (cells,), for bodies scaled to c = 1.
 
-@dataclass(frozen=True)
-class Coefficients:
-    """The paper's symbols, each an array of shape (cells,), for bodies scaled to c = 1.
-
-    The labels of the paper's equations are in parentheses: p, q, s (p, q, s); J1, J2 (j1j2); I3;
-    theta (tanth, exact); nu1 and nu2, the frequencies of the X and Y modes (nu1, nu2, but without the
-    paper's expansion in δ); f (f); k1 … k4 (k1 … k4, exact); m1 … m4 (m12, m34).
-    """
-
-    p: Array
-    q: Array
-    s: Array
-    I3: Array
-    J1: Array
-    J2: Array
-    theta: Array
-    nu1: Array
-    nu2: Array
-    f: Array
-    k1: Array
-    k2: Array
-    k3: Array
-    k4: Array
-    m1: Array
-    m2: Array
-    m3: Array
-    m4: Array
+The labels of the paper's equations are in parentheses: p, q, s (p, q, s); J1, J2 (j1j2); I3; theta (tanth, exact); nu1
+and nu2, the frequencies of the X and Y modes (nu1, nu2, but without the paper's expansion in δ); f (f); k1 … k4
+(k1 … k4, exact); m1 … m4 (m12, m34).
+"""
 
 
 def coefficients(columns: Columns) -> Coefficients:

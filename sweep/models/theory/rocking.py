@@ -11,7 +11,8 @@ which is 3.87.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -19,30 +20,12 @@ from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.model import Array, Columns
 
-
-class Rocking(NamedTuple):
-    """The elements of B and C."""
-
-    B11: Any
-    B12: Any
-    B21: Any
-    B22: Any
-    C11: Any
-    C12: Any
-    C21: Any
-    C22: Any
+Rocking = namedtuple("Rocking", "B11 B12 B21 B22 C11 C12 C21 C22")
+"""The elements of B and C."""
 
 
-class Body(NamedTuple):
+class Body(namedtuple("Body", "I1 I2 I3 A11 A12 A22 A33")):
     """What the rocking depends on, each of shape (cells,)."""
-
-    I1: Any
-    I2: Any
-    I3: Any
-    A11: Any
-    A12: Any
-    A22: Any
-    A33: Any
 
     @classmethod
     def of(cls, columns: Columns) -> Body:
