@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from sweep.cli.faults import refuse, say
+from sweep.faults import brief, suggestion
 from sweep.parameters import PARAMETERS, Parameter
 
 if TYPE_CHECKING:
-    from click.shell_completion import CompletionItem
-
     from sweep.config import Config
 
 PATH = click.Path(path_type=Path)
@@ -22,8 +22,6 @@ PATH = click.Path(path_type=Path)
 
 def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> list[CompletionItem]:
     """The keys of a configuration, or with `--at` the parameters, that go on from what was typed."""
-    from click.shell_completion import CompletionItem
-
     from sweep.config.schema import PATHS
 
     known = PATHS if parameter.name == "settings" else {p.name: p.long_name for p in PARAMETERS.values()}
@@ -58,7 +56,6 @@ def configured(command: Callable[..., None]) -> Callable[..., None]:
 def loaded(config: Path, settings: tuple[str, ...]) -> Config:
     from sweep.config import load_config
     from sweep.config.document import parse_value
-    from sweep.config.faults import brief
 
     parsed = {}
     for setting in settings:
@@ -76,8 +73,6 @@ def announce(words: str) -> None:
 
 def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:
     """The values of `--at` by parameter."""
-    from sweep.config.faults import brief, suggestion
-
     given: dict[str, list[float]] = {}
     for text in texts:
         name = text.partition("=")[0]
@@ -90,7 +85,6 @@ def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str
 
 def parse_pair(text: str, option: str) -> tuple[str, float]:
     from sweep.config.document import number
-    from sweep.config.faults import brief
 
     name, _, value = text.partition("=")
     if (parsed := number(value)) is None:
@@ -100,7 +94,6 @@ def parse_pair(text: str, option: str) -> tuple[str, float]:
 
 def parse_span(text: str, option: str) -> tuple[float, float]:
     from sweep.config.document import number
-    from sweep.config.faults import brief
 
     low, dots, high = text.partition("..")
     ends = number(low), number(high)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sweep import interrupt
-from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, resumable, say
+from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
 from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured
 from sweep.parameters import PARAMETERS
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
@@ -26,19 +26,8 @@ _TIMES = {"paper": "sqrt(c/g)", "SI": "s", "own": "of time"}
 """The unit in which a progress bar counts time, by the `units` of a configuration."""
 
 
-def _either(context: click.Context, parameter: click.Parameter, value: Any) -> Any:  # noqa: ARG001
-    """Refuse workers of two kinds."""
-    if value and any(context.params.get(name) for name in ("workers", "scheduler")):
-        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
-    return value
-
-
-WORKERS = click.option(
-    "--workers", type=click.IntRange(1, 4096), callback=_either, help="Run in this many processes of one thread each."
-)
-SCHEDULER = click.option(
-    "--scheduler", metavar="ADDRESS", callback=_either, help="Run on the workers of this dask scheduler."
-)
+WORKERS = click.option("--workers", type=click.IntRange(1, 4096), help="Run in this many processes of one thread each.")
+SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 
 
 def _parameter_help() -> str:
@@ -147,7 +136,6 @@ def animate(
     Several stand side by side, in one clock, above their spins.  A page (html) opens without network; an mp4 needs
     ffmpeg.
     """
-    from sweep.config import ConfigError
     from sweep.plots import animation
 
     target = output or Path("runs") / config.name / f"{config.name}_trajectory.gif"
@@ -157,8 +145,6 @@ def animate(
         target.parent.mkdir(parents=True, exist_ok=True)
         animation.animate(result, target, begin=begin, end=end, speed=speed)
     except ValueError as error:
-        if isinstance(error, ConfigError):
-            raise
         refuse("animate", str(error))
     if not quiet:
         say(f"wrote {target}")
@@ -286,6 +272,8 @@ def _written(
     dry_run: bool, output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
 ) -> xr.Dataset | None:  # fmt: skip
     """Carry out `work`, show its progress, and say what it found and wrote; of a dry run, only the estimate."""
+    if workers and scheduler:
+        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
     if dry_run:
         click.echo(estimate())
         return None
@@ -296,12 +284,15 @@ def _written(
     folder, name = output or Path("runs") / config.name, config.name if verb == "run" else f"{config.name}_{verb}"
     before = _stamps(folder, name)
     interrupt.raise_again()
-    with (
-        Terminal(quiet) as terminal,
-        resumable(terminal, "run" if verb == "run" else "search"),
-        connected(workers, scheduler) as cluster,
-    ):
-        result = work(output=folder, reporter=terminal, cluster=cluster)
+    with Terminal(quiet) as terminal:
+        try:
+            with connected(workers, scheduler) as cluster:
+                result = work(output=folder, reporter=terminal, cluster=cluster)
+        except KeyboardInterrupt:
+            done = f"{terminal.last.done:.0f} of {terminal.last.cells} cells" if terminal.last else "no cells"
+            kept = f"the same command resumes the {'run' if verb == 'run' else 'search'}"
+            terminal.note(f"interrupted: {done} finished and kept; {kept}")
+            sys.exit(interrupt.INTERRUPTED)
     if not quiet:
         click.echo(describe(result))
         new = [suffix for suffix, stamp in _stamps(folder, name).items() if stamp != before.get(suffix)]

@@ -18,10 +18,10 @@ from sweep.config import cases, cross_checks, document, film, schema, user_model
 from sweep.config.configuration import FIRST_AXES, Config, model_of
 from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
-from sweep.config.faults import ConfigError, Fault
 from sweep.config.messages import describe
 from sweep.config.schema import Integrator
 from sweep.config.values import MAX_AXIS, Values
+from sweep.faults import ConfigError, Fault
 from sweep.grid import Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH

@@ -14,9 +14,9 @@ from ruamel.yaml.compat import StringIO
 
 from sweep.config.distributions import Distribution
 from sweep.config.document import Document
-from sweep.config.faults import Fault, Path
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
+from sweep.faults import Fault, Path
 from sweep.grid import CASE, SAMPLE
 from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.models import TIERS

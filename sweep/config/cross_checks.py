@@ -12,9 +12,9 @@ import numpy as np
 
 from sweep.config import bodies
 from sweep.config.configuration import Config
-from sweep.config.faults import Path, either
 from sweep.config.schema import MAX_CELLS_IN_MEMORY
 from sweep.config.values import Values
+from sweep.faults import Path, either
 from sweep.grid import BODY, Grid, distinct
 from sweep.kernels import measures, methods
 from sweep.kernels.differentiate import undifferentiable

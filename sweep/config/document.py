@@ -20,7 +20,7 @@ import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sweep.config.faults import ConfigError, Fault, Path, brief, fault_of
+from sweep.faults import ConfigError, Fault, Path, brief, fault_of
 from sweep.models.origin import Origin
 
 _NUMBER = r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"

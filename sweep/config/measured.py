@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pint
 
-from sweep.config.faults import either, fault_of, printable, refusal
+from sweep.faults import either, fault_of, printable, refusal
 from sweep.models.general import meshes, solids
 from sweep.parameters import DENSITY, PARAMETERS, SI, Parameter
 from sweep.variables import in_si

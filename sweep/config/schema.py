@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
 
-from sweep.config.faults import either, refusal
 from sweep.config.messages import Allowed, wrong
 from sweep.config.values import MAX_AXIS, Strict, Whole, parse_values, whole
+from sweep.faults import either, refusal
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.method import TOLERANCE

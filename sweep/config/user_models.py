@@ -12,7 +12,7 @@ import numpy as np
 
 from sweep.config.configuration import Config
 from sweep.config.document import Document
-from sweep.config.faults import ConfigError, Fault, brief, either
+from sweep.faults import ConfigError, Fault, brief, either
 from sweep.models import TIERS
 from sweep.models.origin import ModelError, Origin
 from sweep.models.user import loading, trial

@@ -21,10 +21,10 @@ import xarray as xr
 from scipy.stats import qmc
 
 from sweep.config import Config, ConfigError, Values
-from sweep.config.faults import brief, fault_of, suggestion
 from sweep.config.film import read
 from sweep.config.user_models import explained
 from sweep.engine.reporter import Reporter
+from sweep.faults import brief, fault_of, suggestion
 from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.kernels.measures.misfit import Film, Misfit

@@ -14,7 +14,6 @@ import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
 from sweep.config.bodies import misplaced, unfit
-from sweep.config.faults import suggestion
 from sweep.config.schema import FOREVER
 from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
@@ -26,6 +25,7 @@ from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.engine.work import Work
+from sweep.faults import suggestion
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import threads

@@ -1,4 +1,4 @@
-"""Faults of a configuration, each with the place where the user can correct it."""
+"""What the user can mend: faults of a configuration, each with the place where to correct it, and of files."""
 
 from __future__ import annotations
 
@@ -75,7 +75,11 @@ class Fault:
         return printable(": ".join(part for part in (place, spell(self.path), self.message) if part))
 
 
-class ConfigError(Exception):
+class Refused(Exception):
+    """What the user can mend, such as a configuration or a file that cannot be used; the text says how."""
+
+
+class ConfigError(Refused):
     """A configuration that cannot be run; `faults` has an entry for each thing to correct, in the order of lines."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
