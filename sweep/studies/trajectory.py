@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
-from sweep.config.bodies import misplaced, unfit
+from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.schema import FOREVER
 from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
