@@ -150,7 +150,5 @@ def sections(table: Mapping[str, Parameter]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(p.section for p in table.values() if p.section))
 
 
-SECTIONS: tuple[str, ...] = sections(PARAMETERS)
-
 START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")
 """Names of the parameters of the start, on which the critical spins and the form factor do not depend."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> li
 
 
 FILE = click.argument("file", type=PATH)
-SETTINGS = click.option(
+_SETTINGS = click.option(
     "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=begun,
     help="Replace a value of the configuration, e.g. friction.mu=60, or friction.mu=20..60:41 for the range "
     "START..STOP:NUM (repeatable).",
@@ -44,13 +44,13 @@ def report_folder(default: str) -> Callable[[Any], Any]:
 
 
 def configured(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the argument CONFIG to a command, which gets the configuration with the values of `SETTINGS`."""
+    """Add the argument CONFIG and the option `--set` to a command, which gets the configuration with these values."""
 
     @wraps(command)
     def call(config: Path, settings: tuple[str, ...], **options: Any) -> None:
         command(config=loaded(config, settings), **options)
 
-    return click.argument("config", type=PATH)(call)
+    return click.argument("config", type=PATH)(_SETTINGS(call))
 
 
 def loaded(config: Path, settings: tuple[str, ...]) -> Config:
@@ -66,9 +66,8 @@ def loaded(config: Path, settings: tuple[str, ...]) -> Config:
     return load_config(config, parsed, argument=lambda path: f"--set {path}", announce=announce)
 
 
-def announce(words: str) -> None:
-    """Said even with --quiet: code of a user never runs unseen."""
-    say(words, err=True)
+announce = partial(say, err=True)
+"""Said even with --quiet: code of a user never runs unseen."""
 
 
 def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:

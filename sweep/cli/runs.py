@@ -12,7 +12,7 @@ import click
 
 from sweep import interrupt
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
-from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured
+from sweep.cli.options import OUTPUT, PATH, QUIET, begun, cells_of, configured
 from sweep.parameters import PARAMETERS
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
@@ -51,7 +51,7 @@ FRESH = click.option("--fresh", is_flag=True, help="Discard what an earlier run 
 
 def _resumed(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of a command whose simulations are kept, resumed, and spread over processes."""
-    for option in (QUIET, SCHEDULER, WORKERS, FRESH, DRY_RUN, SETTINGS, OUTPUT):
+    for option in (QUIET, SCHEDULER, WORKERS, FRESH, DRY_RUN, OUTPUT):
         command = option(command)
     return command
 
@@ -91,7 +91,6 @@ def run(config: Config, rerun: str | None, fresh: bool, **how: Any) -> None:
 @click.option("--samples", type=click.IntRange(1), metavar="N",
               help="Follow N samples of the uncertain parameters, not their medians.")  # fmt: skip
 @OUTPUT
-@SETTINGS
 @DRY_RUN
 @QUIET
 def trajectory(
@@ -125,7 +124,6 @@ def trajectory(
 @click.option("--speed", type=click.FloatRange(0, min_open=True),
               help="Time shown in a second [default: such that the clip takes ten].")  # fmt: skip
 @click.option("--output", type=PATH, help="gif, mp4 or html to write [default: runs/NAME/NAME_trajectory.gif].")
-@SETTINGS
 @QUIET
 def animate(
     config: Config, cells: tuple[str, ...], begin: float, end: float | None, speed: float | None, output: Path | None,
@@ -217,7 +215,6 @@ def indices(config: Config, fresh: bool, **how: Any) -> None:
 @click.option("--free", required=True, metavar="NAME,NAME", help="The parameters to find, e.g. mu,sigma,n0,x0,y0.")
 @click.option("--laws", metavar="NAME,NAME", help="Laws of friction to fit and compare, e.g. viscous,coulomb.")
 @OUTPUT
-@SETTINGS
 @QUIET
 def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | None, quiet: bool) -> None:
     """Find the parameters of the body in CONFIG that reproduce FILM.

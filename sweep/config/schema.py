@@ -250,8 +250,6 @@ def schema_of(origin: Origin | None) -> Any:
     return create_model("Configuration", __base__=_Top, **_physical("", table), **found)
 
 
-Schema: Any = schema_of(None)
-
 SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fields.items() if name != "integrator"}
 for _name, _words in _WORDS.items():
     SETTINGS |= {f"{_name}.{name}": field for name, field in _words.model_fields.items()}
