@@ -36,15 +36,16 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     name = source.values.get("model")
     if not isinstance(name, str) or name in TIERS:
         return None
-    origin = source.model if source.model and source.model.name == name else None
+    origin: Origin | None = source.known.get(("model", name))
     if origin is None and not name.endswith(SUFFIX) and (origin := loading.entry_point(name)) is None:
         return None  # the schema refuses it
     if announce is None:
         words = "code of a user, which is not run for a configuration that comes from a dataset"
         raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; choose {either(TIERS)}")])
     if origin is None:
-        origin = of_file(source, name)
-    source.model = origin
+        path, text = source.read_beside("model", name)
+        origin = Origin.of_file(name, str(path), text)
+    source.known["model", name] = origin
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
         words = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
@@ -53,12 +54,6 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     with explained(origin):
         loading.load(origin)
     return origin
-
-
-def of_file(source: Document, name: str) -> Origin:
-    """The model in a file that a document names, whose code is not run; a `ConfigError` if it cannot be read."""
-    path, text = source.read_beside("model", name)
-    return Origin.of_file(name, str(path), text)
 
 
 @contextmanager
