@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Column
 
+from sweep import interrupt
 from sweep.engine.reporter import Progress as Done
 from sweep.engine.reporter import Reporter
 from sweep.jit import showing
@@ -58,6 +59,7 @@ class Terminal(Reporter):
         self._told = False
 
     def __enter__(self) -> Terminal:
+        interrupt.raise_again()
         self._open = ExitStack()
         self._open.enter_context(showing(self._compiling))
         return self

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sweep import interrupt
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
 from sweep.cli.options import OUTPUT, PATH, QUIET, begun, cells_of, configured
+from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
@@ -230,7 +230,6 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
     from sweep.studies.laws import compare
 
     names = [name.strip() for name in free.split(",")]
-    interrupt.raise_again()
     with Terminal(quiet) as terminal, of_option("--free", config.table):
         result = (
             compare(config, film, names, [name.strip() for name in laws.split(",")], terminal)
@@ -249,7 +248,6 @@ def _followed(config: Config, cells: tuple[str, ...], quiet: bool, **how: Any) -
     from sweep.progress import Terminal
     from sweep.studies.trajectory import trajectory
 
-    interrupt.raise_again()
     with Terminal(quiet, _TIMES[config.units]) as terminal, of_option("--at", config.table):
         return trajectory(config, reporter=terminal, **how, **at)
 
@@ -280,7 +278,6 @@ def _written(
 
     folder, name = output or Path("runs") / config.name, config.name if verb == "run" else f"{config.name}_{verb}"
     before = _stamps(folder, name)
-    interrupt.raise_again()
     with Terminal(quiet) as terminal:
         try:
             with connected(workers, scheduler) as cluster:
@@ -289,7 +286,7 @@ def _written(
             done = f"{terminal.last.done:.0f} of {terminal.last.cells} cells" if terminal.last else "no cells"
             kept = f"the same command resumes the {'run' if verb == 'run' else 'search'}"
             terminal.note(f"interrupted: {done} finished and kept; {kept}")
-            sys.exit(interrupt.INTERRUPTED)
+            sys.exit(INTERRUPTED)
     if not quiet:
         click.echo(describe(result))
         new = [suffix for suffix, stamp in _stamps(folder, name).items() if stamp != before.get(suffix)]
