@@ -48,17 +48,13 @@ _HOMES = {
 
 @contextmanager
 def _prepared(
-    config: ConfigLike,
-    overrides: Mapping[str, Any],
-    progress: bool | None,
-    reporter: Reporter | None,
-    unit: str = "cells",
+    config: ConfigLike, overrides: Mapping[str, Any], progress: bool | None, reporter: Reporter | None
 ) -> Iterator[tuple[Config, Reporter]]:
     """The checked configuration of a call, and who is told of its progress."""
     from sweep.config import load_config
     from sweep.progress import shown
 
-    with shown(progress, reporter, unit) as told:
+    with shown(progress, reporter) as told:
         yield load_config(config, overrides, announce=told.note), told
 
 
@@ -261,7 +257,7 @@ def trajectory(
     known = parameters_of(config, values)
     cells = {name: value for name, value in values.items() if name in known}
     settings = {name: value for name, value in values.items() if name not in known}
-    with _prepared(config, settings, progress, reporter, "sqrt(c/g)") as (checked, told):
+    with _prepared(config, settings, progress, reporter) as (checked, told):
         return trajectory(
             checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
         )

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from sweep.config import Config
     from sweep.results.folder import RunFiles
 
-_TIMES = {"paper": "sqrt(c/g)", "SI": "s", "own": "of time"}
-"""The unit in which a progress bar counts time, by the `units` of a configuration."""
-
 
 WORKERS = click.option("--workers", type=click.IntRange(1, 4096), help="Run in this many processes of one thread each.")
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
@@ -248,7 +245,7 @@ def _followed(config: Config, cells: tuple[str, ...], quiet: bool, **how: Any) -
     from sweep.progress import Terminal
     from sweep.studies.trajectory import trajectory
 
-    with Terminal(quiet, _TIMES[config.units]) as terminal, of_option("--at", config.table):
+    with Terminal(quiet) as terminal, of_option("--at", config.table):
         return trajectory(config, reporter=terminal, **how, **at)
 
 

@@ -36,8 +36,9 @@ from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
-from sweep.models.model import Columns, Model, take
+from sweep.models.model import OWN, Columns, Model, take
 from sweep.models.theory.linear import fastest_motion
+from sweep.parameters import PAPER_UNITS, SI
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.search import require_simulated
@@ -65,6 +66,9 @@ MAX_TRAJECTORIES = 1000
 """Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
 
 _TIME = ("1", "time, in sqrt(c/g)")
+
+_TIMES = {PAPER_UNITS: "sqrt(c/g)", SI: "s", OWN: "of time"}
+"""The unit in which progress counts time, by the `units` of a configuration."""
 
 # name: units, long_name
 SERIES: dict[str, tuple[str, str]] = {
@@ -156,7 +160,8 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     def report() -> None:
         table = kernel.table(images)
         covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
-        reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, time.perf_counter() - began))
+        seconds = time.perf_counter() - began
+        reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, seconds, _TIMES[chosen.units]))
 
     marks, steps = _run(kernel, images, settles, report), part.step.copy()
     work = Work(after_chunk=report)
