@@ -84,12 +84,15 @@ class ConfigError(Refused):
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults = sorted(faults, key=lambda fault: (fault.line or 0, fault.column or 0))
+        super().__init__(self.faults)  # by which another process is told of it
+
+    def __str__(self) -> str:
         lines = [str(fault) for fault in self.faults[:_MAX_LINES]]
         if more := len(self.faults) - len(lines):
             lines.append(str(Fault(self.faults[0].file, None, None, (), f"{more} more faults")))
-        super().__init__("\n".join(lines))
+        return "\n".join(lines)
 
 
-def fault_of(message: str, *path: str | int, file: str = "") -> ConfigError:
-    """The error of one fault that has no line."""
-    return ConfigError([Fault(file, None, None, path, message)])
+def fault_of(message: str, *path: str | int, file: str = "", line: int | None = None) -> ConfigError:
+    """The error of one fault that has no column."""
+    return ConfigError([Fault(file, line, None, path, message)])

@@ -5,18 +5,16 @@ Its code runs as soon as the configuration is read, so that a configuration from
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import numpy as np
 
 from sweep.config.configuration import Config
 from sweep.config.document import Document
-from sweep.faults import ConfigError, Fault, brief, either
+from sweep.faults import ConfigError, brief, either
 from sweep.models import TIERS
-from sweep.models.origin import ModelError, Origin
+from sweep.models.origin import Origin
 from sweep.models.user import loading, trial
-from sweep.models.user.blame import blamed
 
 SUFFIX = ".py"
 
@@ -51,19 +49,8 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         words = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
         raise ConfigError([source.fault(("model_sha256",), words)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
-    with explained(origin):
-        loading.load(origin)
+    loading.load(origin)
     return origin
-
-
-@contextmanager
-def explained(origin: Origin | None) -> Iterator[None]:
-    """Turn errors of the code of a user's model into a `ConfigError` that tells its file and line."""
-    try:
-        with blamed(origin):
-            yield
-    except ModelError as error:
-        raise ConfigError([Fault(error.place, error.line, None, (), error.message)]) from None
 
 
 def try_out(config: Config) -> None:
@@ -71,5 +58,4 @@ def try_out(config: Config) -> None:
     if config.origin:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
         ends |= {name: np.array([column[0], column[-1]]) for name, column in (config.cases or {}).items()}
-        with explained(config.origin):
-            trial.try_out(config.equations, ends, config.own_law)
+        trial.try_out(config.equations, ends, config.own_law)

@@ -15,7 +15,6 @@ import xarray as xr
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
 from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.schema import FOREVER
-from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
 from sweep.engine import executor, final
 from sweep.engine.checks import results
@@ -38,6 +37,7 @@ from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
 from sweep.models.model import OWN, Columns, Model, take
 from sweep.models.theory.linear import fastest_motion
+from sweep.models.user.blame import blamed
 from sweep.parameters import PAPER_UNITS, SI
 from sweep.results import dataset
 from sweep.results.provenance import provenance
@@ -142,7 +142,7 @@ def trajectory(
     chosen = choose(config, at, samples)
     stops = stop_when_settled or chosen.integrator.t_end >= FOREVER
     chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_when_settled": stops}))
-    with explained(chosen.origin):
+    with blamed(chosen.origin):
         found = _followed(chosen, every, reporter or Reporter())
     if not samples:
         return found
