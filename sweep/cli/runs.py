@@ -294,5 +294,4 @@ def _written(
 def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:
     """Return marks, by suffix, that change when the results `name` in `folder` are written anew."""
     found = [path for ending in (".nc", ".png", "_*.png") for path in sorted(folder.glob(f"{name}{ending}"))]
-    stats = {path.name.removeprefix(name): path.stat() for path in found}
-    return {suffix: (stat.st_ino, stat.st_mtime_ns) for suffix, stat in stats.items()}
+    return {path.name.removeprefix(name): (path.stat().st_ino, path.stat().st_mtime_ns) for path in found}
