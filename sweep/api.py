@@ -6,7 +6,6 @@ What a function needs is imported when it is called: an import of all would take
 from __future__ import annotations
 
 from contextlib import contextmanager
-from importlib import import_module
 
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
@@ -34,7 +33,7 @@ __all__ = [
     "load_config", "open", "plot", "predict", "run", "trajectory",
 ]  # fmt: skip
 
-_HOMES = {
+HOMES = {
     "Config": "sweep.config",
     "ConfigError": "sweep.config",
     "StoreError": "sweep.results.store",
@@ -43,22 +42,18 @@ _HOMES = {
     "plot": "sweep.plots.picture",
     "predict": "sweep.studies.predictions",
 }
-"""The modules that define the names which are not defined here."""
+"""The modules that define the names which are not defined here; they are names of `sweep` all the same."""
 
 
 @contextmanager
 def _prepared(
-    config: ConfigLike,
-    overrides: Mapping[str, Any],
-    progress: bool | None,
-    reporter: Reporter | None,
-    unit: str = "cells",
+    config: ConfigLike, overrides: Mapping[str, Any], progress: bool | None, reporter: Reporter | None
 ) -> Iterator[tuple[Config, Reporter]]:
     """The checked configuration of a call, and who is told of its progress."""
     from sweep.config import load_config
     from sweep.progress import shown
 
-    with shown(progress, reporter, unit) as told:
+    with shown(progress, reporter) as told:
         yield load_config(config, overrides, announce=told.note), told
 
 
@@ -261,7 +256,7 @@ def trajectory(
     known = parameters_of(config, values)
     cells = {name: value for name, value in values.items() if name in known}
     settings = {name: value for name, value in values.items() if name not in known}
-    with _prepared(config, settings, progress, reporter, "sqrt(c/g)") as (checked, told):
+    with _prepared(config, settings, progress, reporter) as (checked, told):
         return trajectory(
             checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
         )
@@ -410,11 +405,3 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
         dataset.close()
         raise StoreError(f"{path}: not a dataset of sweep: no attribute sweep_version")
     return dataset
-
-
-if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> object:
-        if name not in _HOMES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(_HOMES[name]), name)

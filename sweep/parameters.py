@@ -58,12 +58,9 @@ class Parameter:
     @property
     def allowed(self) -> str:
         """The bounds in words, for messages to the user."""
-        bounds = [
-            f"{sign} {bound:.6g}"
-            for sign, bound in ((">", self.above), (">=", self.at_least), ("<", self.below))
-            if abs(bound) != inf
-        ]
-        return "a finite number" + (f" {' and '.join(bounds)}" if bounds else "")
+        marks = ((">", self.above), (">=", self.at_least), ("<", self.below))
+        bounds = " and ".join(f"{sign} {bound:.6g}" for sign, bound in marks if abs(bound) != inf)
+        return f"a finite number {bounds}".rstrip()
 
 
 _SIZE = {"above": 0, "below": 1e6}
@@ -149,8 +146,6 @@ def sections(table: Mapping[str, Parameter]) -> tuple[str, ...]:
     """Names of the sections in which the parameters of a table stand."""
     return tuple(dict.fromkeys(p.section for p in table.values() if p.section))
 
-
-SECTIONS: tuple[str, ...] = sections(PARAMETERS)
 
 START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")
 """Names of the parameters of the start, on which the critical spins and the form factor do not depend."""

@@ -9,27 +9,25 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Column
 
+from sweep import interrupt
 from sweep.engine.reporter import Progress as Done
 from sweep.engine.reporter import Reporter
 from sweep.jit import showing
 
 
-def shown(
-    progress: bool | None, reporter: Reporter | None = None, unit: str = "cells"
-) -> AbstractContextManager[Reporter]:
+def shown(progress: bool | None, reporter: Reporter | None = None) -> AbstractContextManager[Reporter]:
     """Choose who is told of the progress of a call: `reporter` if there is one, else a bar where one is wanted.
 
     Parameters
     ----------
     progress : whether a bar is wanted; None if only in a notebook
-    unit : what is counted
     """
     if reporter or not (in_notebook() if progress is None else progress):
         return nullcontext(reporter or Reporter())
-    return Notebook(unit) if in_notebook() else Terminal(unit=unit)
+    return Notebook() if in_notebook() else Terminal()
 
 
 def in_notebook() -> bool:
@@ -50,27 +48,27 @@ class _Console(Console):
 class Terminal(Reporter):
     """A bar with what is done and the time left, of cells also failures and trajectories per second."""
 
-    def __init__(self, quiet: bool = False, unit: str = "cells") -> None:
+    def __init__(self, quiet: bool = False) -> None:
         self.console = _Console(stderr=True, quiet=quiet, highlight=False)
         self.last: Done | None = None
-        self._bar = _line(unit, self.console)
-        self._task: TaskID | None = None
+        self._bar: Progress | None = None
         self._told = False
 
     def __enter__(self) -> Terminal:
+        interrupt.raise_again()
         self._open = ExitStack()
         self._open.enter_context(showing(self._compiling))
         return self
 
     def __exit__(self, *exception: object) -> None:
         self._open.close()
-        if self._task is not None:
+        if self._bar:
             self._bar.stop()
 
     @contextmanager
     def _compiling(self) -> Iterator[None]:
         """One line for as long as something compiles: with a spinner, where one can turn."""
-        if self._task is None and self.console.is_terminal:
+        if self._bar is None and self.console.is_terminal:
             with self.console.status(_COMPILING):
                 yield
         else:
@@ -85,10 +83,12 @@ class Terminal(Reporter):
     def chunk(self, progress: Done) -> None:
         self.last = progress
         rate = (progress.done - progress.done_before) / progress.seconds
-        if self._task is None:
+        if self._bar is None:
+            self._bar = _line(progress.unit, self.console)
+            self._bar.add_task("", total=progress.cells, failed=0, rate=0.0)
             self._bar.start()
-            self._task = self._bar.add_task("", total=progress.cells, failed=0, rate=0.0)
-        self._bar.update(self._task, total=progress.cells, completed=progress.done, failed=progress.failed, rate=rate)
+        (task,) = self._bar.task_ids
+        self._bar.update(task, total=progress.cells, completed=progress.done, failed=progress.failed, rate=rate)
 
 
 # Characters that all words need, with room for a bar.
@@ -97,10 +97,9 @@ _WIDE = 80
 
 def _line(unit: str, console: Console) -> Progress:
     """The line that is shown: on a narrow terminal the bar, and no more words than leave room for it."""
-    wide = console.width >= _WIDE
     whole, count = Column(no_wrap=True), "{task.completed:.0f}/{task.total:.0f}"
     left = TimeRemainingColumn(compact=True, table_column=whole)
-    if not wide:
+    if console.width < _WIDE:
         bar = BarColumn(None, table_column=Column(ratio=1, min_width=4))
         return Progress(TextColumn(count, table_column=whole), bar, left, console=console, expand=True)
     cells = TextColumn("{task.fields[failed]} failed · {task.fields[rate]:.3g} trajectories/s ·", table_column=whole)
@@ -111,8 +110,7 @@ def _line(unit: str, console: Console) -> Progress:
 class Notebook(Reporter):
     """A bar under the cell of a notebook, drawn by the browser."""
 
-    def __init__(self, unit: str = "cells") -> None:
-        self._unit = unit
+    def __init__(self) -> None:
         self._output: Any = None
         self._drawn = 0.0
         self._last: Done | None = None
@@ -141,8 +139,8 @@ class Notebook(Reporter):
             self._draw(self._words(progress), progress)
 
     def _words(self, progress: Done) -> str:
-        failed = f" · {progress.failed} failed" if self._unit == "cells" else ""
-        return f"{progress.done:.0f}/{progress.cells:.0f} {self._unit}{failed} · {progress.seconds:.1f} s"
+        failed = f" · {progress.failed} failed" if progress.unit == "cells" else ""
+        return f"{progress.done:.0f}/{progress.cells:.0f} {progress.unit}{failed} · {progress.seconds:.1f} s"
 
     def _draw(self, words: str, progress: Done | None = None) -> None:
         """Show a bar and `words`, in place of those shown before."""

@@ -10,6 +10,7 @@ import click
 
 from sweep.cli.faults import refuse, say
 from sweep.cli.options import PATH
+from sweep.faults import brief, suggestion
 from sweep.parameters import DENSITY, PARAMETERS, Parameter
 
 MEASURED: dict[str, tuple[Parameter, str]] = {
@@ -77,8 +78,6 @@ def examples(name: str | None, output: Path) -> None:
             say(f"{stem:{width}}  {first.removeprefix('# ')}")
         return
     if name not in shipped:
-        from sweep.config.faults import brief, suggestion
-
         refuse(f"examples {brief(name)}", f"no such example{suggestion(name, shipped)}; `sweep examples` lists them")
     for path in (copied := _with_companions(shipped[name])):
         if (output / path.name).exists():

@@ -6,17 +6,15 @@ import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import click
 
+from sweep.faults import ConfigError, Fault, Refused, fault_of, printable
 from sweep.interrupt import INTERRUPTED
 from sweep.parameters import Parameter
-
-if TYPE_CHECKING:
-    from sweep.config import Fault
-    from sweep.progress import Terminal
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
 CLOSED_PIPE = 141
@@ -25,24 +23,17 @@ CLOSED_PIPE = 141
 
 def say(text: str, *, err: bool = False) -> None:
     """Print lines that may quote files and their names."""
-    from sweep.config.faults import printable
-
     click.echo("\n".join(map(printable, text.split("\n"))), err=err)
 
 
-def refuse(option: str, message: str) -> NoReturn:
-    """Raise the fault of an option."""
-    from sweep.config.faults import fault_of
-
-    raise fault_of(message, file=option)
+def refuse(option: str | Path, message: str) -> NoReturn:
+    """Raise the fault of an option, or of a file."""
+    raise fault_of(message, file=str(option))
 
 
 @contextmanager
 def of_option(option: str, known: Mapping[str, Parameter]) -> Iterator[None]:
     """Name `option` in faults of the parameters that it gave."""
-    from dataclasses import replace
-
-    from sweep.config.faults import ConfigError
 
     def named(fault: Fault) -> Fault:
         first, *rest = fault.path or ("",)
@@ -69,16 +60,14 @@ def needs_bokeh(what: str) -> Iterator[None]:
 @contextmanager
 def about(file: Path) -> Iterator[None]:
     """Make any error in reading a dataset of another program a fault of that file."""
-    from sweep.results.store import StoreError
-
     try:
         yield
-    except (StoreError, OSError):
+    except (Refused, OSError):
         raise
     except Exception as error:
         spoken = isinstance(error, ValueError)  # by our plots, of what was asked of the dataset
         reason = str(error) if spoken else f"not a dataset of sweep: {type(error).__name__}: {error}"
-        raise StoreError(f"{file}: {reason}".splitlines()[0]) from None
+        refuse(file, reason.partition("\n")[0])
 
 
 class Commands(click.Group):
@@ -87,8 +76,6 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
-        except (click.ClickException, click.exceptions.Exit):
-            raise
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
@@ -99,22 +86,6 @@ class Commands(click.Group):
             sys.exit(CLOSED_PIPE)
         except OSError as error:
             say(f"{error.filename or 'a file'}: {error.strerror or error}", err=True)
-        except Exception as error:
-            from sweep.config.faults import ConfigError
-            from sweep.results.store import StoreError
-
-            if not isinstance(error, ConfigError | StoreError):
-                raise
+        except Refused as error:
             say(str(error), err=True)
         sys.exit(WRONG_INPUT)
-
-
-@contextmanager
-def resumable(terminal: Terminal, work: str) -> Iterator[None]:
-    """End an interrupted command with what is kept."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        done = f"{terminal.last.done:.0f} of {terminal.last.cells} cells" if terminal.last else "no cells"
-        terminal.note(f"interrupted: {done} finished and kept; the same command resumes the {work}")
-        sys.exit(INTERRUPTED)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from sweep.cli.faults import refuse, say
+from sweep.faults import brief, suggestion
 from sweep.parameters import PARAMETERS, Parameter
 
 if TYPE_CHECKING:
-    from click.shell_completion import CompletionItem
-
     from sweep.config import Config
 
 PATH = click.Path(path_type=Path)
@@ -22,8 +22,6 @@ PATH = click.Path(path_type=Path)
 
 def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> list[CompletionItem]:
     """The keys of a configuration, or with `--at` the parameters, that go on from what was typed."""
-    from click.shell_completion import CompletionItem
-
     from sweep.config.schema import PATHS
 
     known = PATHS if parameter.name == "settings" else {p.name: p.long_name for p in PARAMETERS.values()}
@@ -31,7 +29,7 @@ def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> li
 
 
 FILE = click.argument("file", type=PATH)
-SETTINGS = click.option(
+_SETTINGS = click.option(
     "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=begun,
     help="Replace a value of the configuration, e.g. friction.mu=60, or friction.mu=20..60:41 for the range "
     "START..STOP:NUM (repeatable).",
@@ -46,19 +44,18 @@ def report_folder(default: str) -> Callable[[Any], Any]:
 
 
 def configured(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the argument CONFIG to a command, which gets the configuration with the values of `SETTINGS`."""
+    """Add the argument CONFIG and the option `--set` to a command, which gets the configuration with these values."""
 
     @wraps(command)
     def call(config: Path, settings: tuple[str, ...], **options: Any) -> None:
         command(config=loaded(config, settings), **options)
 
-    return click.argument("config", type=PATH)(call)
+    return click.argument("config", type=PATH)(_SETTINGS(call))
 
 
 def loaded(config: Path, settings: tuple[str, ...]) -> Config:
     from sweep.config import load_config
     from sweep.config.document import parse_value
-    from sweep.config.faults import brief
 
     parsed = {}
     for setting in settings:
@@ -69,15 +66,12 @@ def loaded(config: Path, settings: tuple[str, ...]) -> Config:
     return load_config(config, parsed, argument=lambda path: f"--set {path}", announce=announce)
 
 
-def announce(words: str) -> None:
-    """Said even with --quiet: code of a user never runs unseen."""
-    say(words, err=True)
+announce = partial(say, err=True)
+"""Said even with --quiet: code of a user never runs unseen."""
 
 
 def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:
     """The values of `--at` by parameter."""
-    from sweep.config.faults import brief, suggestion
-
     given: dict[str, list[float]] = {}
     for text in texts:
         name = text.partition("=")[0]
@@ -90,7 +84,6 @@ def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str
 
 def parse_pair(text: str, option: str) -> tuple[str, float]:
     from sweep.config.document import number
-    from sweep.config.faults import brief
 
     name, _, value = text.partition("=")
     if (parsed := number(value)) is None:
@@ -100,7 +93,6 @@ def parse_pair(text: str, option: str) -> tuple[str, float]:
 
 def parse_span(text: str, option: str) -> tuple[float, float]:
     from sweep.config.document import number
-    from sweep.config.faults import brief
 
     low, dots, high = text.partition("..")
     ends = number(low), number(high)

@@ -9,7 +9,6 @@ from typing import NoReturn
 
 import click
 
-from sweep import interrupt
 from sweep.cli.faults import DONE, ROWS_FAILED
 from sweep.cli.options import report_folder
 
@@ -44,7 +43,6 @@ def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path,
     """Write a report, its `files` in the folder `output`, and end by whether all of its `rows` hold."""
     from sweep.progress import Terminal
 
-    interrupt.raise_again()
     with Terminal():
         failed = report(output, click.echo)
     click.echo(f"\nwrote {output / files}; {len(failed)} {rows} do not hold")

@@ -112,9 +112,8 @@ def opened(file: Path) -> xr.Dataset:
     """The dataset of a command, of whatever kind."""
     from sweep.results.kind import kind
     from sweep.results.netcdf import open_dataset
-    from sweep.results.store import StoreError
 
     dataset = open_dataset(file)
     if kind(dataset) is None:
-        raise StoreError(f"{file}: not a dataset of sweep: no variable of it, such as status")
+        refuse(file, "not a dataset of sweep: no variable of it, such as status")
     return dataset

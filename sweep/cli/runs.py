@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sweep import interrupt
-from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, resumable, say
-from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured
+from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
+from sweep.cli.options import OUTPUT, PATH, QUIET, begun, cells_of, configured
+from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
@@ -22,23 +22,9 @@ if TYPE_CHECKING:
     from sweep.config import Config
     from sweep.results.folder import RunFiles
 
-_TIMES = {"paper": "sqrt(c/g)", "SI": "s", "own": "of time"}
-"""The unit in which a progress bar counts time, by the `units` of a configuration."""
 
-
-def _either(context: click.Context, parameter: click.Parameter, value: Any) -> Any:  # noqa: ARG001
-    """Refuse workers of two kinds."""
-    if value and any(context.params.get(name) for name in ("workers", "scheduler")):
-        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
-    return value
-
-
-WORKERS = click.option(
-    "--workers", type=click.IntRange(1, 4096), callback=_either, help="Run in this many processes of one thread each."
-)
-SCHEDULER = click.option(
-    "--scheduler", metavar="ADDRESS", callback=_either, help="Run on the workers of this dask scheduler."
-)
+WORKERS = click.option("--workers", type=click.IntRange(1, 4096), help="Run in this many processes of one thread each.")
+SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 
 
 def _parameter_help() -> str:
@@ -62,7 +48,7 @@ FRESH = click.option("--fresh", is_flag=True, help="Discard what an earlier run 
 
 def _resumed(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of a command whose simulations are kept, resumed, and spread over processes."""
-    for option in (QUIET, SCHEDULER, WORKERS, FRESH, DRY_RUN, SETTINGS, OUTPUT):
+    for option in (QUIET, SCHEDULER, WORKERS, FRESH, DRY_RUN, OUTPUT):
         command = option(command)
     return command
 
@@ -102,7 +88,6 @@ def run(config: Config, rerun: str | None, fresh: bool, **how: Any) -> None:
 @click.option("--samples", type=click.IntRange(1), metavar="N",
               help="Follow N samples of the uncertain parameters, not their medians.")  # fmt: skip
 @OUTPUT
-@SETTINGS
 @DRY_RUN
 @QUIET
 def trajectory(
@@ -136,7 +121,6 @@ def trajectory(
 @click.option("--speed", type=click.FloatRange(0, min_open=True),
               help="Time shown in a second [default: such that the clip takes ten].")  # fmt: skip
 @click.option("--output", type=PATH, help="gif, mp4 or html to write [default: runs/NAME/NAME_trajectory.gif].")
-@SETTINGS
 @QUIET
 def animate(
     config: Config, cells: tuple[str, ...], begin: float, end: float | None, speed: float | None, output: Path | None,
@@ -147,7 +131,6 @@ def animate(
     Several stand side by side, in one clock, above their spins.  A page (html) opens without network; an mp4 needs
     ffmpeg.
     """
-    from sweep.config import ConfigError
     from sweep.plots import animation
 
     target = output or Path("runs") / config.name / f"{config.name}_trajectory.gif"
@@ -157,8 +140,6 @@ def animate(
         target.parent.mkdir(parents=True, exist_ok=True)
         animation.animate(result, target, begin=begin, end=end, speed=speed)
     except ValueError as error:
-        if isinstance(error, ConfigError):
-            raise
         refuse("animate", str(error))
     if not quiet:
         say(f"wrote {target}")
@@ -231,7 +212,6 @@ def indices(config: Config, fresh: bool, **how: Any) -> None:
 @click.option("--free", required=True, metavar="NAME,NAME", help="The parameters to find, e.g. mu,sigma,n0,x0,y0.")
 @click.option("--laws", metavar="NAME,NAME", help="Laws of friction to fit and compare, e.g. viscous,coulomb.")
 @OUTPUT
-@SETTINGS
 @QUIET
 def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | None, quiet: bool) -> None:
     """Find the parameters of the body in CONFIG that reproduce FILM.
@@ -247,7 +227,6 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
     from sweep.studies.laws import compare
 
     names = [name.strip() for name in free.split(",")]
-    interrupt.raise_again()
     with Terminal(quiet) as terminal, of_option("--free", config.table):
         result = (
             compare(config, film, names, [name.strip() for name in laws.split(",")], terminal)
@@ -266,8 +245,7 @@ def _followed(config: Config, cells: tuple[str, ...], quiet: bool, **how: Any) -
     from sweep.progress import Terminal
     from sweep.studies.trajectory import trajectory
 
-    interrupt.raise_again()
-    with Terminal(quiet, _TIMES[config.units]) as terminal, of_option("--at", config.table):
+    with Terminal(quiet) as terminal, of_option("--at", config.table):
         return trajectory(config, reporter=terminal, **how, **at)
 
 
@@ -286,6 +264,8 @@ def _written(
     dry_run: bool, output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
 ) -> xr.Dataset | None:  # fmt: skip
     """Carry out `work`, show its progress, and say what it found and wrote; of a dry run, only the estimate."""
+    if workers and scheduler:
+        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
     if dry_run:
         click.echo(estimate())
         return None
@@ -295,13 +275,15 @@ def _written(
 
     folder, name = output or Path("runs") / config.name, config.name if verb == "run" else f"{config.name}_{verb}"
     before = _stamps(folder, name)
-    interrupt.raise_again()
-    with (
-        Terminal(quiet) as terminal,
-        resumable(terminal, "run" if verb == "run" else "search"),
-        connected(workers, scheduler) as cluster,
-    ):
-        result = work(output=folder, reporter=terminal, cluster=cluster)
+    with Terminal(quiet) as terminal:
+        try:
+            with connected(workers, scheduler) as cluster:
+                result = work(output=folder, reporter=terminal, cluster=cluster)
+        except KeyboardInterrupt:
+            done = f"{terminal.last.done:.0f} of {terminal.last.cells} cells" if terminal.last else "no cells"
+            kept = f"the same command resumes the {'run' if verb == 'run' else 'search'}"
+            terminal.note(f"interrupted: {done} finished and kept; {kept}")
+            sys.exit(INTERRUPTED)
     if not quiet:
         click.echo(describe(result))
         new = [suffix for suffix, stamp in _stamps(folder, name).items() if stamp != before.get(suffix)]
@@ -312,5 +294,4 @@ def _written(
 def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:
     """Return marks, by suffix, that change when the results `name` in `folder` are written anew."""
     found = [path for ending in (".nc", ".png", "_*.png") for path in sorted(folder.glob(f"{name}{ending}"))]
-    stats = {path.name.removeprefix(name): path.stat() for path in found}
-    return {suffix: (stat.st_ino, stat.st_mtime_ns) for suffix, stat in stats.items()}
+    return {path.name.removeprefix(name): (path.stat().st_ino, path.stat().st_mtime_ns) for path in found}

@@ -15,18 +15,17 @@ from typing import Any
 from pydantic import ValidationError
 
 from sweep.config import cases, cross_checks, document, film, schema, user_models
-from sweep.config.configuration import FIRST_AXES, Config, model_of
+from sweep.config.configuration import FIRST_AXES, Config, film_in, model_of
 from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
-from sweep.config.faults import ConfigError, Fault
 from sweep.config.messages import describe
 from sweep.config.schema import Integrator
 from sweep.config.values import MAX_AXIS, Values
+from sweep.faults import ConfigError, Fault
 from sweep.grid import Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
-from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.models.general.laws import LAWS
 from sweep.models.general.selection import PAPER_LAW, Physics
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
@@ -73,7 +72,7 @@ def load_config(
     for key, value in (overrides or {}).items():
         source.set(_full_path(key, known), plain_data(value), argument(key))
     if isinstance(table := source.values.get("cases"), dict):
-        source.table, source.values["cases"] = ("cases", cases.of_columns(source, table, known)), "cases"
+        source.known["cases", "cases"], source.values["cases"] = cases.of_columns(source, table, known), "cases"
     # A name made from the file's must not be refused, since the user did not choose it.
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")
@@ -114,12 +113,13 @@ def _source(config: ConfigLike) -> document.Document:
         return document.read(Path(config))
     if config.source:
         return deepcopy(config.source)
-    values, table = config.document(), None
+    values = config.document()
+    known: dict[tuple[str, str], Any] = {("film", config.film_file): config.film}
+    known["model", config.model] = config.origin
     if config.cases is not None and not config.samples:
         values["cases"] = config.cases_file or "cases"
-        table = values["cases"], config.cases
-    seen = (config.film_file, config.film) if config.film else None
-    return document.Document("", values, table=table, film=seen, model=config.origin)
+        known["cases", values["cases"]] = config.cases
+    return document.Document("", values, known=known)
 
 
 def _full_path(key: str, known: Mapping[str, Parameter]) -> tuple[str, ...]:
@@ -133,7 +133,10 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     """Fill in defaults, order the axes, and check that everything fits together."""
     known = loading.table(origin)
     given = _given(values, source, known)
-    columns = _table(values.cases, source, known) if values.cases is not None else None
+    columns = None
+    if values.cases is not None:  # it may be ""
+        columns = source.once("cases", values.cases, lambda: cases.read(source, values.cases, known))
+    seen = film_in(values.measure or ())
     physics = _physics(values, origin, frozenset((*given, *(columns or ()))))
     _refuse(source, cross_checks.of_physics(values, physics, origin))
     model = model_of(values.model, origin, physics)
@@ -159,7 +162,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         samples=samples,
         until=values.until,
         seed=values.seed,
-        film=_film(values.measure or (), source),
+        film=source.once("film", seen, lambda: film.read(Path(source.file).parent / seen)) if seen else None,
         units=physics.units,
         law=physics.law.name,
         surface=physics.surface.name,
@@ -201,21 +204,6 @@ def _given(values: Any, source: document.Document, known: Mapping[str, Parameter
     if known is PARAMETERS and "offset" in found and found["offset"].spec == 0.0:
         del found["offset"]  # the default: it does not make a body other than the paper's
     return found
-
-
-def _table(name: str, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, tuple[float, ...]]:
-    """Read the table of cases, once for all that is made from `source`, and return its columns."""
-    if not source.table or source.table[0] != name:
-        source.table = name, cases.read(source, name, known)
-    return source.table[1]
-
-
-def _film(measure: Iterable[str], source: document.Document) -> Film | None:
-    """Read the film that is measured against, once for all that is made from `source`."""
-    name = next((setting for kind, _, setting in (spec.partition("=") for spec in measure) if kind == Misfit.name), "")
-    if name and (not source.film or source.film[0] != name):
-        source.film = name, film.read(Path(source.file).parent / name)
-    return source.film[1] if name and source.film else None
 
 
 def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physics:

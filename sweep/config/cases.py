@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from sweep.config import faults
+from sweep import faults
 from sweep.config.document import Document, is_number, number
-from sweep.config.faults import ConfigError, Fault, brief, refusal, suggestion
 from sweep.config.values import MAX_AXIS
+from sweep.faults import ConfigError, Fault, brief, refusal, suggestion
 from sweep.parameters import Parameter
 
 Columns = dict[str, tuple[float, ...]]

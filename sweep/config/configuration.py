@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Any
@@ -14,9 +14,9 @@ from ruamel.yaml.compat import StringIO
 
 from sweep.config.distributions import Distribution
 from sweep.config.document import Document
-from sweep.config.faults import Fault, Path
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
+from sweep.faults import Fault, Path
 from sweep.grid import CASE, SAMPLE
 from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.models import TIERS
@@ -32,6 +32,11 @@ from sweep.variables import in_si, with_unit
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
+
+
+def film_in(measure: Iterable[str]) -> str:
+    """The name of the film that is measured against, as the configuration has it; "" if there is none."""
+    return next((spec.partition("=")[2] for spec in measure if spec.startswith(f"{Misfit.name}=")), "")
 
 
 def model_of(name: str, origin: Origin | None, physics: Physics) -> Tier:
@@ -125,8 +130,7 @@ class Config:
 
     @property
     def film_file(self) -> str:
-        """The name of the film, as the configuration has it; "" if there is none."""
-        return next((spec.partition("=")[2] for spec in self.measure if spec.startswith(f"{Misfit.name}=")), "")
+        return film_in(self.measure)
 
     @property
     def simulated(self) -> bool:

@@ -5,21 +5,23 @@ Each check yields the path of the key to be changed, and what is wrong with it a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from sweep.config import bodies
 from sweep.config.configuration import Config
-from sweep.config.faults import Path, either
 from sweep.config.schema import MAX_CELLS_IN_MEMORY
 from sweep.config.values import Values
-from sweep.grid import BODY, Grid, distinct
+from sweep.faults import Path, either
+from sweep.grid import BODY, Array, Grid, distinct
 from sweep.kernels import measures, methods
 from sweep.kernels.differentiate import undifferentiable
 from sweep.kernels.measures import misfit
-from sweep.models.general.selection import Physics
+from sweep.models.general import starts, validity
+from sweep.models.general.selection import INERTIA, Physics
+from sweep.models.general.surfaces import SURFACES
 from sweep.models.general.variants import BASES
 from sweep.models.model import Model
 from sweep.models.origin import Origin
@@ -66,8 +68,8 @@ def of_all_cells(config: Config) -> Iterator[Misfit]:
         if getattr(config, name) and cells > MAX_CELLS_IN_MEMORY:
             yield (name,), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY}{way_out}"
     for path, check in (
-        (("body",), bodies.impossible),
-        (("start", "x0"), bodies.misplaced),
+        (("body",), impossible),
+        (("start", "x0"), misplaced),
         (("integrator", "step"), _unusable_step),
     ):
         if reason := check(config):
@@ -166,3 +168,69 @@ def _unusable_step(config: Config) -> str:
         )
     too_long = f"must be auto or at most {longest:.3g}, a quarter of the rattle's period, not {step:g}"
     return "" if step <= longest else too_long
+
+
+_SHAPE = ("a", "b", "c", "offset", *INERTIA)
+
+Reason = tuple[str, int, dict[str, float]]
+"""Why some bodies cannot be or cannot stand, how many cells have one, and the parameters of the first."""
+
+
+def impossible(config: Config) -> str:
+    """Say what is wrong with the first body if none can be or can stand; "" if any can."""
+    return unfit(config) if sum(cells for _, cells, _ in _reasons(config)) == Grid.of(config).size else ""
+
+
+def unfit(config: Config) -> str:
+    """Say what is wrong with the first body that cannot be or cannot stand; "" if all can."""
+    return next((f"{words} (at {_at(first, _SHAPE)})" for words, _, first in _reasons(config)), "")
+
+
+def described_impossible(config: Config) -> dict[str, str]:
+    """Return the attribute of a dataset that says how many cells have the status `impossible`, and why."""
+    varying = [name for name in _SHAPE if name in {*config.axes, *(config.cases or ())}]
+    found = [
+        f"{cells} cells, {words.partition(';')[0]}, the first at {_at(first, varying)}"
+        for words, cells, first in _reasons(config)
+    ]
+    return {"impossible": "; ".join(found)} if found else {}
+
+
+def misplaced(config: Config) -> str:
+    """Say what is wrong with the first cell whose start point lies off the body; "" if no cell's does."""
+    surface = SURFACES[config.surface]
+    if not config.of_rattlebacks or "x0" not in {*config.parameters, *(config.cases or ())}:
+        return ""
+    for columns in distinct(Grid.of(config), (*BODY, "x0", "y0")):
+        with np.errstate(over="ignore"):  # infinity lies off the body as well
+            cells = np.flatnonzero(surface.off(columns, *starts.point(columns)))
+        if len(cells):
+            place = _at(_cell(columns, cells[0]), ("x0", "y0", "a", "b", "delta"))
+            return f"start point off the {surface.name} at {place}; keep {surface.outline}"
+    return ""
+
+
+def _cell(columns: Mapping[str, Array], cell: int) -> dict[str, float]:
+    return {name: float(column[cell]) for name, column in columns.items()}
+
+
+def _at(values: Mapping[str, float], names: Iterable[str]) -> str:
+    return ", ".join(f"{name}={values[name]:g}" for name in names if name in values)
+
+
+def _reasons(config: Config) -> list[Reason]:
+    """Collect the reasons why bodies cannot be or cannot stand; a cell counts for the first that is true of it."""
+    if not config.of_rattlebacks or not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
+        return []
+    grid, surface = Grid.of(config), SURFACES[config.surface]
+    counts, first, seen = Counter[str](), dict[str, dict[str, float]](), 0
+    for columns in distinct(grid, BODY):
+        left = np.ones(len(columns["a"]), bool)
+        seen += len(left)
+        for bad, words in validity.wrongs(columns, surface):
+            cells = np.flatnonzero(bad & left)
+            if len(cells):
+                first.setdefault(words, _cell(columns, cells[0]))
+                counts[words] += len(cells)
+                left[cells] = False
+    return [(words, counts[words] * grid.size // seen, first[words]) for words in first]

@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from sweep.config.document import is_number
-from sweep.config.faults import refusal
 from sweep.config.messages import wrong
+from sweep.faults import refusal
 from sweep.grid import Array
 
 

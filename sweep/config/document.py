@@ -20,8 +20,7 @@ import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sweep.config.faults import ConfigError, Fault, Path, brief, fault_of
-from sweep.models.origin import Origin
+from sweep.faults import ConfigError, Fault, Path, brief, fault_of
 
 _NUMBER = r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
 _FLOAT = re.compile(_NUMBER)
@@ -46,12 +45,14 @@ class Document:
     """Where the key of each value stands, and where the value; an item of a list has no key but itself."""
     arguments: dict[Path, tuple[str, Path]] = field(default_factory=dict)
     """For each value that an argument gave, and each section that it added: the argument, and the path that it set."""
-    table: tuple[str, Any] | None = None
-    """Name and columns of the table of cases, once it is read."""
-    film: tuple[str, Any] | None = None
-    """Name and content of the film that is measured against, once it is read."""
-    model: Origin | None = None
-    """Where the model comes from that a user brings, once it is read."""
+    known: dict[tuple[str, str], Any] = field(default_factory=dict)
+    """What is in the files that it names, by key and name, once they are read: a table of cases, a film, a model."""
+
+    def once(self, key: str, name: str, read: Callable[[], Any]) -> Any:
+        """What is in the file `name`, read once for all that is made from this document."""
+        if (key, name) not in self.known:
+            self.known[key, name] = read()
+        return self.known[key, name]
 
     def read_beside(self, key: str, name: str) -> tuple[FilePath, str]:
         """Path and text of the file `name`, relative to this document's folder, that it names by `key`.

@@ -8,7 +8,7 @@ from typing import get_args
 
 import numpy as np
 
-from sweep.config.faults import ConfigError, Fault, brief, either
+from sweep.faults import ConfigError, Fault, brief, either
 from sweep.grid import Array
 from sweep.kernels.measures.misfit import Film, Seen
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pint
 
-from sweep.config.faults import either, fault_of, printable, refusal
+from sweep.faults import either, fault_of, printable, refusal
 from sweep.models.general import meshes, solids
 from sweep.parameters import DENSITY, PARAMETERS, SI, Parameter
 from sweep.variables import in_si
@@ -75,7 +75,7 @@ def measured(name: str, text: str, parameter: Parameter) -> Measured:
     ConfigError
         if `text` is something else.
     """
-    (option,) = _options([name])
+    option = _option(name)
     unit, found = _unit(parameter), _QUANTITY.fullmatch(text.strip())
     try:
         spelled = re.sub(r"\^?3$", "**3", found["unit"]) if found else ""  # as Pint wants cm3
@@ -118,8 +118,8 @@ def of_shape(given: Given, file: Path) -> str:
         if more is given than a mass or a density, or if the shape is none or does not stand.
     """
     _check_names(given, [_MASS])
-    for option in _options([name for name in given if name not in _MASS]):
-        raise fault_of("cannot be combined with --stl; leave out one of the two", file=option)
+    for name in [each for each in given if each not in _MASS]:
+        raise fault_of("cannot be combined with --stl; leave out one of the two", file=_option(name))
     try:
         solid = meshes.mesh(meshes.triangles(file.read_bytes()) * _MILLIMETRE)
     except ValueError as error:
@@ -148,18 +148,18 @@ def _unit(parameter: Parameter) -> str:
     return in_si(parameter.units, parameter.long_name)[0]
 
 
-def _options(names: Sequence[str]) -> list[str]:
-    return [f"--{name.replace('_', '-')}" for name in names]
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def _check_names(given: Given, needed: Sequence[Sequence[str]]) -> None:
     """Refuse that all names of a group are missing, and two that tell the same."""
     for names in needed:
         if not given.keys() & {*names}:
-            raise fault_of(f"not all is known; give {either(_options(names))} as well", file="body")
+            raise fault_of(f"not all is known; give {either(map(_option, names))} as well", file="body")
     for twice in (_MASS, *solids.RADII.items()):
         if {*twice} <= given.keys():
-            one, other = _options(twice)
+            one, other = map(_option, twice)
             raise fault_of(f"cannot be combined with {other}; leave out one of the two", file=one)
 
 
@@ -168,9 +168,8 @@ def _check_stands(body: Mapping[str, float]) -> None:
     height = body["c"] - body["offset"]
     for axis, radius in solids.RADII.items():
         if (found := body[axis] ** 2 / body["c"]) <= height:
-            (option,) = _options([radius])
             raise fault_of(
-                f"it falls over, since {option} is {found:.3g} m and its centre of mass {height:.3g} m high; "
+                f"it falls over, since {_option(radius)} is {found:.3g} m and its centre of mass {height:.3g} m high; "
                 "measure this radius, or check the sizes",
                 file="body",
             )

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from sweep.config.faults import Path, either, refusal, suggestion
+from sweep.faults import Path, either, refusal, suggestion
 
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _KINDS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a word"}

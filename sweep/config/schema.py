@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
 
-from sweep.config.faults import either, refusal
 from sweep.config.messages import Allowed, wrong
 from sweep.config.values import MAX_AXIS, Strict, Whole, parse_values, whole
+from sweep.faults import either, refusal
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.method import TOLERANCE
@@ -142,16 +142,12 @@ def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:
     }
 
 
-class _Words(Strict):
-    """What a section has beside physical parameters: of most, nothing."""
-
-
 def _parts(which: int) -> tuple[str, ...]:
     """The laws of friction (0), or the regularisations of those that have several (2), from the names of `LAWS`."""
     return tuple(dict.fromkeys(part for name in LAWS if (part := name.partition("-")[which])))
 
 
-class Friction(_Words):
+class Friction(Strict):
     law: Literal[_parts(0)] = Field(default=PAPER_LAW, description="law of slip friction")  # type: ignore[valid-type]
     regularisation: Literal[_parts(2)] = Field(  # type: ignore[valid-type]
         default=_parts(2)[0], description="how Coulomb friction passes through zero slip, within `speed`"
@@ -171,13 +167,14 @@ class Friction(_Words):
         return self
 
 
-class Body(_Words):
+class Body(Strict):
     surface: Literal[tuple(SURFACES)] = Field(  # type: ignore[valid-type]
         default=ELLIPSOID.name, description="surface of the body, which says what `a`, `b` and `c` mean"
     )
 
 
-_WORDS: dict[str, type[_Words]] = {"body": Body, "friction": Friction}
+_WORDS: dict[str, type[Strict]] = {"body": Body, "friction": Friction}
+"""What sections have beside physical parameters: most have nothing."""
 
 
 class _Top(Strict):
@@ -234,23 +231,19 @@ class _Top(Strict):
     )
 
 
-def _section(name: str, table: Mapping[str, Parameter], words: type[_Words]) -> tuple[Any, Any]:
-    made: Any = create_model(name.capitalize(), __base__=words, **_physical(name, table))
-    return made, Field(default_factory=made)
-
-
 @cache
 def schema_of(origin: Origin | None) -> Any:
     """The schema of the configurations of a user's model, or, without one, of the models of this package."""
     table = loading.table(origin)
     words = _WORDS if not origin else {"body": Body} if loading.law(origin) else {}
-    found: dict[str, Any] = {name: _section(name, table, words.get(name, _Words)) for name in sections(table)}
+    found: dict[str, Any] = {}
+    for name in sections(table):
+        made: Any = create_model(name.capitalize(), __base__=words.get(name, Strict), **_physical(name, table))
+        found[name] = made, Field(default_factory=made)
     if origin:
         found["model"] = str, ...
     return create_model("Configuration", __base__=_Top, **_physical("", table), **found)
 
-
-Schema: Any = schema_of(None)
 
 SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fields.items() if name != "integrator"}
 for _name, _words in _WORDS.items():

@@ -5,18 +5,16 @@ Its code runs as soon as the configuration is read, so that a configuration from
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import numpy as np
 
 from sweep.config.configuration import Config
 from sweep.config.document import Document
-from sweep.config.faults import ConfigError, Fault, brief, either
+from sweep.faults import ConfigError, brief, either
 from sweep.models import TIERS
-from sweep.models.origin import ModelError, Origin
+from sweep.models.origin import Origin
 from sweep.models.user import loading, trial
-from sweep.models.user.blame import blamed
 
 SUFFIX = ".py"
 
@@ -36,39 +34,23 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     name = source.values.get("model")
     if not isinstance(name, str) or name in TIERS:
         return None
-    origin = source.model if source.model and source.model.name == name else None
+    origin: Origin | None = source.known.get(("model", name))
     if origin is None and not name.endswith(SUFFIX) and (origin := loading.entry_point(name)) is None:
         return None  # the schema refuses it
     if announce is None:
         words = "code of a user, which is not run for a configuration that comes from a dataset"
         raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; choose {either(TIERS)}")])
     if origin is None:
-        origin = of_file(source, name)
-    source.model = origin
+        path, text = source.read_beside("model", name)
+        origin = Origin.of_file(name, str(path), text)
+    source.known["model", name] = origin
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
         words = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
         raise ConfigError([source.fault(("model_sha256",), words)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
-    with explained(origin):
-        loading.load(origin)
+    loading.load(origin)
     return origin
-
-
-def of_file(source: Document, name: str) -> Origin:
-    """The model in a file that a document names, whose code is not run; a `ConfigError` if it cannot be read."""
-    path, text = source.read_beside("model", name)
-    return Origin.of_file(name, str(path), text)
-
-
-@contextmanager
-def explained(origin: Origin | None) -> Iterator[None]:
-    """Turn errors of the code of a user's model into a `ConfigError` that tells its file and line."""
-    try:
-        with blamed(origin):
-            yield
-    except ModelError as error:
-        raise ConfigError([Fault(error.place, error.line, None, (), error.message)]) from None
 
 
 def try_out(config: Config) -> None:
@@ -76,5 +58,4 @@ def try_out(config: Config) -> None:
     if config.origin:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
         ends |= {name: np.array([column[0], column[-1]]) for name, column in (config.cases or {}).items()}
-        with explained(config.origin):
-            trial.try_out(config.equations, ends, config.own_law)
+        trial.try_out(config.equations, ends, config.own_law)

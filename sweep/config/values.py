@@ -12,8 +12,8 @@ from pydantic_core import PydanticCustomError
 
 from sweep.config.distributions import FAMILIES, Distribution
 from sweep.config.document import is_number, number, plain_data
-from sweep.config.faults import fault_of, refusal
 from sweep.config.messages import describe, wrong
+from sweep.faults import fault_of, refusal
 from sweep.parameters import Parameter
 
 _MORE = ", a list of such, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}"

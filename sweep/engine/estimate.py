@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from sweep.config import Config
-from sweep.config.user_models import explained
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import BATCH
 from sweep.engine.plan import Choice, choose, needed
@@ -16,6 +15,7 @@ from sweep.grid import Array, Grid
 from sweep.kernels.build import compile_seconds, missing
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.models import MODELS
+from sweep.models.user.blame import blamed
 
 _SAMPLE = 4096
 """Cells whose steps are chosen to judge all the others by."""
@@ -39,7 +39,7 @@ def estimate(config: Config) -> str:
         return cells
     sample = grid.sample(_SAMPLE)
     share = grid.size / sample.size
-    with explained(config.origin):
+    with blamed(config.origin):
         chosen = tuple(each for each in choose(config, sample) if len(each.cells))
         steps = [np.ceil(config.integrator.patient.t_end / each.step) for each in chosen]
         seconds = sum(map(nominal_seconds, _works(config, chosen, steps, share)))

@@ -24,6 +24,8 @@ class Progress:
     """Of `done`, those finished by an earlier run."""
     seconds: float
     """Since this run began."""
+    unit: str = "cells"
+    """What is counted."""
 
 
 class Reporter:

@@ -17,7 +17,6 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigLike, load_config
-from sweep.config.user_models import explained
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.enlarged import RERUN, Earlier, Enlarged, reason_against, taken_over
@@ -28,6 +27,7 @@ from sweep.engine.whole import Whole
 from sweep.grid import Grid, Tile
 from sweep.interrupt import deferred, point
 from sweep.kernels.methods import METHODS
+from sweep.models.user.blame import blamed
 from sweep.plots import quantities
 from sweep.results import dataset
 from sweep.results.folder import RunFiles
@@ -132,7 +132,7 @@ def _compute(
 def carry_out(result: Whole, store: Store, reporter: Reporter, cluster: Cluster | None) -> None:
     """Run the tiles of `result` that `store` does not have, until it asks for no more."""
     count, running = Count(reporter), store.load_running()
-    with explained(result.config.origin):
+    with blamed(result.config.origin):
         while result.grow(tile_size):
             if not count.cells and (store.done or running):
                 reporter.note(_kept(result, store, running))

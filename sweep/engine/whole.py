@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config
-from sweep.config.bodies import described_impossible
+from sweep.config.cross_checks import described_impossible
 from sweep.grid import Array, Grid, Tile
 from sweep.results import dataset, netcdf
 from sweep.results.provenance import provenance

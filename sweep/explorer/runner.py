@@ -13,11 +13,11 @@ from queue import PriorityQueue
 import xarray as xr
 
 from sweep.config import ConfigError, Values
-from sweep.config.faults import printable
 from sweep.config.schema import FOREVER
 from sweep.engine.reporter import Progress, Reporter
 from sweep.explorer.setup import Setup
 from sweep.explorer.state import Cell
+from sweep.faults import printable
 from sweep.grid import Array
 from sweep.jit import load_numba, showing
 from sweep.kernels import measures

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from sweep.config import Config, ConfigError, Fault, load_config
-from sweep.config.faults import brief
 from sweep.config.user_models import SUFFIX
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell
+from sweep.faults import brief
 from sweep.models.user.loading import entry_point
 
 Announce = Callable[[str], None]

@@ -12,8 +12,8 @@ from typing import Any
 from urllib.parse import urlencode
 
 from sweep.axis import Axis
-from sweep.config.faults import brief
 from sweep.explorer.slices import Source
+from sweep.faults import brief
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.plots import labels
 from sweep.plots.quantities import subject

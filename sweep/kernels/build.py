@@ -62,7 +62,7 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
 
     Raises
     ------
-    ModelError
+    ConfigError
         if a model that a user brings cannot be compiled.
     """
     kernels = list(kernels)
@@ -86,7 +86,7 @@ def compile_seconds(jobs: Sequence[Job]) -> float:
 
 
 def try_compiling(model: Model) -> None:
-    """Compile the inline functions of a model one by one, so that a fault is known by its line; `ModelError` if any."""
+    """Compile the inline functions of a model one by one, so that a `ConfigError` tells the line of a fault."""
     numba, states = load_numba(), (0.0,) * len(model.states)
     constants = model.constants(*(0.0 for _ in model.constants._fields))
     with blamed(model.origin):

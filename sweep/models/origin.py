@@ -52,14 +52,3 @@ def _sources(place: str) -> list[str]:
         return []
     found = [path for folder in spec.submodule_search_locations or () for path in Path(folder).rglob("*.py")]
     return sorted(map(str, found)) or [str(spec.origin)]
-
-
-class ModelError(Exception):
-    """What is wrong with a model that a user brings, and what is allowed."""
-
-    def __init__(self, place: str, line: int | None, message: str) -> None:
-        super().__init__(place, line, message)
-        self.place, self.line, self.message = place, line, message
-
-    def __str__(self) -> str:
-        return ":".join(str(part) for part in (self.place, self.line) if part is not None) + f": {self.message}"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import xarray as xr
 
 from sweep.config import Config, ConfigError
-from sweep.config.faults import either, refusal
+from sweep.faults import either, refusal
 from sweep.kernels.measures import MEASURES
 from sweep.plots import labels, regimes
 from sweep.results.dataset import VARIABLES

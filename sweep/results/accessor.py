@@ -23,7 +23,7 @@ class Accessor:
 
     def plot(self, variable: str | None = None, **options: Any) -> Any:
         """Draw the dataset; arguments, figure and errors as of `sweep.plot`."""
-        return import_module("sweep.api").plot(self._dataset, variable, **options)
+        return import_module("sweep").plot(self._dataset, variable, **options)
 
     def trajectory(self, **values: Any) -> Any:
         """Follow single cells densely in time, with the configuration of the dataset.
@@ -42,7 +42,7 @@ class Accessor:
         """
         if "config" not in self._dataset.attrs:
             raise ValueError("the dataset tells no configuration; call sweep.trajectory with one")
-        return import_module("sweep.api").trajectory(configuration(self._dataset.attrs["config"]), **values)
+        return import_module("sweep").trajectory(configuration(self._dataset.attrs["config"]), **values)
 
 
 def configuration(text: str) -> Config:

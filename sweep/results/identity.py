@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sweep.config.faults import printable
+from sweep.faults import printable
 from sweep.results.store import StoreError
 
 

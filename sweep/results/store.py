@@ -12,10 +12,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import NamedTuple, Protocol
 
+from sweep.faults import Refused
 from sweep.grid import Array
 
 
-class StoreError(Exception):
+class StoreError(Refused):
     """A file of the run cannot be used; the message says which one, why, and what to do."""
 
 

@@ -17,9 +17,9 @@ import xarray as xr
 
 from sweep.axis import Axis, contours
 from sweep.config import Config, ConfigError
-from sweep.config.faults import Fault
 from sweep.engine.cluster import Cluster
 from sweep.engine.reporter import Reporter
+from sweep.faults import Fault
 from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.models.model import COUNT

@@ -21,13 +21,13 @@ import xarray as xr
 from scipy.stats import qmc
 
 from sweep.config import Config, ConfigError, Values
-from sweep.config.faults import brief, fault_of, suggestion
 from sweep.config.film import read
-from sweep.config.user_models import explained
 from sweep.engine.reporter import Reporter
+from sweep.faults import brief, fault_of, suggestion
 from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.kernels.measures.misfit import Film, Misfit
+from sweep.models.user.blame import blamed
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.misfit import Ask, Minimum, Problem, minimise
@@ -79,7 +79,7 @@ def fit(config: Config, film: str | Path | Film, free: Sequence[str], reporter: 
     note, began = (reporter or Reporter()).note, time.perf_counter()
     if film.left_out:
         note(f"{film.left_out} rows of the film are left out: they hold no number, or are more than a fit needs")
-    with explained(config.origin):
+    with blamed(config.origin):
         problem = Problem(config, film, {name: theirs.get(name) or _range(config, name) for name in free})
         minima = _search(problem, note)
         best, limits, rugged = _intervals(problem, minima[0], note)

@@ -9,10 +9,10 @@ from pathlib import Path
 import xarray as xr
 
 from sweep.config import Config
-from sweep.config.user_models import explained
 from sweep.engine.cluster import Cluster
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import carry_out
+from sweep.models.user.blame import blamed
 from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
@@ -45,7 +45,7 @@ def kept(
     identity = replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
 
     def search(store: Store) -> xr.Dataset:
-        with explained(config.origin):
+        with blamed(config.origin):
             found = make(store)
         carry_out(found, store, reporter, cluster)
         return found.labelled().assign_attrs(vars(identity))

@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError
-from sweep.config.faults import either
 from sweep.engine.errors import ROUND_OFF
 from sweep.engine.whole import Apart, Whole, apart_from
+from sweep.faults import either
 from sweep.grid import Array
 from sweep.kernels.measures import default
 from sweep.models import MODELS

@@ -13,10 +13,8 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
-from sweep.config.bodies import misplaced, unfit
-from sweep.config.faults import suggestion
+from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.schema import FOREVER
-from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
 from sweep.engine import executor, final
 from sweep.engine.checks import results
@@ -26,6 +24,7 @@ from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.engine.work import Work
+from sweep.faults import suggestion
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import threads
@@ -36,8 +35,10 @@ from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
-from sweep.models.model import Columns, Model, take
+from sweep.models.model import OWN, Columns, Model, take
 from sweep.models.theory.linear import fastest_motion
+from sweep.models.user.blame import blamed
+from sweep.parameters import PAPER_UNITS, SI
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.search import require_simulated
@@ -65,6 +66,9 @@ MAX_TRAJECTORIES = 1000
 """Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
 
 _TIME = ("1", "time, in sqrt(c/g)")
+
+_TIMES = {PAPER_UNITS: "sqrt(c/g)", SI: "s", OWN: "of time"}
+"""The unit in which progress counts time, by the `units` of a configuration."""
 
 # name: units, long_name
 SERIES: dict[str, tuple[str, str]] = {
@@ -138,7 +142,7 @@ def trajectory(
     chosen = choose(config, at, samples)
     stops = stop_when_settled or chosen.integrator.t_end >= FOREVER
     chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_when_settled": stops}))
-    with explained(chosen.origin):
+    with blamed(chosen.origin):
         found = _followed(chosen, every, reporter or Reporter())
     if not samples:
         return found
@@ -156,7 +160,8 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     def report() -> None:
         table = kernel.table(images)
         covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
-        reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, time.perf_counter() - began))
+        seconds = time.perf_counter() - began
+        reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, seconds, _TIMES[chosen.units]))
 
     marks, steps = _run(kernel, images, settles, report), part.step.copy()
     work = Work(after_chunk=report)

@@ -158,9 +158,9 @@ def test_a_resumed_run_tells_how_many_cells_are_kept(write: Write, tmp_path: Pat
 def test_a_terminal_of_any_width_keeps_the_bar(width: int, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
     screen = io.StringIO()
-    terminal = Terminal(unit=unit)
+    terminal = Terminal()
     assert terminal.console.width == width
-    terminal.chunk(Progress(6072, 3036, 0, 0, 10.0))
+    terminal.chunk(Progress(6072, 3036, 0, 0, 10.0, unit))
     terminal._bar.stop()
     Console(file=screen, width=width).print(terminal._bar.get_renderable())
     (line,) = screen.getvalue().splitlines()

@@ -1,5 +1,6 @@
 """What is said of a configuration that cannot be run."""
 
+import pickle
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from support.cli import invoke, refused
 from support.physics import MOMENTS, stone
 
 from sweep import ConfigError, load_config
+from sweep.faults import fault_of
 
 
 def small(old: str, new: str) -> str:
@@ -151,6 +153,12 @@ def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None
     file = write(text + "".join(f"colour{i}: red\n" for i in range(50)))
     lines = invoke("run", file).stderr.splitlines()
     assert (len(lines), lines[-1]) == (21, f"{file}: 36 more faults")
+
+
+def test_another_process_is_told_of_faults() -> None:
+    error = fault_of("wrong", "body", "a", file="small.yaml", line=3)
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.faults) == ("small.yaml:3: body.a: wrong", error.faults)
 
 
 @pytest.mark.parametrize(

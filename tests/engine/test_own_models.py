@@ -228,8 +228,9 @@ def test_a_law_of_ones_own_moves_the_body_as_newton_says(folder: Path, monkeypat
         return p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2)
 
     monkeypatch.setitem(newton.LAWS, "fading", fading)
-    at = {"t_end": 0.5, "every": 0.1, "tolerance": 1e-12, "fading": 0.1, "slip1": 0.2}
-    one = sweep.trajectory(folder / "fading.yaml", **at).isel(trajectory=0)
+    at, told = {"t_end": 0.5, "every": 0.1, "tolerance": 1e-12, "fading": 0.1, "slip1": 0.2}, Stop(10**9)
+    one = sweep.trajectory(folder / "fading.yaml", reporter=told, **at).isel(trajectory=0)
+    assert {progress.unit for progress in told.seen} == {"s"}
     p = {name: one[name].item() for name in load_config(folder / "fading.yaml").equations.parameters}
     u1, u2 = np.cos(p["roll"]) * np.sin(p["pitch"]), -np.sin(p["roll"])
     start = np.array([u1, u2, p["omega1"], p["omega2"], p["omega3"], p["slip1"] * np.cos(p["pitch"]), 0.0])

@@ -9,21 +9,22 @@ from contextlib import contextmanager
 from itertools import pairwise
 from os.path import abspath
 
-from sweep.models.origin import ModelError, Origin
+from sweep.faults import ConfigError, fault_of
+from sweep.models.origin import Origin
 
 
 @contextmanager
 def blamed(origin: Origin | None, *, always: bool = False) -> Iterator[None]:
-    """Turn errors that come from the code of a user's model, or all errors, into a `ModelError` that says where."""
+    """Turn errors that come from the code of a user's model, or all errors, into a `ConfigError` that says where."""
     try:
         yield
-    except ModelError:
+    except ConfigError:
         raise
     except Exception as error:
         place, line = _place(error, origin) if origin else ("", None)
         if origin is None or not (place or always):
             raise
-        raise ModelError(place or origin.place, line, _words(error)) from None
+        raise fault_of(_words(error), file=place or origin.place, line=line) from None
 
 
 def _place(error: Exception, origin: Origin) -> tuple[str, int | None]:

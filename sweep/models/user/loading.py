@@ -14,13 +14,14 @@ from importlib import metadata
 from types import ModuleType
 from typing import Any
 
+from sweep.faults import fault_of
 from sweep.models.general import variants
 from sweep.models.general.laws import Law
 from sweep.models.general.selection import Physics
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.general.variants import SlipWith
 from sweep.models.model import Model
-from sweep.models.origin import ModelError, Origin
+from sweep.models.origin import Origin
 from sweep.models.user import trial
 from sweep.models.user.blame import blamed
 from sweep.parameters import PARAMETERS, Parameter
@@ -48,7 +49,7 @@ def load(origin: Origin) -> Model | SlipWith:
 
     Raises
     ------
-    ModelError
+    ConfigError
         if that cannot be done, or if what it defines is no model.
     """
     made: Model | SlipWith
@@ -72,7 +73,8 @@ def _file(origin: Origin) -> Any:
     try:
         code = compile(origin.text, origin.place, "exec")
     except (SyntaxError, ValueError) as error:
-        raise ModelError(origin.place, getattr(error, "lineno", None), f"not Python: {error.args[0]}") from None
+        line = getattr(error, "lineno", None)
+        raise fault_of(f"not Python: {error.args[0]}", file=origin.place, line=line) from None
     try:
         exec(code, module.__dict__)
     except SystemExit as error:
@@ -84,7 +86,7 @@ def _imported(origin: Origin) -> Any:
     try:
         return next(iter(metadata.entry_points(group=GROUP, name=origin.name))).load()
     except (ImportError, AttributeError) as error:
-        raise ModelError(f"entry point {origin.name} = {origin.place}", None, str(error)) from None
+        raise fault_of(str(error), file=f"entry point {origin.name} = {origin.place}") from None
 
 
 def table(origin: Origin | None) -> dict[str, Parameter]:

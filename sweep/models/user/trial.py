@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from sweep.faults import fault_of
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.variants import SlipWith
 from sweep.models.model import COUNT, ENERGY, LINEAR, OWN, SPIN, Columns, Model, never_rocks, never_upright
-from sweep.models.origin import ModelError, Origin
+from sweep.models.origin import Origin
 from sweep.models.theory.linear import fastest_motion
 from sweep.models.theory.stability import stable_ranges
 from sweep.models.user.blame import blamed
@@ -34,7 +35,7 @@ Faults = Iterator[tuple[Any, str]]
 
 
 def check(made: Any, origin: Origin) -> None:
-    """Raise a `ModelError` for the first fault of what a file or an entry point defines as its MODEL."""
+    """Raise a `ConfigError` for the first fault of what a file or an entry point defines as its MODEL."""
     _refuse(_declared(made), origin)
 
 
@@ -48,7 +49,7 @@ def try_out(model: Model, columns: Columns, law: Law | None = None) -> None:
 
     Raises
     ------
-    ModelError
+    ConfigError
         if one of them returns something else than it has to.
     """
     assert model.origin
@@ -60,9 +61,8 @@ def try_out(model: Model, columns: Columns, law: Law | None = None) -> None:
 def _refuse(faults: Faults, origin: Origin) -> None:
     for function, message in faults:
         code = getattr(function, "__code__", None)
-        raise ModelError(
-            origin.place, code.co_firstlineno if code and code.co_filename == origin.place else None, message
-        )
+        line = code.co_firstlineno if code and code.co_filename == origin.place else None
+        raise fault_of(message, file=origin.place, line=line)
 
 
 def _declared(made: Any) -> Faults:

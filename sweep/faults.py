@@ -1,4 +1,4 @@
-"""Faults of a configuration, each with the place where the user can correct it."""
+"""What the user can mend: faults of a configuration, each with the place where to correct it, and of files."""
 
 from __future__ import annotations
 
@@ -75,17 +75,24 @@ class Fault:
         return printable(": ".join(part for part in (place, spell(self.path), self.message) if part))
 
 
-class ConfigError(Exception):
+class Refused(Exception):
+    """What the user can mend, such as a configuration or a file that cannot be used; the text says how."""
+
+
+class ConfigError(Refused):
     """A configuration that cannot be run; `faults` has an entry for each thing to correct, in the order of lines."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults = sorted(faults, key=lambda fault: (fault.line or 0, fault.column or 0))
+        super().__init__(self.faults)  # by which another process is told of it
+
+    def __str__(self) -> str:
         lines = [str(fault) for fault in self.faults[:_MAX_LINES]]
         if more := len(self.faults) - len(lines):
             lines.append(str(Fault(self.faults[0].file, None, None, (), f"{more} more faults")))
-        super().__init__("\n".join(lines))
+        return "\n".join(lines)
 
 
-def fault_of(message: str, *path: str | int, file: str = "") -> ConfigError:
-    """The error of one fault that has no line."""
-    return ConfigError([Fault(file, None, None, path, message)])
+def fault_of(message: str, *path: str | int, file: str = "", line: int | None = None) -> ConfigError:
+    """The error of one fault that has no column."""
+    return ConfigError([Fault(file, line, None, path, message)])
