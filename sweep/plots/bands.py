@@ -15,37 +15,26 @@ from sweep.grid import SAMPLE
 from sweep.plots import labels
 from sweep.results.kind import parameters
 
-SHARES = (0.95, 0.68)
-"""Of the samples, that the bands hold, the widest first."""
-
-_OPACITIES = (0.18, 0.35)
+_BANDS = {0.95: 0.18, 0.68: 0.35}
+"""Shares of the samples that the bands hold, the widest first, and the opacities of these."""
 
 
 def draw(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
     """Draw a series of sampled trajectories; returns the entries for the legend."""
-    samples = int(dataset[SAMPLE].max()) + 1
+    samples, time = int(dataset[SAMPLE].max()) + 1, dataset["time"]
     entries: list[Artist] = []
     for i in range(dataset.sizes["trajectory"] // samples):
         one = dataset.isel(trajectory=slice(i * samples, (i + 1) * samples))
-        tails = [(1 - share) / 2 for share in SHARES]
+        tails = [(1 - share) / 2 for share in _BANDS]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # no sample goes on so long
             median, *ends = np.nanquantile(one[name], [0.5, *tails, *(1 - tail for tail in tails)], axis=0)
-        axes.plot(dataset["time"], median, color=f"C{i}", linewidth=0.9, gid=name)
-        for low, high, opacity in zip(ends[:2], ends[2:], _OPACITIES, strict=True):
-            axes.fill_between(
-                dataset["time"],
-                low,
-                high,
-                color=f"C{i}",
-                alpha=opacity,
-                linewidth=0,
-                rasterized=dataset.sizes["time"] > 5000,
-            )
+        axes.plot(time, median, color=f"C{i}", linewidth=0.9, gid=name)
+        for low, high, opacity in zip(ends[:2], ends[2:], _BANDS.values(), strict=True):
+            axes.fill_between(time, low, high, color=f"C{i}", alpha=opacity, linewidth=0, rasterized=time.size > 5000)
         entries.append(Line2D([], [], color=f"C{i}", label=_label(dataset, one)))
-    held = zip(SHARES, _OPACITIES, strict=True)
-    entries += [Patch(color="0.4", alpha=opacity, label=f"{share:.0%} of them") for share, opacity in held]
-    return entries
+    held = [Patch(color="0.4", alpha=opacity, label=f"{share:.0%} of them") for share, opacity in _BANDS.items()]
+    return entries + held
 
 
 def _label(dataset: xr.Dataset, one: xr.Dataset) -> str:
