@@ -96,9 +96,8 @@ def _points(axes: Axes, at: Array, values: Array, style: dict[str, Any], label: 
 def _form_factor(axes: Axes, chosen: xr.Dataset) -> Line2D:
     twin = axes.twinx()
     twin.set_label(BESIDE)
-    (line,) = twin.plot(
-        chosen["b"], chosen["form_factor"], color="0.5", linewidth=1, label="form factor L(f), right axis"
-    )
+    (line,) = twin.plot(chosen["b"], chosen["form_factor"], color="0.5", linewidth=1)
+    line.set_label("form factor L(f), right axis")
     twin.set_ylabel("L(f)", color="0.4")
     twin.tick_params(colors="0.4")
     for each in (axes, twin):  # the same zero, and marks there are whole

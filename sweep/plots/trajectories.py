@@ -84,17 +84,15 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
         first.set_xlim(0, until)
         apart = " " if columns > 1 else "\n"
         time = f"{time};{apart}nothing changes by more than {_STILL:.0%} from here to {last:g}"
-    axes = first
-    for k, (title, names) in enumerate(panels):
-        axes = figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first)
+    below = [figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first) for k in range(len(panels))]
+    for axes, (title, names) in zip(below, panels, strict=True):
         _series(axes, dataset, names)
         per_mass = " per unit mass" if "per unit mass" in dataset[next(iter(names))].attrs.get("long_name", "") else ""
         axes.set_title(f"{title}{per_mass}", loc="left", pad=16 if columns == 1 < len(names) else None)
-        axes.tick_params(labelbottom=k >= len(panels) - columns)
-        if k >= len(panels) - columns:
-            axes.set_xlabel(time)
-    if not panels:
-        first.set_xlabel(time)
+    for axes in below[:-columns]:
+        axes.tick_params(labelbottom=False)
+    for axes in (below or [first])[-columns:]:
+        axes.set_xlabel(time)
     figure.explain(entries)
     return figure
 
@@ -162,9 +160,8 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
         for name, symbol, at, source in body:
             style: Any = {"linestyle": theory.OVER_TIME[name], "linewidth": 0.9}
             axes.axhline(at, color=colour, gid=name, **style)
-            entries[name] = Line2D(
-                [], [], color="black", label=theory.words(name, source, over_n0=True, spin="n"), **style
-            )
+            words = theory.words(name, source, over_n0=True, spin="n")
+            entries[name] = Line2D([], [], color="black", label=words, **style)
             if all(abs(at - other) > apart for other in written):
                 axes.annotate(
                     labels.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
