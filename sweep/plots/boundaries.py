@@ -52,14 +52,14 @@ def draw(dataset: xr.Dataset) -> Picture:
 def curves(dataset: xr.Dataset, x: str, y: str) -> Iterator[tuple[int, Array, Array]]:
     """The level of each curve, and smooth x and y through those of its points that were found."""
     axes = [_axis(dataset, name) for name in (x, y)]
+    spans = [float(np.ptp(axis.straight(axis.values))) for axis in axes]
     for number in np.unique(dataset["curve"]):
         part = dataset.isel(point=((dataset["curve"] == number) & (dataset["outcome"] != OPEN)).values)
         if not part.sizes["point"]:
             continue
-        places = [axis.straight(part[axis.name].values) for axis in axes]
-        spans = [float(np.ptp(axis.straight(axis.values))) for axis in axes]
+        places = [axis.straight(part[axis.name].values) / span for axis, span in zip(axes, spans, strict=True)]
         closed = bool((part["closed"] == 1).all()) and len(part.point) == int((dataset["curve"] == number).sum())
-        xs, ys = smoothed(*(place / span for place, span in zip(places, spans, strict=True)), closed=closed)
+        xs, ys = smoothed(*places, closed=closed)
         yield int(part["level"][0]), axes[0].bent(xs * spans[0]), axes[1].bent(ys * spans[1])
 
 

@@ -72,7 +72,7 @@ def along(dataset: xr.Dataset, dim: str) -> Array:
     """The values of an axis, counted from zero if it has none; a zero without an axis."""
     if not dim:
         return np.zeros(1)
-    return np.asarray(dataset[dim].values if dim in dataset.coords else np.arange(dataset.sizes[dim]), float)
+    return np.asarray(dataset[dim].values, float)
 
 
 def table(array: xr.DataArray, x: Axis, y: Axis) -> Array:

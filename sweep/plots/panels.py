@@ -144,11 +144,8 @@ def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) 
     free = [d for d in dims if d not in (x, y)]
     long = [d for d in free if dataset.sizes[d] > _PANEL_VALUES and d != "count"]
     longest = sorted((d for d in free if d != "count"), key=lambda d: -dataset.sizes[d])[:1]
-    if x is None and y is None:
-        return (long or longest)[:2]
-    if x is None:
-        return [d for d in (y, *(long or longest)[:1]) if d]
-    return [d for d in (y or next(iter(long), None), x) if d]
+    rest = iter(long if x else long or longest)
+    return [d for d in (y or next(rest, None), x or next(rest, None)) if d]
 
 
 def _telling(dataset: xr.Dataset) -> list[int]:

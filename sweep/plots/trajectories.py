@@ -1,7 +1,8 @@
-"""Pictures of dense trajectories."""
+"""Pictures of dense trajectories; many samples of one scene are drawn as the bands in which most of them lie."""
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import matplotlib as mpl
@@ -10,11 +11,12 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from sweep.grid import SAMPLE, Array
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.plots import bands, labels, theory
+from sweep.plots import labels, theory
 from sweep.plots.figure import Picture, page, panel_width
 from sweep.results.kind import is_of_own_body, parameters
 
@@ -43,6 +45,9 @@ _STILL = 0.01
 
 _ENDLESS = ("heading", "table_x", "table_y")
 """Series that go on where a body spins steadily."""
+
+_BANDS = {0.95: 0.18, 0.68: 0.35}
+"""Shares of the samples that the bands hold, the widest first, and the opacities of these."""
 
 _NARROW = 6.0
 """Inches of a page up to which panels stand below each other."""
@@ -122,7 +127,7 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
     first = next(iter(names))
     axes.set_ylabel(labels.with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
     if SAMPLE in dataset.coords:
-        return bands.draw(axes, dataset, first)
+        return _bands(axes, dataset, first)
     entries: list[Artist] = []
     # Oscillations are so dense that an opaque curve would hide those below it.
     alone = dataset.sizes["trajectory"] == 1 or "spin" in names
@@ -144,6 +149,34 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
             borderaxespad=0.2,
         )  # fmt: skip
     return entries
+
+
+def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
+    """Draw a series of sampled trajectories; returns the entries for the legend."""
+    samples, time = int(dataset[SAMPLE].max()) + 1, dataset["time"]
+    entries: list[Artist] = []
+    for i in range(dataset.sizes["trajectory"] // samples):
+        one = dataset.isel(trajectory=slice(i * samples, (i + 1) * samples))
+        tails = [(1 - share) / 2 for share in _BANDS]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # no sample goes on so long
+            median, *ends = np.nanquantile(one[name], [0.5, *tails, *(1 - tail for tail in tails)], axis=0)
+        axes.plot(time, median, color=f"C{i}", linewidth=0.9, gid=name)
+        for low, high, opacity in zip(ends[:2], ends[2:], _BANDS.values(), strict=True):
+            axes.fill_between(time, low, high, color=f"C{i}", alpha=opacity, linewidth=0, rasterized=time.size > 5000)
+        entries.append(Line2D([], [], color=f"C{i}", label=_of_samples(dataset, one)))
+    held = [Patch(color="0.4", alpha=opacity, label=f"{share:.0%} of them") for share, opacity in _BANDS.items()]
+    return entries + held
+
+
+def _of_samples(dataset: xr.Dataset, one: xr.Dataset) -> str:
+    """What the samples of one cell have in common and not with all others, and how many there are."""
+    own = [
+        labels.measured(dataset, name, float(one[name][0]))
+        for name in parameters(dataset)
+        if dataset[name].dims and len(np.unique(one[name])) == 1 < len(np.unique(dataset[name]))
+    ]
+    return ", ".join([*own, f"median of {one.sizes['trajectory']} samples"])
 
 
 def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
