@@ -161,7 +161,5 @@ def _fraction(units: str) -> str:
 
 
 def _long_name(dataset: xr.Dataset, name: str) -> str:
-    given = dataset[name].attrs.get("long_name")
-    if given is None and name in _RECORDS:
-        given = _RECORDS[name].long_name
-    return str(given or "")
+    usual = _RECORDS[name].long_name if name in _RECORDS else ""
+    return str(dataset[name].attrs.get("long_name", usual))

@@ -171,12 +171,9 @@ def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
 
 def _of_samples(dataset: xr.Dataset, one: xr.Dataset) -> str:
     """What the samples of one cell have in common and not with all others, and how many there are."""
-    own = [
-        labels.measured(dataset, name, float(one[name][0]))
-        for name in parameters(dataset)
-        if dataset[name].dims and len(np.unique(one[name])) == 1 < len(np.unique(dataset[name]))
-    ]
-    return ", ".join([*own, f"median of {one.sizes['trajectory']} samples"])
+    own = [name for name in _varying(dataset) if name not in _varying(one)]
+    told = [labels.measured(dataset, name, float(one[name][0])) for name in own]
+    return ", ".join([*told, f"median of {one.sizes['trajectory']} samples"])
 
 
 def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
@@ -246,14 +243,18 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 def label(dataset: xr.Dataset, i: int) -> str:
     """The parameters that set this trajectory apart from the others, and its number of reversals."""
-    varying = [name for name in parameters(dataset) if len(set(np.ravel(dataset[name].values))) > 1]
-    names = varying or [name for name in ("n0", "omega3") if name in dataset]
+    names = _varying(dataset) or [name for name in ("n0", "omega3") if name in dataset]
     named = ", ".join(labels.measured(dataset, name, float(np.ravel(dataset[name].values)[i])) for name in names)
     return f"{named}: {labels.reversals(int(dataset['reversals'][i]))}" if "reversals" in dataset else named
 
 
 def constants_apart(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the parameters that all trajectories share as scalar coordinates."""
-    values = {name: set(np.ravel(dataset[name].values)) for name in parameters(dataset)}
-    shared = {name: ((), found.pop(), dataset[name].attrs) for name, found in values.items() if len(found) == 1}
-    return dataset.drop_vars(list(shared)).assign_coords(shared)
+    names = [name for name in parameters(dataset) if name not in _varying(dataset)]
+    shared = {name: ((), np.ravel(dataset[name])[0], dataset[name].attrs) for name in names}
+    return dataset.drop_vars(names).assign_coords(shared)
+
+
+def _varying(dataset: xr.Dataset) -> list[str]:
+    """The parameters that not all trajectories share."""
+    return [name for name in parameters(dataset) if np.unique(dataset[name]).size > 1]
