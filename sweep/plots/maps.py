@@ -227,9 +227,5 @@ def _name(dataset: xr.Dataset) -> str:
 def _constants(datasets: Sequence[xr.Dataset]) -> str:
     """The parameters that are the same in all datasets."""
     first, *others = datasets
-
-    def shared(name: str) -> bool:
-        return all(name in other.coords and np.array_equal(other[name], first[name]) for other in others)
-
-    own = [name for name in map(str, first.coords) if not shared(name)]
+    own = {n for n, v in first.coords.items() for other in others if not np.array_equal(v, other.coords.get(n, []))}
     return labels.constants(first.drop_vars(own))
