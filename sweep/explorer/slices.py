@@ -14,7 +14,7 @@ import xarray as xr
 from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, marks, quantities, theory
-from sweep.plots.description import Map, along, describe, needed, table
+from sweep.plots.description import Map, along, describe, table
 from sweep.results.kind import BOUNDARIES, FIT, INDICES, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
@@ -109,18 +109,17 @@ class Source:
 
     def map(self, name: str, x: str, y: str, at: Mapping[str, int]) -> Map:
         """Read the map of a variable over `x` and `y`, at an index of each other axis; a row if `y` is empty."""
-        return describe(self._part(needed(self.dataset, name), x, y, at), name, x, y)
+        return describe(self._part(x, y, at), name, x, y)
 
     def tables(self, names: Iterable[str], x: str, y: str, at: Mapping[str, int]) -> dict[str, Array]:
         """The values of variables over the cells of such a map, each of shape (y, x)."""
-        wanted = set().union(*(needed(self.dataset, name) for name in names))
-        part = quantities.with_derived(self._part(wanted, x, y, at))
+        part = self._part(x, y, at)
         axes = [self.axes[d] if d else Axis("", np.zeros(1)) for d in (x, y)]
-        return {name: table(part[name], *axes) for name in names}
+        return {name: table(quantities.field(part, name), *axes) for name in names}
 
-    def _part(self, names: Iterable[str], x: str, y: str, at: Mapping[str, int]) -> xr.Dataset:
-        fixed = {d: at.get(d, 0) for d in self.axes if d not in (x, y)}
-        return self.dataset[list(names)].isel(fixed, missing_dims="ignore").load()
+    def _part(self, x: str, y: str, at: Mapping[str, int]) -> xr.Dataset:
+        """The slice over `x` and `y`; of a large file, each variable is read when it is asked for."""
+        return self.dataset.isel({d: at.get(d, 0) for d in self.axes if d not in (x, y)})
 
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:
         """The parameters `names` of the cell at `index`, as far as the dataset tells them."""

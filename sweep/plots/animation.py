@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
@@ -36,6 +37,9 @@ _BUTTONS = {
     "play": "▶", "step-forward": "⏩", "fast-forward": "⏭", "plus": "+",
 }  # fmt: skip
 """What a page shows in place of the icons that matplotlib's would load from the network."""
+
+_SURFACE = {"rstride": 1, "cstride": 1, "linewidth": 0, "antialiased": False, "zorder": 2}
+"""How matplotlib draws the surface of a body: each face, without lines between them."""
 
 FORMATS = ("gif", "mp4", "html")
 
@@ -70,10 +74,8 @@ def animate(
     found = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
     if "heading" not in found:
         raise ValueError("its bodies have no attitude; animate trajectories of the models slip or noslip")
-    if found.sizes["trajectory"] > MOST:
-        raise ValueError(
-            f"{found.sizes['trajectory']} bodies are too many to stand side by side; choose at most {MOST}"
-        )
+    if (bodies := found.sizes["trajectory"]) > MOST:
+        raise ValueError(f"{bodies} bodies are too many to stand side by side; choose at most {MOST}")
     last = float(found["time"][-1])
     end = min(_until(found) if end is None else end, last)
     if not begin < end:
@@ -104,37 +106,35 @@ class _Scene:
     """The figure, and the state of each body at each frame."""
 
     def __init__(self, dataset: xr.Dataset, times: Array) -> None:
-        self.times, self.figure = times, Figure((max(3.2 * dataset.sizes["trajectory"], 6.4), 4.8), dpi=80)
         bodies = dataset.sizes["trajectory"]
+        self.figure = Figure((max(3.2 * bodies, 6.4), 4.8), dpi=80)
         self.figure.suptitle(labels.constants(trajectories.constants_apart(dataset)), fontsize=8)
-        self.spins = self.figure.add_axes((0.1, 0.12, 0.85, 0.26))
-        self.spins.set(xlim=(times[0], times[-1]), xlabel=labels.label(dataset, "time"), ylabel="spin n")
-        self.spins.axhline(0, color="black", linewidth=0.5)
+        over_time = self.figure.add_axes((0.1, 0.12, 0.85, 0.26))
+        over_time.set(xlim=(times[0], times[-1]), xlabel=labels.label(dataset, "time"), ylabel="spin n")
+        over_time.axhline(0, color="black", linewidth=0.5)
         self.bodies = []
         for i in range(bodies):
-            one = dataset.isel(trajectory=i)
             place = (i / bodies, 0.42, 1 / bodies, 0.55)
             axes: Any = self.figure.add_axes(place, projection="3d", computed_zorder=False)
             axes.set_title(trajectories.label(dataset, i), fontsize=9, color=f"C{i}", y=0.82)
-            (curve,) = self.spins.plot([], [], color=f"C{i}", linewidth=1)
-            self.bodies.append(_Body(one, times, axes, curve, f"C{i}"))
+            (curve,) = over_time.plot([], [], color=f"C{i}", linewidth=1)
+            self.bodies.append(_Body(dataset.isel(trajectory=i), times, axes, curve))
         spins = np.concatenate([each.spin for each in self.bodies])
         margin = 0.08 * max(np.ptp(spins), 1e-12)
-        self.spins.set_ylim(min(spins.min(), 0) - margin, max(spins.max(), 0) + margin)
+        over_time.set_ylim(min(spins.min(), 0) - margin, max(spins.max(), 0) + margin)
 
     def show(self, frame: int) -> list[Any]:
         """Draw all bodies at a frame."""
         for each in self.bodies:
-            each.show(frame, self.times)
+            each.show(frame)
         return []
 
 
 class _Body:
     """One body on its table, and its curve of n(t)."""
 
-    def __init__(self, one: xr.Dataset, times: Array, axes: Any, curve: Any, colour: str) -> None:
-        self.axes, self.curve = axes, curve
-        self.surface: Any = None
+    def __init__(self, one: xr.Dataset, times: Array, axes: Any, curve: Line2D) -> None:
+        self.axes, self.curve, self.times = axes, curve, times
         self.moving = body.moving(one, times)
         known = np.isfinite(one["heading"].values)
         self.spin = np.interp(times, one["time"].values[known], one["spin"].values[known])
@@ -144,27 +144,18 @@ class _Body:
         # Seen through the body, which covers most of it.
         (self.trace,) = axes.plot([], [], [], color="black", linewidth=1, zorder=3)
         (self.dot,) = axes.plot([], [], [], "o", color="black", markersize=3, zorder=3)
-        self.colours = self.moving.colours(colour)
+        self.look = {"facecolors": self.moving.colours(str(curve.get_color())), "lightsource": LightSource(**body.SUN)}
 
-    def show(self, frame: int, times: Array) -> None:
-        moving, place = self.moving, [*self.moving.path[:, frame], 0.0]
+    def show(self, frame: int) -> None:
+        """Draw the body in place of what it was at the frame before."""
+        moving, place = self.moving, np.append(self.moving.path[:, frame], 0.0)
         at = np.einsum("ij,jkl->ikl", moving.turns[frame], moving.points - moving.contacts[frame][:, None, None])
-        at += np.array(place)[:, None, None]
-        if self.surface is not None:
-            self.surface.remove()
-        self.surface = self.axes.plot_surface(
-            *at,
-            facecolors=self.colours,
-            rstride=1,
-            cstride=1,
-            linewidth=0,
-            antialiased=False,
-            zorder=2,
-            lightsource=LightSource(**body.SUN),
-        )
+        for surface in list(self.axes.collections):
+            surface.remove()
+        self.axes.plot_surface(*at + place[:, None, None], **_SURFACE, **self.look)
         self.trace.set_data_3d(*moving.path[:, : frame + 1], np.zeros(frame + 1))
         self.dot.set_data_3d(*([each] for each in place))
-        self.curve.set_data(times[: frame + 1], self.spin[: frame + 1])
+        self.curve.set_data(self.times[: frame + 1], self.spin[: frame + 1])
 
 
 def _save(animation: FuncAnimation, path: Path) -> None:

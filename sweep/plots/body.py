@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.colors import to_rgb
+from scipy.spatial.transform import Rotation
 
 from sweep.grid import Array
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES, offset
@@ -76,7 +77,7 @@ def moving(one: xr.Dataset, times: Array) -> Moving:
         for name in ("heading", "roll_angle", "pitch_angle", "table_x", "table_y")
     )
     delta = float(one["delta"]) if "delta" in one else 0.0
-    turns = rotation(heading, roll, pitch) @ _about(2, -delta)
+    turns = rotation(heading, roll, pitch) @ Rotation.from_euler("z", -delta).as_matrix()
     contacts = np.array(surface.contact(turns[:, 2, 0], turns[:, 2, 1], 0.0, 0.0, 0.0, constants)[1]).T
     return Moving(_points(surface is ELLIPSOID, columns), turns, contacts, np.array(path))
 
@@ -103,14 +104,5 @@ def _points(ellipsoid: bool, columns: dict[str, Array]) -> Array:
 
 def rotation(heading: Any, roll: Any, pitch: Any) -> Array:
     """The matrices that take vectors from the body to the table, shape (…, 3, 3)."""
-    return np.asarray(np.diag([1, -1, -1]) @ _about(2, -heading) @ _about(0, roll) @ _about(1, pitch))
-
-
-def _about(axis: int, angle: Any) -> Array:
-    """The matrices of turns about an axis, shape (…, 3, 3)."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    turn = np.zeros((*np.shape(angle), 3, 3)) + np.eye(3)
-    turn[..., i, i] = turn[..., j, j] = np.cos(angle)
-    turn[..., j, i] = np.sin(angle)
-    turn[..., i, j] = -turn[..., j, i]
-    return turn
+    turns = Rotation.from_euler("ZXY", np.stack([-heading, roll, pitch], axis=-1))
+    return np.asarray(np.diag([1, -1, -1]) @ turns.as_matrix())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +16,9 @@ from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_sca
 from sweep.plots.panels import MAX_PANELS
 from sweep.plots.theory import Line
 from sweep.results.margins import OPEN, smoothed
+
+_OPEN: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "markeredgecolor": "0.3"}
+"""How points are drawn at which no boundary was found."""
 
 
 def draw(dataset: xr.Dataset) -> Picture:
@@ -36,29 +40,26 @@ def draw(dataset: xr.Dataset) -> Picture:
         each = [Line("boundary", "", [(xs, ys)], f"{level}") for level, xs, ys in drawn]
         lines.number(axes, each, _axis(dataset, x), _axis(dataset, y))
         open_ = part.isel(point=(part["outcome"] == OPEN).values)
-        axes.plot(open_[x], open_[y], linestyle="none", marker="o", markersize=3, color="none", markeredgecolor="0.3")
+        axes.plot(open_[x], open_[y], markersize=3, **_OPEN)
         axes.set(xlabel=labels.label(dataset, x), ylabel=labels.label(dataset, y))
         axes.set(xlim=dataset[x].attrs["actual_range"], ylim=dataset[y].attrs["actual_range"])
     count = int((dataset["outcome"] == OPEN).sum())
     words = f"not found: a cell failed, or did not end ({count} of {dataset.sizes['point']})"
-    handle = Line2D(
-        [], [], linestyle="none", marker="o", markersize=4, color="none", markeredgecolor="0.3", label=words
-    )
-    figure.explain([handle] if count else [])
+    figure.explain([Line2D([], [], markersize=4, label=words, **_OPEN)] if count else [])
     return figure
 
 
 def curves(dataset: xr.Dataset, x: str, y: str) -> Iterator[tuple[int, Array, Array]]:
     """The level of each curve, and smooth x and y through those of its points that were found."""
     axes = [_axis(dataset, name) for name in (x, y)]
+    spans = [float(np.ptp(axis.straight(axis.values))) for axis in axes]
     for number in np.unique(dataset["curve"]):
         part = dataset.isel(point=((dataset["curve"] == number) & (dataset["outcome"] != OPEN)).values)
         if not part.sizes["point"]:
             continue
-        places = [axis.straight(part[axis.name].values) for axis in axes]
-        spans = [float(np.ptp(axis.straight(axis.values))) for axis in axes]
+        places = [axis.straight(part[axis.name].values) / span for axis, span in zip(axes, spans, strict=True)]
         closed = bool((part["closed"] == 1).all()) and len(part.point) == int((dataset["curve"] == number).sum())
-        xs, ys = smoothed(*(place / span for place, span in zip(places, spans, strict=True)), closed=closed)
+        xs, ys = smoothed(*places, closed=closed)
         yield int(part["level"][0]), axes[0].bent(xs * spans[0]), axes[1].bent(ys * spans[1])
 
 
@@ -71,9 +72,8 @@ def _axis(dataset: xr.Dataset, name: str) -> Axis:
 def _panels(dataset: xr.Dataset, across: set[str]) -> Iterator[tuple[str, xr.Dataset]]:
     """The values of the other axes in words, and the points that have them."""
     others = [str(n) for n, c in dataset.coords.items() if c.dims == ("point",) and n not in across]
-    cells = (
-        np.stack([dataset[name].values for name in others], axis=1) if others else np.zeros((dataset.sizes["point"], 1))
-    )
+    columns = [dataset[name].values for name in others] or [np.zeros(dataset.sizes["point"])]
+    cells = np.stack(columns, axis=1)
     for cell in np.unique(cells, axis=0):
         words = ", ".join(labels.measured(dataset, name, float(v)) for name, v in zip(others, cell, strict=False))
         yield words, dataset.isel(point=(cells == cell).all(axis=1))

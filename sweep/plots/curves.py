@@ -45,20 +45,18 @@ def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[A
     dataset, x = panels.dataset, panels.across[0] if panels.across else ""
     names = [name for name in panels.names if name not in COMPARISONS] or panels.names
     names = names[:1] + [name for name in names[1:] if dataset[name].notnull().any()]
+    kinds = legend(dataset, names[0])
     entries: dict[str, Artist] = {}
     for axes, chosen in frames:
-        entries |= _panel(axes, chosen, names, x)
+        entries |= _panel(axes, chosen, names, x, kinds)
         axes.set_ylabel(labels.common(dataset, names[0]))
         if limits:
             axes.set_ylim(limits)
-    words = legend(dataset, names[0])
-    for name, entry in entries.items():
-        entry.set_label(words.get(name, entry.get_label()))
     return list(entries.values())
 
 
-def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str) -> dict[str, Artist]:
-    """Draw one panel; returns the entries for the legend."""
+def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str, kinds: dict[str, str]) -> dict[str, Artist]:
+    """Draw one panel, with the words for the kinds of its cells; returns the entries for the legend."""
     entries: dict[str, Artist] = {}
     described = [describe(chosen, name, x) for name in names]
     first = described[0]
@@ -73,7 +71,7 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str) -> dict[str
         for kind, (where,) in shown.marks.items() if shown is first else ():
             if where.any():
                 place = np.zeros(where.sum()) if kind in BLANK else height[where]
-                entries[kind] = _points(axes, at[where], place, _STYLES[kind] | {"gid": kind}, kind, size)
+                entries[kind] = _points(axes, at[where], place, _STYLES[kind] | {"gid": kind}, kinds[kind], size)
     if first.values.dtype.kind == "i":
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     if first.flags:
@@ -96,9 +94,8 @@ def _points(axes: Axes, at: Array, values: Array, style: dict[str, Any], label: 
 def _form_factor(axes: Axes, chosen: xr.Dataset) -> Line2D:
     twin = axes.twinx()
     twin.set_label(BESIDE)
-    (line,) = twin.plot(
-        chosen["b"], chosen["form_factor"], color="0.5", linewidth=1, label="form factor L(f), right axis"
-    )
+    (line,) = twin.plot(chosen["b"], chosen["form_factor"], color="0.5", linewidth=1)
+    line.set_label("form factor L(f), right axis")
     twin.set_ylabel("L(f)", color="0.4")
     twin.tick_params(colors="0.4")
     for each in (axes, twin):  # the same zero, and marks there are whole

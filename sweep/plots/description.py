@@ -15,10 +15,8 @@ from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, levels, scales, theory
 from sweep.plots.marks import BLANK, legend, marks
-from sweep.plots.quantities import DERIVED, field
+from sweep.plots.quantities import field
 from sweep.plots.scales import Limits, Scale
-
-_NEEDED_BY_MARKS = ("status", "inferred", "noise_limited", "sensitive", "window_dependent", "decided")
 
 
 @dataclass(frozen=True)
@@ -26,8 +24,6 @@ class Map:
     """A variable over two axes, all other axes being fixed."""
 
     name: str
-    label: str
-    """The variable in words, with its unit."""
     x: Axis
     y: Axis
     """Of one value, and without a name, where the dataset has a single axis."""
@@ -67,24 +63,16 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
     lines = theory.lines(dataset, across, up) if y and name in theory.REVERSALS else []
     lines += levels.lines(dataset, across, up) if y and name == "reversals" else []
     return Map(
-        name, labels.label(dataset.assign({name: found}), name), across, up, table(found, across, up),
-        {kind: table(where, across, up) for kind, where in kinds.items()},
+        name, across, up, table(found, across, up), {kind: table(where, across, up) for kind, where in kinds.items()},
         legend(dataset, name), labels.flag_words(dataset.assign({name: found}), name), lines,
     )  # fmt: skip
-
-
-def needed(dataset: xr.Dataset, name: str) -> set[str]:
-    """The variables of a dataset that `describe` looks at."""
-    lines = [str(n) for n in dataset.data_vars if str(n).startswith("n_c")] if name in theory.REVERSALS else []
-    lines += levels.NEEDED if name == "reversals" else []
-    return {*(DERIVED[name].needs if name in DERIVED else (name,)), *_NEEDED_BY_MARKS, *lines} & set(dataset.data_vars)
 
 
 def along(dataset: xr.Dataset, dim: str) -> Array:
     """The values of an axis, counted from zero if it has none; a zero without an axis."""
     if not dim:
         return np.zeros(1)
-    return np.asarray(dataset[dim].values if dim in dataset.coords else np.arange(dataset.sizes[dim]), float)
+    return np.asarray(dataset[dim].values, float)
 
 
 def table(array: xr.DataArray, x: Axis, y: Axis) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import xarray as xr
 
@@ -138,14 +138,9 @@ def constants(dataset: xr.Dataset) -> str:
         found = {name: at for name, at in found.items() if at or name not in PARAMETERS or PARAMETERS[name].default}
     ordered = [name for name in parameters(dataset) if name in found]
     fixed = [measured(dataset, name, found[name]) for name in dict.fromkeys([*ordered, *found])]
-    return ", ".join([*fixed, *_distributions(dataset)])
-
-
-def _distributions(dataset: xr.Dataset) -> Iterator[str]:
-    """What is known of each parameter that was sampled."""
-    for name, coordinate in dataset.coords.items():
-        if known := coordinate.attrs.get("distribution"):
-            yield f"{symbol(str(name))}: {known}{si_unit(dataset, str(name))}"
+    known = {str(name): v.attrs["distribution"] for name, v in dataset.coords.items() if "distribution" in v.attrs}
+    sampled = [f"{symbol(name)}: {words}{si_unit(dataset, name)}" for name, words in known.items()]
+    return ", ".join([*fixed, *sampled])
 
 
 def in_maths(words: str) -> str:
@@ -166,7 +161,5 @@ def _fraction(units: str) -> str:
 
 
 def _long_name(dataset: xr.Dataset, name: str) -> str:
-    given = dataset[name].attrs.get("long_name")
-    if given is None and name in _RECORDS:
-        given = _RECORDS[name].long_name
-    return str(given or "")
+    usual = _RECORDS[name].long_name if name in _RECORDS else ""
+    return str(dataset[name].attrs.get("long_name", usual))

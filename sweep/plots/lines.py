@@ -89,14 +89,11 @@ def _symbols(axes: Axes, shown: Map, written: list[places.Number]) -> None:
     """Write the symbols of critical spins beside their lines, where there is room."""
     words = {line.symbol: labels.in_maths(line.symbol) for line in shown.lines if line.name != "boundary"}
     size = _LAID_OUT * axes.bbox.width * np.array([1, RATIO])
-
-    def half_size(of: str) -> Array:
+    halves: dict[str, Array] = {}
+    for symbol, of in words.items():
         text = axes.text(0, 0, of)
-        found = extent(text) / size / 2
+        halves[symbol] = extent(text) / size / 2
         text.remove()
-        return found
-
-    halves = {symbol: half_size(of) for symbol, of in words.items()}
     in_points = size * 72 / axes.get_figure(root=True).dpi  # type: ignore[union-attr]
     for symbol, at, middle in places.symbols(shown.lines, shown.x, shown.y, written, halves):
         axes.annotate(words[symbol], tuple(at), xycoords="axes fraction", xytext=tuple((middle - at) * in_points),

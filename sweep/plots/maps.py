@@ -43,24 +43,23 @@ _OF_DIFFERENCES = ("failed", "not_run", "impossible", "time_limit")
 def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, *, contours: bool = False) -> Picture:
     """A map of each variable over two axes, side by side, and such a row for each value of the other axes."""
     dataset, names = panels.dataset, panels.names
-    together = [names] if fits(len(names)) else [[name] for name in names]
-    groups = list(product(range(len(panels.each)), together))
-    rows, across = arrangement(len(groups), len(together[0]))
-    columns = across * len(together[0])
+    maps = _maps(panels, names)
+    together = len(names) if fits(len(names)) else 1
+    groups = [_columns(maps[0], names[i : i + together]) for i in range(0, len(names), together)]
+    count = len(groups) * len(maps)
+    rows, across = arrangement(count, together)
+    columns = across * together
     width = panel_width(columns, _WIDEST, _AROUND)
     small = width < _SMALL
     figure = Picture(width * columns + _AROUND, 1.6 + width * RATIO * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
-    maps = _maps(panels, names)
     each_scales = [_scales(maps, k, limits, cmap) for k in range(len(maps))]
     entries: dict[str, Artist] = {}
-    grid, first = None, None
-    for place, (k, group) in enumerate(groups):
-        kinds, scales = _columns({name: maps[k][name] for name in group}), each_scales[k]
-        grid = grid or figure.add_gridspec(
-            rows, across * len(kinds), width_ratios=across * [1 if name else _BAR for name in kinds]
-        )
-        row, column = divmod(place, across)
+    first = None
+    widths = across * [1 if name else _BAR for name in groups[0]]
+    grid = figure.add_gridspec(rows, len(widths), width_ratios=widths)
+    for place, (k, kinds) in enumerate(product(range(len(maps)), groups)):
+        scales, (row, column) = each_scales[k], divmod(place, across)
         for i, name in enumerate(kinds):
             at = grid[row, column * len(kinds) + i]
             if not name:
@@ -68,10 +67,10 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, 
                 continue
             axes = figure.add_subplot(at, sharex=first, sharey=first)
             first = first or axes
-            how = {"alone": len(names) == 1, "labelled": not small, "contours": contours}
-            entries |= _map(axes, maps[k][name], scales[name], **how)
-            axes.set_title(_title(panels, name, panels.each[k], small=small and len(group) > 1))
-            _label_axes(axes, dataset, maps[k][name], left=i == 0, lowest=place + across >= len(groups))
+            shown, alone = maps[k][name], len(names) == 1
+            entries |= _map(axes, shown, scales[name], alone=alone, labelled=not small, contours=contours)
+            axes.set_title(_title(panels, name, panels.each[k], small=small and together > 1))
+            _label_axes(axes, dataset, shown, left=i == 0, lowest=place + across >= count)
     figure.explain([*_meanings([panels], [maps], each_scales[0]), *entries.values()])
     return figure
 
@@ -134,12 +133,12 @@ def _maps(panels: Panels, names: list[str]) -> Maps:
     return [{name: describe(panels.dataset.isel(panel), name, right, down) for name in names} for panel in panels.each]
 
 
-def _columns(shown: dict[str, Map]) -> list[str]:
-    """The variables of a panel in their order, and "" for each bar: after the last map that shares its scale."""
-    if any(each.flags for each in shown.values()):  # told in the legend
-        return list(shown)
-    counted = [name for name in shown if name not in COMPARISONS]
-    compared = [name for name in shown if name in COMPARISONS]
+def _columns(shown: dict[str, Map], names: list[str]) -> list[str]:
+    """The variables of a group in their order, and "" for each bar: after the last map that shares its scale."""
+    if any(shown[name].flags for name in names):  # told in the legend
+        return names
+    counted = [name for name in names if name not in COMPARISONS]
+    compared = [name for name in names if name in COMPARISONS]
     return [*counted, *([""] if counted else []), *(each for name in compared for each in (name, ""))]
 
 
@@ -228,9 +227,5 @@ def _name(dataset: xr.Dataset) -> str:
 def _constants(datasets: Sequence[xr.Dataset]) -> str:
     """The parameters that are the same in all datasets."""
     first, *others = datasets
-
-    def shared(name: str) -> bool:
-        return all(name in other.coords and np.array_equal(other[name], first[name]) for other in others)
-
-    own = [name for name in map(str, first.coords) if not shared(name)]
+    own = {n for n, v in first.coords.items() for other in others if not np.array_equal(v, other.coords.get(n, []))}
     return labels.constants(first.drop_vars(own))

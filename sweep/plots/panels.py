@@ -6,7 +6,7 @@ Free of any library that draws.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from textwrap import fill
@@ -91,7 +91,7 @@ def choose(
         dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // most)) for d in across})
     dataset = dataset.assign({name: field(dataset, name) for name in names})
     dataset = dataset.sortby([d for d in across if d in dataset.coords])
-    return Panels(dataset, whole, names, across, list(indices(dataset, rest)))
+    return Panels(dataset, whole, names, across, indices(dataset, rest))
 
 
 def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:
@@ -112,10 +112,9 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
     return found
 
 
-def indices(dataset: xr.Dataset, dims: list[str]) -> Iterator[Panel]:
+def indices(dataset: xr.Dataset, dims: list[str]) -> list[Panel]:
     """All indices along `dims`, a panel each."""
-    for index in product(*(range(dataset.sizes[d]) for d in dims)):
-        yield dict(zip(dims, index, strict=True))
+    return [dict(zip(dims, index, strict=True)) for index in product(*(range(dataset.sizes[d]) for d in dims))]
 
 
 def title(dataset: xr.Dataset, panel: Panel) -> str:
@@ -145,11 +144,8 @@ def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) 
     free = [d for d in dims if d not in (x, y)]
     long = [d for d in free if dataset.sizes[d] > _PANEL_VALUES and d != "count"]
     longest = sorted((d for d in free if d != "count"), key=lambda d: -dataset.sizes[d])[:1]
-    if x is None and y is None:
-        return (long or longest)[:2]
-    if x is None:
-        return [d for d in (y, *(long or longest)[:1]) if d]
-    return [d for d in (y or next(iter(long), None), x) if d]
+    rest = iter(long if x else long or longest)
+    return [d for d in (y or next(rest, None), x or next(rest, None)) if d]
 
 
 def _telling(dataset: xr.Dataset) -> list[int]:

@@ -36,13 +36,12 @@ def _curves(axes: Axes, chosen: xr.Dataset, x: str) -> None:
     """Draw the probability of each count or more, with its interval as a band."""
     counts = chosen["count"].values
     colours = mpl.colormaps["viridis"](_COLOURS * np.arange(len(counts)) / max(len(counts) - 1, 3))
-    set_scale(axes, "x", chosen[x].values)
+    at = chosen[x].values
+    set_scale(axes, "x", at)
     for count, colour in zip(counts, colours, strict=True):
         one = chosen.sel(count=count)
-        axes.plot(one[x], one["probability"], color=colour, linewidth=1.2, label=title(chosen, {"count": count - 1}))
-        axes.fill_between(
-            one[x], one["probability_low"], one["probability_high"], color=colour, alpha=0.25, linewidth=0
-        )
+        axes.plot(at, one["probability"], color=colour, linewidth=1.2, label=title(chosen, {"count": count - 1}))
+        axes.fill_between(at, one["probability_low"], one["probability_high"], color=colour, alpha=0.25, linewidth=0)
     axes.set_ylabel("probability, with its interval of 95 %")
 
 

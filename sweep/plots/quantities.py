@@ -108,17 +108,14 @@ def check_pictures(config: Config) -> None:
 def subject(dataset: xr.Dataset) -> str:
     """The variable that a dataset is about, which is shown where none is named.
 
-    It is the first picture that the configuration names.  If it names none, it is the first variable of the measurement
-    that it names first, or the quantity that this serves.  Where it is lacking, it is the reversals.
+    It is the first picture that the configuration names.  If it names none, it is the probability of counts, or else
+    the first variable of the measurement that it names first, or the quantity that this serves.  Where it is lacking,
+    it is the reversals.
     """
     there = {*map(str, dataset.data_vars), *derivable(dataset)}
-    if (named := pictured(dataset)[:1]) and named[0] in there:
-        return named[0]
-    if "probability" in dataset:
-        return "probability"
     measurement = str(dataset.attrs.get("measured", "")).partition(" ")[0].partition("=")[0]
     served = [_SERVE[measurement]] if measurement in _SERVE else []
     variables = MEASURES[measurement].variables if measurement in MEASURES else {}
     own = [name for name, spec in variables.items() if not spec.along]
-    wanted = (*served, *own[:1], "reversals", "reversals_predicted")
+    wanted = (*pictured(dataset)[:1], "probability", *served, *own[:1], "reversals", "reversals_predicted")
     return next((name for name in wanted if name in there), "spin_final")

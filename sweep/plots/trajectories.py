@@ -1,7 +1,8 @@
-"""Pictures of dense trajectories."""
+"""Pictures of dense trajectories; many samples of one scene are drawn as the bands in which most of them lie."""
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import matplotlib as mpl
@@ -10,11 +11,12 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from sweep.grid import SAMPLE, Array
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.plots import bands, labels, theory
+from sweep.plots import labels, theory
 from sweep.plots.figure import Picture, page, panel_width
 from sweep.results.kind import is_of_own_body, parameters
 
@@ -43,6 +45,9 @@ _STILL = 0.01
 
 _ENDLESS = ("heading", "table_x", "table_y")
 """Series that go on where a body spins steadily."""
+
+_BANDS = {0.95: 0.18, 0.68: 0.35}
+"""Shares of the samples that the bands hold, the widest first, and the opacities of these."""
 
 _NARROW = 6.0
 """Inches of a page up to which panels stand below each other."""
@@ -84,17 +89,15 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
         first.set_xlim(0, until)
         apart = " " if columns > 1 else "\n"
         time = f"{time};{apart}nothing changes by more than {_STILL:.0%} from here to {last:g}"
-    axes = first
-    for k, (title, names) in enumerate(panels):
-        axes = figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first)
+    below = [figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first) for k in range(len(panels))]
+    for axes, (title, names) in zip(below, panels, strict=True):
         _series(axes, dataset, names)
         per_mass = " per unit mass" if "per unit mass" in dataset[next(iter(names))].attrs.get("long_name", "") else ""
         axes.set_title(f"{title}{per_mass}", loc="left", pad=16 if columns == 1 < len(names) else None)
-        axes.tick_params(labelbottom=k >= len(panels) - columns)
-        if k >= len(panels) - columns:
-            axes.set_xlabel(time)
-    if not panels:
-        first.set_xlabel(time)
+    for axes in below[:-columns]:
+        axes.tick_params(labelbottom=False)
+    for axes in (below or [first])[-columns:]:
+        axes.set_xlabel(time)
     figure.explain(entries)
     return figure
 
@@ -124,7 +127,7 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
     first = next(iter(names))
     axes.set_ylabel(labels.with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
     if SAMPLE in dataset.coords:
-        return bands.draw(axes, dataset, first)
+        return _bands(axes, dataset, first)
     entries: list[Artist] = []
     # Oscillations are so dense that an opaque curve would hide those below it.
     alone = dataset.sizes["trajectory"] == 1 or "spin" in names
@@ -148,6 +151,31 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
     return entries
 
 
+def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
+    """Draw a series of sampled trajectories; returns the entries for the legend."""
+    samples, time = int(dataset[SAMPLE].max()) + 1, dataset["time"]
+    entries: list[Artist] = []
+    for i in range(dataset.sizes["trajectory"] // samples):
+        one = dataset.isel(trajectory=slice(i * samples, (i + 1) * samples))
+        tails = [(1 - share) / 2 for share in _BANDS]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # no sample goes on so long
+            median, *ends = np.nanquantile(one[name], [0.5, *tails, *(1 - tail for tail in tails)], axis=0)
+        axes.plot(time, median, color=f"C{i}", linewidth=0.9, gid=name)
+        for low, high, opacity in zip(ends[:2], ends[2:], _BANDS.values(), strict=True):
+            axes.fill_between(time, low, high, color=f"C{i}", alpha=opacity, linewidth=0, rasterized=time.size > 5000)
+        entries.append(Line2D([], [], color=f"C{i}", label=_of_samples(dataset, one)))
+    held = [Patch(color="0.4", alpha=opacity, label=f"{share:.0%} of them") for share, opacity in _BANDS.items()]
+    return entries + held
+
+
+def _of_samples(dataset: xr.Dataset, one: xr.Dataset) -> str:
+    """What the samples of one cell have in common and not with all others, and how many there are."""
+    own = [name for name in _varying(dataset) if name not in _varying(one)]
+    told = [labels.measured(dataset, name, float(one[name][0])) for name in own]
+    return ", ".join([*told, f"median of {one.sizes['trajectory']} samples"])
+
+
 def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
     """Lines at the critical spins, one set a body: in the colour of its first trajectory if there are several."""
     bodies: dict[tuple[tuple[str, str, float, str], ...], int] = {}
@@ -162,9 +190,8 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
         for name, symbol, at, source in body:
             style: Any = {"linestyle": theory.OVER_TIME[name], "linewidth": 0.9}
             axes.axhline(at, color=colour, gid=name, **style)
-            entries[name] = Line2D(
-                [], [], color="black", label=theory.words(name, source, over_n0=True, spin="n"), **style
-            )
+            words = theory.words(name, source, over_n0=True, spin="n")
+            entries[name] = Line2D([], [], color="black", label=words, **style)
             if all(abs(at - other) > apart for other in written):
                 axes.annotate(
                     labels.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
@@ -216,14 +243,18 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 def label(dataset: xr.Dataset, i: int) -> str:
     """The parameters that set this trajectory apart from the others, and its number of reversals."""
-    varying = [name for name in parameters(dataset) if len(set(np.ravel(dataset[name].values))) > 1]
-    names = varying or [name for name in ("n0", "omega3") if name in dataset]
+    names = _varying(dataset) or [name for name in ("n0", "omega3") if name in dataset]
     named = ", ".join(labels.measured(dataset, name, float(np.ravel(dataset[name].values)[i])) for name in names)
     return f"{named}: {labels.reversals(int(dataset['reversals'][i]))}" if "reversals" in dataset else named
 
 
 def constants_apart(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the parameters that all trajectories share as scalar coordinates."""
-    values = {name: set(np.ravel(dataset[name].values)) for name in parameters(dataset)}
-    shared = {name: ((), found.pop(), dataset[name].attrs) for name, found in values.items() if len(found) == 1}
-    return dataset.drop_vars(list(shared)).assign_coords(shared)
+    names = [name for name in parameters(dataset) if name not in _varying(dataset)]
+    shared = {name: ((), np.ravel(dataset[name])[0], dataset[name].attrs) for name in names}
+    return dataset.drop_vars(names).assign_coords(shared)
+
+
+def _varying(dataset: xr.Dataset) -> list[str]:
+    """The parameters that not all trajectories share."""
+    return [name for name in parameters(dataset) if np.unique(dataset[name]).size > 1]

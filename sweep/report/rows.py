@@ -39,11 +39,8 @@ class Section:
 
 def against(what: str, source: str, expected: float, found: float, tolerance: float, why: str, remark: str = "") -> Row:
     """A number that must agree with the expected one to an absolute tolerance."""
-    difference = found - expected
-    holds = abs(difference) <= tolerance
-    return Row(
-        what, source, f"{expected:.6g}", f"{found:.6g}", f"{difference:.2g}", f"{tolerance:.2g}", why, holds, remark
-    )
+    numbers = (f"{expected:.6g}", f"{found:.6g}", f"{found - expected:.2g}", f"{tolerance:.2g}")
+    return Row(what, source, *numbers, why, abs(found - expected) <= tolerance, remark)
 
 
 def below(what: str, source: str, found: float, bound: float, why: str, remark: str = "") -> Row:
