@@ -159,11 +159,11 @@ def boundaries(
     ('n0', 'mu')
     """
     from sweep.studies.boundaries import boundaries
+    from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return boundaries(
-            checked, x, y, width, output, deviation=deviation, fresh=fresh, reporter=told, cluster=cluster
-        )
+        task = boundaries(checked, x, y, width, deviation)
+        return kept(task, output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def critical(
@@ -206,9 +206,10 @@ def critical(
     '0.005'
     """
     from sweep.studies.critical import critical
+    from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return critical(checked, width, output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(critical(checked, width), output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def trajectory(
@@ -375,9 +376,10 @@ def indices(
         as `run`; also if the model is a formula, no parameter is a distribution, or one is an axis.
     """
     from sweep.studies.indices import indices
+    from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return indices(checked, output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(indices(checked), output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:

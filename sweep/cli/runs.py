@@ -184,8 +184,9 @@ def boundaries(
     """
     from sweep.studies import estimates
     from sweep.studies.boundaries import boundaries as search
+    from sweep.studies.kept import kept
 
-    work = partial(search, config, x, y, width, deviation=deviation, fresh=fresh)
+    work = partial(kept, search(config, x, y, width, deviation), fresh=fresh)
     _written(config, "boundaries", work, lambda: estimates.of_boundaries(config, x, y), **how)
 
 
@@ -203,8 +204,9 @@ def critical(config: Config, width: float, fresh: bool, **how: Any) -> None:
     """
     from sweep.studies import estimates
     from sweep.studies.critical import critical as search
+    from sweep.studies.kept import kept
 
-    work = partial(search, config, width, fresh=fresh)
+    work = partial(kept, search(config, width), fresh=fresh)
     _written(config, "critical", work, lambda: estimates.of_critical(config), **how)
 
 
@@ -219,10 +221,11 @@ def indices(config: Config, fresh: bool, **how: Any) -> None:
     simulations are kept, and the same command resumes.
     """
     from sweep.engine.estimate import estimate
-    from sweep.studies.indices import designed
     from sweep.studies.indices import indices as find
+    from sweep.studies.kept import kept
 
-    _written(config, "indices", partial(find, config, fresh=fresh), lambda: estimate(designed(config)), **how)
+    task = find(config)
+    _written(config, "indices", partial(kept, task, fresh=fresh), lambda: estimate(task.config), **how)
 
 
 @click.command()
