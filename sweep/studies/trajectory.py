@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
+from sweep.config import Config, ConfigError, ConfigLike, load_config
 from sweep.config.bodies import misplaced, unfit
-from sweep.config.faults import suggestion
+from sweep.config.faults import fault_of, suggestion
 from sweep.config.schema import FOREVER
 from sweep.config.user_models import explained
 from sweep.config.values import numbers_of
@@ -223,9 +223,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     table = {name: values for name, values in (config.cases or {}).items() if samples and name not in wanted}
     drawn = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)] or [{}]
     if (count := prod(map(len, wanted.values())) * len(drawn)) > MAX_TRAJECTORIES:
-        raise ConfigError(
-            [Fault("", None, None, (), f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")]
-        )
+        raise fault_of(f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")
     config = config.at_medians
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
@@ -234,7 +232,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)
     if beyond := unfit(chosen) or misplaced(chosen):
-        raise ConfigError([Fault("", None, None, (), beyond)])
+        raise fault_of(beyond)
     return chosen
 
 
@@ -244,9 +242,7 @@ def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, tuple[float, ..
     for name, value in at.items():
         if name not in model.parameters:
             message = f"is no parameter of the {model.name} model{suggestion(name, model.parameters)}"
-            faults.append(
-                Fault("", None, None, (name,), f"{message}; its parameters are {', '.join(model.parameters)}")
-            )
+            faults += fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", name).faults
             continue
         try:
             numbers[name] = numbers_of(config.table[name], value)
