@@ -307,11 +307,10 @@ def fit(
     ConfigError
         if the configuration or the film cannot be used, or the configuration is not of one body.
     """
-    from sweep.studies.fit import fit
-    from sweep.studies.laws import compare
+    from sweep.studies.laws import fitted
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return compare(checked, film, free, laws, told) if laws else fit(checked, film, free, told)
+        return fitted(checked, film, free, laws, told)
 
 
 def explore(dataset: xr.Dataset | str | Path, height: int = 950) -> Beside:

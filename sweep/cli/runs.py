@@ -246,16 +246,12 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
     """
     from sweep.progress import Terminal
     from sweep.results.summary import describe
-    from sweep.studies.fit import fit as find
-    from sweep.studies.laws import compare
+    from sweep.studies.laws import fitted
 
-    names = [name.strip() for name in free.split(",")]
+    names, others = ([name.strip() for name in each.split(",")] if each else [] for each in (free, laws))
     interrupt.raise_again()
     with Terminal(quiet) as terminal, of_option("--free", config.table):
-        result = (
-            compare(config, film, names, [name.strip() for name in laws.split(",")], terminal)
-            if laws else find(config, film, names, terminal)
-        )  # fmt: skip
+        result = fitted(config, film, names, others, terminal)
     files = _save(config, "laws" if laws else "fit", result, output)
     files.configuration.write_text(result.attrs["config"], encoding="utf-8")
     if not quiet:

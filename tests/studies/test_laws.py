@@ -13,7 +13,6 @@ import sweep
 from sweep.config import ConfigError
 from sweep.grid import Grid
 from sweep.kernels.measures.misfit import Film
-from sweep.studies.laws import compare
 
 STONE = """\
 name: stone
@@ -104,5 +103,5 @@ def test_the_command_writes_table_picture_and_the_best_body(write: Write, tmp_pa
 )
 def test_what_cannot_be_compared_is_refused(write: Write, laws: list[str], free: list[str], words: str) -> None:
     with pytest.raises(ConfigError) as refusal:
-        compare(sweep.load_config(write(STONE)), Film(np.arange(9.0), np.ones(9)), free, laws)
+        sweep.fit(write(STONE), Film(np.arange(9.0), np.ones(9)), free, laws=laws)
     assert words in str(refusal.value)
