@@ -115,7 +115,7 @@ def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
         akaike=("law", akaike, {"long_name": "Akaike's criterion"}),
         weight=("law", share / share.sum(), {"long_name": "Akaike's weight"}),
     )
-    words = [*_told_apart(names, akaike - akaike.min(), best)]
+    words = _told_apart(names, akaike - akaike.min())
     excess = chi[best] / (rows - number[best])
     if film.error is not None and excess > 1 + _MISSED * sqrt(2 / (rows - number[best])):
         words.append(f"even {names[best]} misses the film by more than its errors: {excess:.3g} chi square an instant")
@@ -128,13 +128,11 @@ def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
     return result.assign_attrs(attributes)
 
 
-def _told_apart(names: Sequence[str], excess: np.ndarray, best: int) -> list[str]:
+def _told_apart(names: Sequence[str], excess: np.ndarray) -> list[str]:
     """What the film says of each law beside the best, in words."""
-    words = []
-    for i in np.argsort(excess):
+    words, (best, *others) = [], np.argsort(excess, kind="stable")
+    for i in others:
         by = f"Akaike's criteria differ by {excess[i]:.3g}"
-        if i == best:
-            continue
         if excess[i] < _ALIKE:
             words.append(f"{names[best]} and {names[i]} cannot be told apart by this film: {by}")
         elif excess[i] < _RULED_OUT:

@@ -21,18 +21,17 @@ from sweep.config.values import numbers_of
 from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
-from sweep.engine.executor import STEP_SECONDS, UNTIL_ALL_STOP
+from sweep.engine.executor import UNTIL_ALL_STOP, nominal_seconds
 from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.engine.work import Work
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
-from sweep.jit import threads
 from sweep.kernels import path
 from sweep.kernels.build import PATH
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.layout import BLOCK, LANES
+from sweep.kernels.layout import BLOCK
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
@@ -192,9 +191,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
     steps = np.full(Grid.of(chosen).size, integrator.t_end)
     steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
     samples = (integrator.t_end / _intervals(model, columns)).sum()
-    # A step of a group of lanes takes as long whether they are idle or not.
-    groups = -(-len(steps) // (LANES * threads()))
-    seconds = _PASSES * groups * steps.max() * LANES * STEP_SECONDS + samples * _SAMPLE_SECONDS
+    seconds = _PASSES * nominal_seconds(steps) + samples * _SAMPLE_SECONDS
     return "\n".join(
         [
             f"trajectories: {len(steps)}",
