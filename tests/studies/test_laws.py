@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.integrate import solve_ivp
 from support import Write, newton
 from support.cli import invoke
 
@@ -32,8 +31,7 @@ def film(config: Path, law: str, error: float | None = None) -> Film:
     columns, model = Grid.of(checked).columns(), checked.equations
     p = {name: float(value[0]) for name, value in columns.items()}
     start = np.array(model.start(columns))[:, 0]
-    y = solve_ivp(lambda _, y: newton.derivative(y, p, law)[0], (0, 2), start, "DOP853", times, rtol=1e-8, atol=1e-11).y
-    spins = np.sum(y[2:5] * [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], axis=0)
+    spins = newton.spin(newton.follow(start, p, law, times, 1e-8))
     noisy = spins + np.random.default_rng(1).normal(0, NOISE, len(times))
     return Film(times, noisy, None if error is None else np.full(len(times), error))
 
