@@ -25,7 +25,7 @@ from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
 from sweep.studies.curve import Cell, Curve, Middle, Point
 from sweep.studies.kept import Task
-from sweep.studies.search import Search, measuring, require_certain, require_simulated
+from sweep.studies.search import Search, measuring, require_certain
 
 Asked = tuple[Curve, Point | Middle, float]
 """A cell that is asked for: for which part of which curve, and its place along the line."""
@@ -41,7 +41,6 @@ def boundaries(config: Config, x: str | None, y: str | None, width: float, devia
 
 def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
     """The axes over which boundaries are curves: those named, or else the first two."""
-    require_simulated(config)
     require_certain(config)
     if COUNT not in config.equations.offers:
         raise ConfigError([config.fault(("model",), "counts no reversals, so that there are no boundaries")])

@@ -31,7 +31,7 @@ from sweep.results.margins import Counts
 from sweep.results.store import Store
 from sweep.studies.kept import Task
 from sweep.studies.roots import Root
-from sweep.studies.search import Search, measuring, require_certain, require_simulated
+from sweep.studies.search import Search, measuring, require_certain
 
 RATIO = 1.25
 """From one spin of the way outwards to the next."""
@@ -53,7 +53,6 @@ def critical(config: Config, width: float) -> Task:
 
 def searchable(config: Config) -> Config:
     """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
-    require_simulated(config)
     require_certain(config)
     if not config.of_rattlebacks:
         raise ConfigError([config.fault(("model",), "no rattleback; critical spins are asked of: slip, noslip")])

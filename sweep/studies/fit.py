@@ -28,7 +28,7 @@ from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.misfit import Ask, Minimum, Problem, minimise
-from sweep.studies.search import require_certain, require_simulated
+from sweep.studies.search import require_certain
 from sweep.studies.sensor import UNKNOWNS, of_film
 from sweep.studies.together import together
 from sweep.variables import Variable
@@ -88,7 +88,6 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
 
     `of_film` are the names of what may be free of the film.
     """
-    require_simulated(config)
     require_certain(config)
     known = (*config.tier.parameters, *of_film)
     if not free:
