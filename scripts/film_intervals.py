@@ -46,7 +46,7 @@ def spins(config: sweep.Config, law: str, times: np.ndarray) -> np.ndarray | Non
                   rtol=1e-9, atol=1e-12).y  # fmt: skip
     if y.shape[1] < len(times) or not all(newton.derivative(state, p, law)[1] > 0 for state in y.T[::10]):
         return None
-    return np.asarray(np.sum(y[2:5] * [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], axis=0))
+    return newton.spin(y)
 
 
 def film(config: sweep.Config, law: str, omega3: float, random: np.random.Generator) -> Film | None:

@@ -154,11 +154,11 @@ def boundaries(
     ('n0', 'mu')
     """
     from sweep.studies.boundaries import boundaries
+    from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return boundaries(
-            checked, x, y, width, output, deviation=deviation, fresh=fresh, reporter=told, cluster=cluster
-        )
+        task = boundaries(checked, x, y, width, deviation)
+        return kept(task, output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def critical(
@@ -201,9 +201,10 @@ def critical(
     '0.005'
     """
     from sweep.studies.critical import critical
+    from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return critical(checked, width, output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(critical(checked, width), output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def trajectory(
@@ -301,11 +302,10 @@ def fit(
     ConfigError
         if the configuration or the film cannot be used, or the configuration is not of one body.
     """
-    from sweep.studies.fit import fit
-    from sweep.studies.laws import compare
+    from sweep.studies.laws import fitted
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return compare(checked, film, free, laws, told) if laws else fit(checked, film, free, told)
+        return fitted(checked, film, free, laws, told)
 
 
 def explore(dataset: xr.Dataset | str | Path, height: int = 950) -> Beside:
@@ -370,9 +370,10 @@ def indices(
         as `run`; also if the model is a formula, no parameter is a distribution, or one is an axis.
     """
     from sweep.studies.indices import indices
+    from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return indices(checked, output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(indices(checked), output, fresh=fresh, reporter=told, cluster=cluster)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 
 from sweep.bench.section import BenchSection, Spread, colour, curve, marker
 from sweep.bench.timing import T_END, Effort, Work, in_turn, runs_at, spread_out
+from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import METHODS, allowed, automatic_step
@@ -30,16 +31,21 @@ Key = tuple[str, float, str]
 """What is varied, to which value, and the method."""
 
 
+def kernels() -> Iterator[tuple[str, str, Kernel]]:
+    """Compile each method of each model, alone and with measurements: all that the sections run."""
+    for name, model in MODELS.items():
+        for method in allowed(model):
+            for measure in ((), None):
+                yield name, method, make_kernel(method, model, measure)
+
+
 def step_times(effort: Effort) -> BenchSection:
     """Time of a step of one trajectory, by each method of each model, alone and with measurements."""
     threads, section = numba.get_num_threads(), BenchSection("Time of a step", name="steps")
     works, cells = {}, LANES * threads
-    for name, model in MODELS.items():
-        for method in allowed(model):
-            for measure in ((), None):
-                kernel = make_kernel(method, model, measure)
-                what = " and ".join(kernel.measure) or "nothing"
-                works[name, method, what] = Work(kernel, standard(mu=np.full(cells, MU)), np.full(cells, STEP))
+    for name, method, kernel in kernels():
+        what = " and ".join(kernel.measure) or "nothing"
+        works[name, method, what] = Work(kernel, standard(mu=np.full(cells, MU)), np.full(cells, STEP))
     # These works are short, so they are repeated more often: some turns escape the machine's other work.
     times = in_turn(works, replace(effort, repeats=5 * effort.repeats))
     lines = [["model", "method", "measuring", "ns per step and trajectory"]]

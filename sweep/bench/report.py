@@ -12,17 +12,14 @@ import llvmlite.binding
 import numba
 from matplotlib.figure import Figure
 
-from sweep.bench.cost import cost, step_times
+from sweep.bench.cost import cost, kernels, step_times
 from sweep.bench.hard import hard_cases
 from sweep.bench.precision import work_precision
 from sweep.bench.section import LINE, BenchSection
 from sweep.bench.timing import Effort
 from sweep.bench.tolerance import tolerance
 from sweep.bench.whole import whole
-from sweep.kernels import methods
-from sweep.models import MODELS
 from sweep.report import page
-from sweep.report.direct import make_kernel
 from sweep.report.rows import Row, Section
 from sweep.results.writing import replacing
 
@@ -38,7 +35,7 @@ def bench(output: Path, note: Callable[[str], None] = lambda _: None, effort: Ef
     """Measure everything, write bench.csv, .png and .html to `output`, and return the hard cases that do not hold."""
     began = time.perf_counter()
     output.mkdir(parents=True, exist_ok=True)
-    compile_kernels()
+    list(kernels())  # compiles
     note(f"kernels compiled or loaded in {time.perf_counter() - began:.1f} s, which no time below includes")
     sections = []
     for measure in SECTIONS:
@@ -59,14 +56,6 @@ def bench(output: Path, note: Callable[[str], None] = lambda _: None, effort: Ef
     heads = ("method", "expected", "found")
     page.write(output / "bench.html", "sweep: speed against error", about, [overview, *sections], heads)
     return [row for section in sections for row in section.rows if not row.holds]
-
-
-def compile_kernels() -> None:
-    """Compile all that the sections run, so that no time includes a compilation."""
-    for model in MODELS.values():
-        for method in methods.allowed(model):
-            for measure in ((), None):
-                make_kernel(method, model, measure)
 
 
 def draw(sections: list[BenchSection]) -> Figure:

@@ -165,8 +165,9 @@ def boundaries(
     """
     from sweep.studies import estimates
     from sweep.studies.boundaries import boundaries as search
+    from sweep.studies.kept import kept
 
-    work = partial(search, config, x, y, width, deviation=deviation, fresh=fresh)
+    work = partial(kept, search(config, x, y, width, deviation), fresh=fresh)
     _written(config, "boundaries", work, lambda: estimates.of_boundaries(config, x, y), **how)
 
 
@@ -184,8 +185,9 @@ def critical(config: Config, width: float, fresh: bool, **how: Any) -> None:
     """
     from sweep.studies import estimates
     from sweep.studies.critical import critical as search
+    from sweep.studies.kept import kept
 
-    work = partial(search, config, width, fresh=fresh)
+    work = partial(kept, search(config, width), fresh=fresh)
     _written(config, "critical", work, lambda: estimates.of_critical(config), **how)
 
 
@@ -200,10 +202,11 @@ def indices(config: Config, fresh: bool, **how: Any) -> None:
     simulations are kept, and the same command resumes.
     """
     from sweep.engine.estimate import estimate
-    from sweep.studies.indices import designed
     from sweep.studies.indices import indices as find
+    from sweep.studies.kept import kept
 
-    _written(config, "indices", partial(find, config, fresh=fresh), lambda: estimate(designed(config)), **how)
+    task = find(config)
+    _written(config, "indices", partial(kept, task, fresh=fresh), lambda: estimate(task.config), **how)
 
 
 @click.command()
@@ -223,15 +226,11 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
     """
     from sweep.progress import Terminal
     from sweep.results.summary import describe
-    from sweep.studies.fit import fit as find
-    from sweep.studies.laws import compare
+    from sweep.studies.laws import fitted
 
-    names = [name.strip() for name in free.split(",")]
+    names, others = ([name.strip() for name in each.split(",")] if each else [] for each in (free, laws))
     with Terminal(quiet) as terminal, of_option("--free", config.table):
-        result = (
-            compare(config, film, names, [name.strip() for name in laws.split(",")], terminal)
-            if laws else find(config, film, names, terminal)
-        )  # fmt: skip
+        result = fitted(config, film, names, others, terminal)
     files = _save(config, "laws" if laws else "fit", result, output)
     files.configuration.write_text(result.attrs["config"], encoding="utf-8")
     if not quiet:

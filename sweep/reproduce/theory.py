@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from sweep.grid import Array
 from sweep.models import MODELS
 from sweep.models.ladder import analytic
-from sweep.models.model import Columns, stack
+from sweep.models.model import stack
 from sweep.models.theory import stability
 from sweep.models.theory.coefficients import coefficients
 from sweep.models.theory.rocking import slower_period
 from sweep.report import direct
-from sweep.report.direct import Ends, standard
+from sweep.report.direct import standard
 from sweep.report.rows import Row, Section, against, below
 from sweep.reproduce.rows import against_paper
 
-
-def simulate(model: str, columns: Columns, t_end: float, step: float | None = None) -> Ends:
-    return direct.simulate(columns, t_end, model=model, step=step, ranges=False)
+simulate = partial(direct.simulate, ranges=False)
 
 
 def formulas() -> Section:
@@ -62,7 +62,7 @@ def consistency() -> Section:
 def _slip_rows() -> list[Row]:
     body = standard()
     plus, minus = stability.critical_spins(MODELS["slip"], body)
-    ends = simulate("slip", standard(mu=[60.0, 200.0]), 400.0, 0.005)
+    ends = simulate(standard(mu=[60.0, 200.0]), 400.0, step=0.005)
     balance, spin = float(ends["energy_error"].max()), float(ends["spin_final"][0])
     other = "the digits of an independent implementation"
     return [
@@ -76,9 +76,9 @@ def _slip_rows() -> list[Row]:
 
 
 def _rolling_rows() -> list[Row]:
-    drift = simulate("noslip", standard(), 1000.0)["energy_error"]
-    rolling, mu = simulate("noslip", standard(), 100.0)["spin_final"], np.array([1e3, 1e4, 1e5])
-    difference = np.abs(simulate("slip", standard(mu=mu), 100.0)["spin_final"] - rolling)
+    drift = simulate(standard(), 1000.0, model="noslip")["energy_error"]
+    rolling, mu = simulate(standard(), 100.0, model="noslip")["spin_final"], np.array([1e3, 1e4, 1e5])
+    difference = np.abs(simulate(standard(mu=mu), 100.0)["spin_final"] - rolling)
     exponent = np.polyfit(np.log(mu), np.log(difference), 1)[0]
     return [
         below("no-slip: energy drift over t = 1000", "sec. basiceq", float(drift[0]), 1e-9, "energy is conserved"),
@@ -95,12 +95,12 @@ def _reduced_rows() -> list[Row]:
         return np.stack([k.I3 * n**2 + A**2 + B**2, A ** (k.k4 / k.k1) * B])
 
     start = stack(MODELS["averaged"].start(free))
-    end = simulate("averaged", free, 1000.0, 0.2).states
+    end = simulate(free, 1000.0, model="averaged", step=0.2).states
     change = np.abs(invariants(end) / invariants(start) - 1).max()
 
     tiny = standard(x0=1e-3, y0=1e-3, mu=1e4, n0=0.002)
     t_end = float(20 * slower_period(tiny)[0])
-    lost = [simulate(name, tiny, t_end)["spin_final"][0] - 0.002 for name in ("effective", "averaged")]
+    lost = [simulate(tiny, t_end, model=name)["spin_final"][0] - 0.002 for name in ("effective", "averaged")]
     body = standard()
     papers = analytic.critical_spins(body)
     offset = {

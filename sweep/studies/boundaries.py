@@ -8,8 +8,8 @@ all brackets are narrowed side by side, until two simulated cells on either side
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,63 +17,42 @@ import xarray as xr
 
 from sweep.axis import Axis, contours
 from sweep.config import Config, ConfigError
-from sweep.engine.cluster import Cluster
-from sweep.engine.reporter import Reporter
-from sweep.faults import Fault
+from sweep.faults import fault_of
 from sweep.grid import Array
-from sweep.interrupt import deferred
 from sweep.models.model import COUNT
 from sweep.results.dataset import described
 from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
-from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH
 from sweep.studies.curve import Cell, Curve, Middle, Point
-from sweep.studies.kept import kept
-from sweep.studies.search import Search, measuring, require_certain, require_simulated
+from sweep.studies.kept import Task
+from sweep.studies.search import Search, measuring, require_certain
 
 Asked = tuple[Curve, Point | Middle, float]
 """A cell that is asked for: for which part of which curve, and its place along the line."""
 
 
-@deferred()
-def boundaries(
-    config: Config,
-    x: str | None = None,
-    y: str | None = None,
-    width: float = BOUNDARY_WIDTH,
-    output: str | Path | None = None,
-    *,
-    deviation: float = BOUNDARY_DEVIATION,
-    fresh: bool = False,
-    reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
-) -> xr.Dataset:
-    """As `sweep.api.boundaries`; what there is to tell goes to `reporter` alone."""
+def boundaries(config: Config, x: str | None, y: str | None, width: float, deviation: float) -> Task:
+    """What `sweep.api.boundaries` asks for."""
     across = chosen_axes(config, x, y)
-    config, settings = (
-        measuring(config),
-        f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}",
-    )
-    return kept(
-        config, __name__, settings, lambda store: Boundaries(config, store, across, width, deviation), output,
-        fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
-    )  # fmt: skip
+    words = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
+    make = partial(Boundaries, across=across, width=width, deviation=deviation)
+    return Task(measuring(config), __name__, words, make)
 
 
 def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
     """The axes over which boundaries are curves: those named, or else the first two."""
-    require_simulated(config)
     require_certain(config)
     if COUNT not in config.equations.offers:
         raise ConfigError([config.fault(("model",), "counts no reversals, so that there are no boundaries")])
     long = [name for name, values in config.axes.items() if len(values) > 1]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in long:
-            words = f"{option}: {name} is no axis of more than one value; the axes are {', '.join(long) or 'none'}"
-            raise ConfigError([Fault("", None, None, (), words)])
-    rest = [name for name in long if name not in (x, y)]
-    up = y or (rest.pop(0) if rest else None)
-    right = x or (rest.pop(0) if rest else None)
+            raise fault_of(
+                f"{option}: {name} is no axis of more than one value; the axes are {', '.join(long) or 'none'}"
+            )
+    rest = (name for name in long if name not in (x, y))
+    up = y or next(rest, None)
+    right = x or next(rest, None)
     if up is None or right is None or up == right:
         raise ConfigError([config.fault((), "boundaries need two axes; give two parameters more than one value")])
     return right, up
@@ -139,14 +118,11 @@ class Boundaries(Search):
 
     def labelled(self) -> xr.Dataset:
         """The points, with what their search has cost."""
-        columns = {name: np.array(values) for name, values in self._columns().items()}
-        head: dict[str, Any] = {
-            "Conventions": "CF-1.11",
-            "title": f"{self.config.name}: boundaries ({self.config.model} model)",
-        }
-        head |= {"x": self.across[0], "y": self.across[1]} | self.told()
+        columns = self._columns()
+        head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.told()
         middles = [middle for curve in self.curves for middle in curve.middles.values()]
         head |= {"deviation": self.deviation, "middles_off": sum(not middle.confirmed for middle in middles)}
+        title = f"{self.config.name}: boundaries ({self.config.model} model)"
         own = {name: xr.Variable("point", columns[name].astype(spec.dtype), described(spec))
                for name, spec in POINTS.items()}  # fmt: skip
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})
@@ -157,18 +133,17 @@ class Boundaries(Search):
         fixed = {
             name: xr.Variable((), value, self.config.described(name)) for name, value in self.grid.constants.items()
         }
-        return xr.Dataset(own, {**places, **fixed}, head)
+        return xr.Dataset(own, {**places, **fixed}, {"Conventions": "CF-1.11", "title": title, **head})
 
-    def _columns(self) -> dict[str, list[Any]]:
+    def _columns(self) -> dict[str, Array]:
         """The variables and coordinates of all points, by name."""
-        columns: dict[str, list[Any]] = {name: [] for name in (*POINTS, "bracket", *self.config.axes)}
         pieces = ((curve.level, *piece) for curve in self.curves for piece in curve.pieces())
-        for number, (level, points, closed) in enumerate(pieces):
-            for point in points:
-                row = {"level": level, "curve": number, "closed": closed, **point.row()}
-                for name, values in columns.items():
-                    values.append(row[name])
-        return columns
+        rows = [
+            {"level": level, "curve": number, "closed": closed, **point.row()}
+            for number, (level, points, closed) in enumerate(pieces)
+            for point in points
+        ]
+        return {name: np.array([row[name] for row in rows]) for name in (*POINTS, "bracket", *self.config.axes)}
 
     def _curves(self, found: Counts, decided: Array) -> Iterator[Curve]:
         """The curves of which the cells of the grid tell."""

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, Values
-from sweep.engine.cluster import Cluster
-from sweep.engine.reporter import Reporter
 from sweep.grid import Array
-from sweep.interrupt import deferred
 from sweep.models.model import Columns
 from sweep.models.theory.stability import SPIN_LIMIT
 from sweep.parameters import START
@@ -32,10 +29,9 @@ from sweep.results.dataset import (
 )
 from sweep.results.margins import Counts
 from sweep.results.store import Store
-from sweep.studies import SPIN_WIDTH
-from sweep.studies.kept import kept
+from sweep.studies.kept import Task
 from sweep.studies.roots import Root
-from sweep.studies.search import Search, measuring, require_certain, require_simulated
+from sweep.studies.search import Search, measuring, require_certain
 
 RATIO = 1.25
 """From one spin of the way outwards to the next."""
@@ -49,27 +45,14 @@ _OUTWARDS = 5
 _FARTHEST = 8.0
 
 
-@deferred()
-def critical(
-    config: Config,
-    width: float = SPIN_WIDTH,
-    output: str | Path | None = None,
-    *,
-    fresh: bool = False,
-    reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
-) -> xr.Dataset:
-    """As `sweep.api.critical`; what there is to tell goes to `reporter` alone."""
-    config = searchable(config)
-    return kept(
-        config, __name__, f"width of the brackets: {width!r}", lambda store: CriticalSpins(config, store, width),
-        output, fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
-    )  # fmt: skip
+def critical(config: Config, width: float) -> Task:
+    """What `sweep.api.critical` asks for."""
+    words = f"width of the brackets: {width!r}"
+    return Task(searchable(config), __name__, words, partial(CriticalSpins, width=width))
 
 
 def searchable(config: Config) -> Config:
     """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
-    require_simulated(config)
     require_certain(config)
     if not config.of_rattlebacks:
         raise ConfigError([config.fault(("model",), "no rattleback; critical spins are asked of: slip, noslip")])

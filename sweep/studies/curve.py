@@ -233,12 +233,10 @@ class Curve:
         ends = [i for i, middle in enumerate(middles, start=1) if middle and not middle.confirmed]
         if not ends:
             return [(self.points, self.closed)]
-        if self.closed:
-            first, count = ends[0], len(self.points)
-            points, ends = [*self.points[first:], *self.points[:first]], [*(end - first for end in ends[1:]), count]
-        else:
-            points, ends = self.points, [*ends, len(self.points)]
-        return [(points[start:end], False) for start, end in pairwise([0, *ends]) if start < end]
+        first = ends[0] if self.closed else 0
+        points = self.points[first:] + self.points[:first]
+        cuts = sorted({0, *(end - first for end in ends), len(points)})
+        return [(points[start:end], False) for start, end in pairwise(cuts)]
 
     def _insert(self, after: dict[int, Point]) -> None:
         """Put points behind those with these ids, in place of the middles there."""

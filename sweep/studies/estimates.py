@@ -40,10 +40,8 @@ def of_critical(config: Config) -> str:
     """
     config = critical.searchable(config)
     grid = Grid.of(config)
-    axes = " × ".join(f"{name} {len(values)}" for name, values in grid.axes.items())
-    if grid.table is not None:
-        axes = f"case {grid.size}"
-    bodies = f"bodies: {grid.size} ({axes or 'one body'}), each with spins of both signs"
+    axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one body"
+    bodies = f"bodies: {grid.size} ({axes}), each with spins of both signs"
     search = critical.CriticalSpins(config, Memory(), SPIN_WIDTH)
     if not search.spins:
         return f"{bodies}; none has an n_c1 from which to search"

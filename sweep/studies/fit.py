@@ -14,15 +14,12 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import ceil
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from scipy.stats import qmc
 
 from sweep.config import Config, ConfigError, Values
-from sweep.config.film import read
-from sweep.engine.reporter import Reporter
 from sweep.faults import brief, fault_of, suggestion
 from sweep.grid import Array
 from sweep.interrupt import deferred
@@ -31,7 +28,7 @@ from sweep.models.user.blame import blamed
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.misfit import Ask, Minimum, Problem, minimise
-from sweep.studies.search import require_certain, require_simulated
+from sweep.studies.search import require_certain
 from sweep.studies.sensor import UNKNOWNS, of_film
 from sweep.studies.together import together
 from sweep.variables import Variable
@@ -69,14 +66,13 @@ _TIED = 0.98
 
 
 @deferred()
-def fit(config: Config, film: str | Path | Film, free: Sequence[str], reporter: Reporter | None = None) -> xr.Dataset:
-    """As `sweep.api.fit`; a film may have been read already."""
-    film = film if isinstance(film, Film) else read(film)
+def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], None]) -> xr.Dataset:
+    """The fit of the law of friction that `config` names."""
     if not np.isfinite(film.rows).all():
         raise fault_of("the film holds a value that is no number; leave out such instants")
     theirs = of_film(film)
     config = _one_body(config, free, theirs)
-    note, began = (reporter or Reporter()).note, time.perf_counter()
+    began = time.perf_counter()
     if film.left_out:
         note(f"{film.left_out} rows of the film are left out: they hold no number, or are more than a fit needs")
     with blamed(config.origin):
@@ -92,7 +88,6 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
 
     `of_film` are the names of what may be free of the film.
     """
-    require_simulated(config)
     require_certain(config)
     known = (*config.tier.parameters, *of_film)
     if not free:
@@ -129,7 +124,8 @@ def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
     cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
     places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:KEPT]]]
     for number, instants in enumerate(horizons, start=1):
-        found = together([partial(minimise, place=place, instants=instants) for place in places], problem.answers)
+        answers = partial(problem.answers, instants=instants)
+        found = together([partial(minimise, place=place) for place in places], answers)
         minima = _different(sorted(found, key=lambda each: each.misfit))
         note(f"film up to {problem.film.time[instants - 1]:.4g}, {number} of {len(horizons)}: minima: {len(minima)}")
         places = [each.place for each in minima]
@@ -166,7 +162,7 @@ def _intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> 
         limits, lower = _profiles(problem, best, note, stops=restart < _RESTARTS)
         if lower is None:
             break
-        (best,) = together([partial(minimise, place=lower.place, instants=len(problem.film.time))], problem.answers)
+        (best,) = together([partial(minimise, place=lower.place)], problem.answers)
         note(f"a lower minimum: {best.misfit:.6g}")
     return best, limits, restart > 1
 
@@ -197,7 +193,7 @@ def _end(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int, allowed: 
         end = float(np.clip(best.place[i] + sign * reach, 0, 1))
         start = np.clip(best.place + along * (end - best.place[i]), 0, 1)
         start[i] = end
-        found = minimise(ask, start, len(problem.film.time), i)
+        found = minimise(ask, start, i)
         above = (found.misfit - best.misfit) / variance
         if above < -0.01 * allowed:
             return end, found
@@ -243,7 +239,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
     best, film, names = minima[0], problem.film, list(problem.free)
     covariance, variance = _covariance(problem, best), _variance(problem, best)
     deviation, rows = np.sqrt(np.diag(covariance)), len(film.time)
-    fitted = film.value + problem.residuals(best.place[None], rows)[0] * problem.error
+    fitted = film.value + problem.residuals(best.place[None])[0] * problem.error
     told, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
         f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})

@@ -6,20 +6,16 @@ The design, and the estimates from it, are those of Saltelli et al. (2010), doi 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError
 from sweep.config.distributions import chances
-from sweep.engine.cluster import Cluster
-from sweep.engine.reporter import Reporter
 from sweep.grid import Array
-from sweep.interrupt import deferred
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.results.dataset import described
-from sweep.studies.kept import kept
+from sweep.studies.kept import Task
 from sweep.studies.search import Study, require_simulated
 from sweep.variables import Variable
 
@@ -42,21 +38,9 @@ VARIABLES = {
 """The variables of the dataset, over quantities and parameters."""
 
 
-@deferred()
-def indices(
-    config: Config,
-    output: str | Path | None = None,
-    *,
-    fresh: bool = False,
-    reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
-) -> xr.Dataset:
-    """As `sweep.api.indices`; what there is to tell goes to `reporter` alone."""
-    config = designed(config)
-    return kept(
-        config, __name__, "Sobol indices", lambda store: Indices(config, store), output,
-        fresh=fresh, reporter=reporter or Reporter(), cluster=cluster,
-    )  # fmt: skip
+def indices(config: Config) -> Task:
+    """What `sweep.api.indices` asks for."""
+    return Task(designed(config), __name__, "Sobol indices", Indices)
 
 
 def designed(config: Config) -> Config:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import xarray as xr
 
@@ -12,6 +13,7 @@ from sweep.config import Config
 from sweep.engine.cluster import Cluster
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import carry_out
+from sweep.interrupt import deferred
 from sweep.models.user.blame import blamed
 from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
@@ -22,31 +24,29 @@ from sweep.results.store import Store
 from sweep.studies.search import Study
 
 
-def kept(
-    config: Config,
-    maker: str,
-    settings: str,
-    make: Callable[[Store], Study],
-    output: str | Path | None,
-    *,
-    fresh: bool,
-    reporter: Reporter,
-    cluster: Cluster | None,
-) -> xr.Dataset:
-    """The dataset that a search finds, or what an earlier search of the same identity has left in the folder `output`.
+class Task(NamedTuple):
+    """A study that is asked for."""
 
-    Parameters
-    ----------
-    maker : module of the search, by which it is identified beside the configuration, and after which files are named
-    settings : its own settings, in words
-    make : makes the search, by its store
-    """
+    config: Config
+    maker: str
+    """Its module, by which it is identified beside the configuration, and after which files are named."""
+    settings: str
+    """Its own settings, in words."""
+    make: Callable[[Config, Store], Study]
+
+
+@deferred()
+def kept(
+    task: Task, output: str | Path | None, *, fresh: bool, reporter: Reporter, cluster: Cluster | None
+) -> xr.Dataset:
+    """The dataset that a study finds, or what an earlier one of the same identity has left in the folder `output`."""
+    config, maker, settings, make = task
     run = identify(config, maker)
     identity = replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
 
     def search(store: Store) -> xr.Dataset:
         with blamed(config.origin):
-            found = make(store)
+            found = make(config, store)
         carry_out(found, store, reporter, cluster)
         return found.labelled().assign_attrs(vars(identity))
 

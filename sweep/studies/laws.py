@@ -1,4 +1,4 @@
-"""Fits several laws of friction to one film, and tells which of them it supports, by Akaike's criterion.
+"""Fits one or several laws of friction to a film, and tells which of them it supports, by Akaike's criterion.
 
 The weight of a law is its share in the evidence, exp(-Δ/2) over the sum of these, with Δ the excess of its criterion
 over the least (Burnham and Anderson 2002, sections 2.6 and 2.9).
@@ -34,13 +34,15 @@ _SHARED = ("seen", "other", "minimum", "misfit", "correlation")
 """Variables of a fit that are those of the film, or have no place beside other laws."""
 
 
-def compare(
-    config: Config, film: str | Path | Film, free: Sequence[str], laws: Sequence[str], reporter: Reporter | None = None
+def fitted(
+    config: Config, film: str | Path | Film, free: Sequence[str], laws: Sequence[str], reporter: Reporter
 ) -> xr.Dataset:
-    """As `sweep.api.fit` with `laws`; a film may have been read already."""
-    if config.origin or config.model != "slip":
+    """As `sweep.api.fit`."""
+    if laws and (config.origin or config.model != "slip"):
         raise fault_of("laws of friction are compared in the slip model; set model: slip")
-    film, note = film if isinstance(film, Film) else read(film), (reporter or Reporter()).note
+    film, note = film if isinstance(film, Film) else read(film), reporter.note
+    if not laws:
+        return fit(config, film, free, note)
     found: dict[str, xr.Dataset] = {}
     for name in dict.fromkeys(map(_full_name, laws)):
         other, own = _with_law(config, LAWS[name])
@@ -48,7 +50,7 @@ def compare(
         dropped = [each for each in free if each not in theirs]
         note(f"law {name}: free are {', '.join([*theirs, *own])}"
              + (f"; it has no {', '.join(dropped)}" if dropped else ""))  # fmt: skip
-        found[name] = fit(other, film, list(dict.fromkeys([*theirs, *own])), reporter)
+        found[name] = fit(other, film, list(dict.fromkeys([*theirs, *own])), note)
     return _together(found, film)
 
 
@@ -113,7 +115,7 @@ def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
         akaike=("law", akaike, {"long_name": "Akaike's criterion"}),
         weight=("law", share / share.sum(), {"long_name": "Akaike's weight"}),
     )
-    words = [*_told_apart(names, akaike - akaike.min(), best)]
+    words = _told_apart(names, akaike - akaike.min())
     excess = chi[best] / (rows - number[best])
     if film.error is not None and excess > 1 + _MISSED * sqrt(2 / (rows - number[best])):
         words.append(f"even {names[best]} misses the film by more than its errors: {excess:.3g} chi square an instant")
@@ -126,13 +128,11 @@ def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
     return result.assign_attrs(attributes)
 
 
-def _told_apart(names: Sequence[str], excess: np.ndarray, best: int) -> list[str]:
+def _told_apart(names: Sequence[str], excess: np.ndarray) -> list[str]:
     """What the film says of each law beside the best, in words."""
-    words = []
-    for i in np.argsort(excess):
+    words, (best, *others) = [], np.argsort(excess, kind="stable")
+    for i in others:
         by = f"Akaike's criteria differ by {excess[i]:.3g}"
-        if i == best:
-            continue
         if excess[i] < _ALIKE:
             words.append(f"{names[best]} and {names[i]} cannot be told apart by this film: {by}")
         elif excess[i] < _RULED_OUT:

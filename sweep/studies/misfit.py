@@ -54,17 +54,10 @@ class Minimum(NamedTuple):
     """Of the residuals with respect to the place, shape (instants, free)."""
 
 
-class Question(NamedTuple):
-    """Residuals that a search asks for."""
+Ask = Callable[[Array], Array]
+"""Tells the residuals, shape (cells, instants), at places, shape (cells, free).
 
-    places: Array
-    """Close together: their trajectories take the same steps, shape (cells, free)."""
-    instants: int
-    """How many of the film, from the first on."""
-
-
-Ask = Callable[[Question], Array]
-"""Answers a question: the residuals, shape (cells, instants)."""
+These are so close together that their trajectories take the same steps."""
 
 
 @dataclass
@@ -130,18 +123,17 @@ class Problem:
             curves[i] = (spline.antiderivative() if self.film.what == "heading" else spline)(times + delay[i]) + bias[i]
         return curves
 
-    def residuals(self, places: Array, instants: int, steps: Array | None = None) -> Array:
-        """(computed - seen) / error at the first `instants` of the film, shape (cells, instants)."""
+    def residuals(self, places: Array, instants: int | None = None, steps: Array | None = None) -> Array:
+        """(computed - seen) / error at all or the first `instants` of the film, shape (cells, instants)."""
         seen, error = self.film.value[:instants], self.error[:instants]
         away = self.curves(places, self.film.time[:instants], steps) - seen
         if self.film.what == "heading":  # no film tells where a heading counts from
             away -= np.average(away, axis=1, weights=error**-2.0)[:, None]
         return np.where(np.isnan(away), _LOST * np.abs(seen).max(), away) / error
 
-    def answers(self, questions: Sequence[Question]) -> Iterator[Array]:
-        """The residuals that searches ask for, all of which see as much of the film."""
-        steps = [np.full(len(each.places), self._step(each.places)) for each in questions]
-        places, (instants,) = [each.places for each in questions], {each.instants for each in questions}
+    def answers(self, places: Sequence[Array], instants: int | None = None) -> Iterator[Array]:
+        """The residuals that searches `Ask` for."""
+        steps = [np.full(len(each), self._step(each)) for each in places]
         found = self.residuals(np.concatenate(places), instants, np.concatenate(steps))
         return iter(np.split(found, np.cumsum([len(each) for each in places[:-1]])))
 
@@ -156,7 +148,7 @@ class Problem:
         return self._steps[key]
 
 
-def minimise(ask: Ask, place: Array, instants: int, fixed: int | None = None) -> Minimum:
+def minimise(ask: Ask, place: Array, fixed: int | None = None) -> Minimum:
     """The minimum near a place, over all parameters but the `fixed` one."""
     moved = np.array([i for i in range(len(place)) if i != fixed], int)
     known: dict[bytes, tuple[Array, Array]] = {}
@@ -167,7 +159,7 @@ def minimise(ask: Ask, place: Array, instants: int, fixed: int | None = None) ->
             at = place.copy()
             at[moved] = some
             steps = _NEAR * np.eye(len(place))
-            found = ask(Question(np.concatenate([at[None], at + steps, at - steps]), instants))
+            found = ask(np.concatenate([at[None], at + steps, at - steps]))
             ahead, behind = found[1 : len(place) + 1], found[len(place) + 1 :]
             known[key] = found[0], (ahead - behind).T / (2 * _NEAR)
         return known[key]

@@ -42,7 +42,8 @@ def measuring(config: Config) -> Config:
 
 
 def require_certain(config: Config) -> None:
-    """Raise a `ConfigError` if a parameter is a distribution."""
+    """Raise a `ConfigError` if the model is a formula, or a parameter is a distribution."""
+    require_simulated(config)
     for name in config.distributions:
         words = "is a distribution, of which run draws samples; here give a number or an axis"
         raise ConfigError([config.fault(config.table[name].place, words)])

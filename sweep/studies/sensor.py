@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,38 +12,19 @@ from sweep.kernels.measures.misfit import Film
 from sweep.models import attitude
 from sweep.models.model import Columns, Model
 
-
-@dataclass(frozen=True)
-class Unknown:
-    """Something of a film that a fit may find beside the parameters of the body."""
-
-    words: str
-    of: tuple[str, ...]
-    """What films of `Film.what` have it."""
-    limits: Callable[[Film], tuple[float, float]]
-    """The range in which it is sought."""
-
-
-def _share(film: Film) -> tuple[float, float]:
-    most = float(np.abs(film.value).max()) / 10
-    return -most, most
-
-
-UNKNOWNS = {
-    "film_delay": Unknown(
-        "time from the start of the motion to the first row", ("spin", "gyroscope", "heading"),
-        lambda film: (0.0, float(film.time[-1]) / 10),
-    ),
-    "film_bias": Unknown("what is shown of a body at rest", ("spin", "gyroscope"), _share),
-    "film_lean_x": Unknown("by how much the sensor leans towards x, in radian", ("gyroscope",), lambda _: (-0.2, 0.2)),
-    "film_lean_y": Unknown("by how much the sensor leans towards y, in radian", ("gyroscope",), lambda _: (-0.2, 0.2)),
-}  # fmt: skip
-"""All of them, by the names that the option --free takes."""
+UNKNOWNS = ("film_delay", "film_bias", "film_lean_x", "film_lean_y")
+"""What a fit may find of a film beside the parameters of the body, by the names that the option --free takes."""
 
 
 def of_film(film: Film) -> dict[str, tuple[float, float]]:
-    """The ranges of all that can be found of a film, by name."""
-    return {name: each.limits(film) for name, each in UNKNOWNS.items() if film.what in each.of}
+    """The ranges in which all that can be found of a film is sought, by name."""
+    most = float(np.abs(film.value).max()) / 10
+    ranges = {"film_delay": (0.0, float(film.time[-1]) / 10)}  # from the start of the motion to the first row
+    if film.what != "heading":
+        ranges["film_bias"] = -most, most  # what is shown of a body at rest
+    if film.what == "gyroscope":
+        ranges |= dict.fromkeys(("film_lean_x", "film_lean_y"), (-0.2, 0.2))  # of the sensor, in radian
+    return ranges
 
 
 def seen_by(model: Model, film: Film, columns: Columns, found: Mapping[str, Array]) -> tuple[Any, Array | None]:

@@ -12,26 +12,25 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError, ConfigLike, Fault, load_config
+from sweep.config import Config, ConfigError, ConfigLike, load_config
 from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.schema import FOREVER
 from sweep.config.values import numbers_of
 from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
-from sweep.engine.executor import STEP_SECONDS, UNTIL_ALL_STOP
+from sweep.engine.executor import UNTIL_ALL_STOP, nominal_seconds
 from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.engine.work import Work
-from sweep.faults import suggestion
+from sweep.faults import fault_of, suggestion
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
-from sweep.jit import threads
 from sweep.kernels import path
 from sweep.kernels.build import PATH
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.layout import BLOCK, LANES
+from sweep.kernels.layout import BLOCK
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
@@ -197,9 +196,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
     steps = np.full(Grid.of(chosen).size, integrator.t_end)
     steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
     samples = (integrator.t_end / _intervals(model, columns)).sum()
-    # A step of a group of lanes takes as long whether they are idle or not.
-    groups = -(-len(steps) // (LANES * threads()))
-    seconds = _PASSES * groups * steps.max() * LANES * STEP_SECONDS + samples * _SAMPLE_SECONDS
+    seconds = _PASSES * nominal_seconds(steps) + samples * _SAMPLE_SECONDS
     return "\n".join(
         [
             f"trajectories: {len(steps)}",
@@ -228,9 +225,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     table = {name: values for name, values in (config.cases or {}).items() if samples and name not in wanted}
     drawn = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)] or [{}]
     if (count := prod(map(len, wanted.values())) * len(drawn)) > MAX_TRAJECTORIES:
-        raise ConfigError(
-            [Fault("", None, None, (), f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")]
-        )
+        raise fault_of(f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")
     config = config.at_medians
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
     if config.cases is not None:
@@ -239,7 +234,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)
     if beyond := unfit(chosen) or misplaced(chosen):
-        raise ConfigError([Fault("", None, None, (), beyond)])
+        raise fault_of(beyond)
     return chosen
 
 
@@ -249,9 +244,7 @@ def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, tuple[float, ..
     for name, value in at.items():
         if name not in model.parameters:
             message = f"is no parameter of the {model.name} model{suggestion(name, model.parameters)}"
-            faults.append(
-                Fault("", None, None, (name,), f"{message}; its parameters are {', '.join(model.parameters)}")
-            )
+            faults += fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", name).faults
             continue
         try:
             numbers[name] = numbers_of(config.table[name], value)

@@ -8,7 +8,6 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.integrate import solve_ivp
 from support import Write, adaptive, columns, newton
 from support.cli import invoke
 
@@ -135,15 +134,13 @@ def test_a_film_of_the_true_body_is_reproduced(write: Write, what: Seen) -> None
     times = np.arange(0, 1, 1 / 60)
     body, law = {name: float(value[0]) for name, value in cell.items()}, "coulomb-sqrt"
     late = np.append(0, times + true["film_delay"])
-    slopes = lambda _, y: newton.derivative(y, body, law)[0]  # noqa: E731
-    y = solve_ivp(slopes, (0, late[-1]), start, "DOP853", late, rtol=1e-12, atol=1e-14).y
+    y = newton.follow(start, body, law, late)
     if what == "heading":
         del true["film_bias"]
         value = heading(cell, law, start, late)[1:]
     else:
-        up = np.array([*np.sin(lean), -np.sqrt(1 - np.sum(np.sin(lean) ** 2))])[:, None]
-        u = np.vstack([y[:2], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
-        value = np.sum(y[2:5] * (u if what == "spin" else up), axis=0)[1:] + true["film_bias"]
+        up = [*np.sin(lean), -np.sqrt(1 - np.sum(np.sin(lean) ** 2))]
+        value = (newton.spin(y) if what == "spin" else up @ y[2:5])[1:] + true["film_bias"]
     problem = Problem(config, Film(times, value, what=what), {name: (each, each) for name, each in true.items()})
     away = problem.residuals(np.zeros((1, len(true))), len(times))
     np.testing.assert_allclose(away, 0, atol=1e-6)

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.integrate import solve_ivp
 from support import Write, newton
 from support.cli import invoke
 
@@ -13,7 +12,6 @@ import sweep
 from sweep.config import ConfigError
 from sweep.grid import Grid
 from sweep.kernels.measures.misfit import Film
-from sweep.studies.laws import compare
 
 STONE = """\
 name: stone
@@ -33,8 +31,7 @@ def film(config: Path, law: str, error: float | None = None) -> Film:
     columns, model = Grid.of(checked).columns(), checked.equations
     p = {name: float(value[0]) for name, value in columns.items()}
     start = np.array(model.start(columns))[:, 0]
-    y = solve_ivp(lambda _, y: newton.derivative(y, p, law)[0], (0, 2), start, "DOP853", times, rtol=1e-8, atol=1e-11).y
-    spins = np.sum(y[2:5] * [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], axis=0)
+    spins = newton.spin(newton.follow(start, p, law, times, 1e-8))
     noisy = spins + np.random.default_rng(1).normal(0, NOISE, len(times))
     return Film(times, noisy, None if error is None else np.full(len(times), error))
 
@@ -104,5 +101,5 @@ def test_the_command_writes_table_picture_and_the_best_body(write: Write, tmp_pa
 )
 def test_what_cannot_be_compared_is_refused(write: Write, laws: list[str], free: list[str], words: str) -> None:
     with pytest.raises(ConfigError) as refusal:
-        compare(sweep.load_config(write(STONE)), Film(np.arange(9.0), np.ones(9)), free, laws)
+        sweep.fit(write(STONE), Film(np.arange(9.0), np.ones(9)), free, laws=laws)
     assert words in str(refusal.value)

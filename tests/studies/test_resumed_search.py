@@ -18,7 +18,6 @@ from support.cli import invoke
 from support.runs import Stop, same_numbers
 
 import sweep
-from sweep.studies.critical import critical
 
 TEXT = """\
 name: standard
@@ -37,7 +36,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def undisturbed(config: Path) -> xr.Dataset:
-    return critical(sweep.load_config(config))
+    return sweep.critical(config)
 
 
 @pytest.fixture

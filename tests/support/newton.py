@@ -120,13 +120,18 @@ def energy(y: Vector, p: Mapping[str, float], law: str | None) -> float:
     return float((y[2:5] @ inertia(p) @ y[2:5] / m + v_g @ v_g) / 2 - p.get("gravity", 1.0) * (x_p @ u + rest))
 
 
-def follow(y: Vector, p: Mapping[str, float], law: str | None, times: Vector) -> Vector:
+def follow(y: Vector, p: Mapping[str, float], law: str | None, times: Vector, rtol: float = 1e-12) -> Vector:
     """The states at `times`, shape (states, times)."""
     solution = solve_ivp(
         lambda t, y: derivative(y, p, law)[0],  # noqa: ARG005
-        (0, times[-1]), y, "DOP853", times, rtol=1e-12, atol=1e-14,
+        (0, times[-1]), y, "DOP853", times, rtol=rtol, atol=rtol / 100,
     )  # fmt: skip
     return np.asarray(solution.y)
+
+
+def spin(y: Vector) -> Vector:
+    """The spins of states of shape (states, times)."""
+    return np.asarray(np.sum(y[2:5] * [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], axis=0))
 
 
 def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector, rtol: float = 1e-12) -> Vector:
