@@ -155,7 +155,7 @@ def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> Non
     done, sittings = None, 0
     while done is None:
         try:
-            done = sweep.boundaries(SCENE, output=tmp_path, reporter=Stop(120), **AXES)
+            done = sweep.boundaries(SCENE, output=tmp_path, reporter=Stop(300), **AXES)
         except KeyboardInterrupt:
             sittings += 1
     assert sittings > 1
