@@ -14,6 +14,7 @@ from support import ROOT, SMALL, Write
 from sweep import ConfigError, load_config
 from sweep.config.values import Range
 from sweep.grid import Grid
+from sweep.plots.quantities import check_pictures
 
 
 def test_settings_replace_the_files_values(write: Write) -> None:
@@ -64,8 +65,10 @@ def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "configs").glob("*.yaml")), ids=lambda p: p.stem)
-def test_the_configurations_we_ship_load(path: Path) -> None:
-    assert Grid.of(load_config(path)).size > 1
+def test_the_configurations_we_ship_load_and_measure_what_they_draw(path: Path) -> None:
+    config = load_config(path)
+    assert Grid.of(config).size > 1
+    check_pictures(config)
 
 
 CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"

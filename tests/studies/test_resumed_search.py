@@ -130,14 +130,8 @@ def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkey
     out = tmp_path / "out"
     told = invoke("critical", config, "--dry-run", "--output", out)
     assert told.exit_code == 0
-    assert [line.split(":")[0] for line in told.stdout.splitlines()] == [
-        "bodies",
-        "cells",
-        "steps",
-        "memory",
-        "time",
-        "then",
-    ]
+    words = [line.split(":")[0] for line in told.stdout.splitlines()]
+    assert words == ["bodies", "cells", "steps", "memory", "time", "then"]
     assert "6 (mu 3 × b 2)" in told.stdout
     told = invoke("trajectory", config, "--at", "mu=60", "--at", "mu=75", "--dry-run", "--output", out)
     assert told.exit_code == 0
