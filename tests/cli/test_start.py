@@ -1,5 +1,6 @@
 """How a command starts: it loads nothing that it does not need, and Ctrl-C is one line from the beginning on."""
 
+import json
 import os
 import re
 import signal
@@ -63,25 +64,39 @@ def test_the_shell_completes_and_loads_nothing_heavy(typed: str) -> None:
     assert {name.partition(".")[0] for name in _IMPORT.findall(done.stderr)} & HEAVY == set()
 
 
-def loaded(*arguments: str | Path) -> tuple[int, set[str]]:
-    """The exit code of `sweep ARGUMENTS`, and the packages that it loads."""
-    with start(*arguments) as process:
-        _, told = process.communicate()
-    return process.returncode, {name.partition(".")[0] for name in _IMPORT.findall(told)}
+PROGRAM = """
+import json, sys
+from sweep.cli import main
+
+codes = []
+for words in json.loads(sys.argv[1]):
+    try:
+        main(words, prog_name="sweep")
+    except SystemExit as end:
+        codes.append(end.code)
+print(json.dumps([codes, [*sys.modules]]))
+"""
 
 
-@pytest.mark.parametrize("arguments", HELP, ids=" ".join)
-def test_help_loads_next_to_nothing(arguments: list[str]) -> None:
-    code, packages = loaded(*arguments)
-    assert code == (0 if {"--help", "--version"} & {*arguments} else 2)
+def loaded(commands: list[list[str]]) -> tuple[list[int], set[str]]:
+    """The exit codes of commands, one after another in a process of their own, and the packages that they load."""
+    run = [sys.executable, "-c", PROGRAM, json.dumps(commands)]
+    done = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True)
+    codes, modules = json.loads(done.stdout.splitlines()[-1])
+    return codes, {name.partition(".")[0] for name in modules}
+
+
+def test_help_loads_next_to_nothing() -> None:
+    codes, packages = loaded(HELP)
+    assert codes == [0 if {"--help", "--version"} & {*words} else 2 for words in HELP]
     assert "click" in packages
     assert packages & (HEAVY | {"numpy", "pydantic", "ruamel", "rich"}) == set()
 
 
-@pytest.mark.parametrize(("command", "text"), REFUSED.values(), ids=REFUSED)
-def test_a_request_is_refused_before_anything_heavy_is_loaded(command: str, text: str, write: Write) -> None:
-    code, packages = loaded(*command.split(), write(text))
-    assert code == 2
+def test_a_request_is_refused_before_anything_heavy_is_loaded(write: Write) -> None:
+    files = enumerate(REFUSED.values())
+    codes, packages = loaded([[*command.split(), str(write(text, f"{i}.yaml"))] for i, (command, text) in files])
+    assert codes == [2] * len(REFUSED)
     assert packages & HEAVY == set()
 
 

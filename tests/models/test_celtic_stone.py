@@ -78,8 +78,7 @@ def set_off(p: dict[str, float]) -> np.ndarray:
 @pytest.mark.parametrize("more", [{}, CYCLE, {"I1": 5.0, "delta": -0.2, "E": 500.0}], ids=["still", "cycle", "other"])
 def test_it_moves_by_the_equations_of_borisov_and_mamaev_and_the_plane_has_to_pull(more: dict[str, float]) -> None:
     stone = STONE | more
-    settings = {"measure": ["reversals"], "t_end": 2, "tolerance": 1e-12}
-    one = sweep.trajectory(CONFIG, every=0.05, **settings, **stone).isel(trajectory=0)
+    one = sweep.trajectory(CONFIG, every=0.05, t_end=2, tolerance=1e-12, **stone).isel(trajectory=0)
     times = one["time"].values
     z = solve_ivp(lambda _, z: motion(z, stone)[0], (0, times[-1]), to_theirs(set_off(stone), stone), "DOP853",
                   times, rtol=1e-12, atol=1e-12).y.T  # fmt: skip

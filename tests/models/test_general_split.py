@@ -38,7 +38,6 @@ def test_they_are_the_equations_of_the_full_model(name: str) -> None:
     sides = {"a": 0.005, "b": 0.22} if name.endswith("paraboloid") else {}
     model, body, y = find(name), bodies(name, **sides), states(name)
     split = stiff_general.form_of(model)
-    assert split is not None
     full, p = model.constants.of(body), split.model.constants.of(body)
     slopes, (_, power, R, denominator) = model.rhs(y, full)
     z = np.array(split.momentum(y, p))
@@ -63,7 +62,6 @@ def test_newton_leaves_little_of_the_residual(name: str) -> None:
     model, body, y = find(name), bodies(name, mu=500), states(name)
     y[5:] *= 0.01
     split = stiff_general.form_of(model)
-    assert split is not None
     full, p = model.constants.of(body), split.model.constants.of(body)
     z, gamma, v = np.array(split.momentum(y, p)), 0.01, y[5:]
 
@@ -81,7 +79,6 @@ def test_rocking_and_the_matrix_of_the_corrector_against_derivatives(name: str) 
     """At zero angular momentum about the vertical."""
     body = bodies(name) | ({} if name == "slip" else {"Ixz": np.zeros(COUNT), "Iyz": np.zeros(COUNT)})
     split = stiff_general.form_of(find(name))
-    assert split is not None
     p = split.model.constants.of(body)
     slopes = [split.slow(*(1e-30j * np.eye(7)[i][:, None] * np.ones(COUNT)), p)[0][:4] for i in range(4)]
     J = np.moveaxis(np.array(slopes).imag / 1e-30, 2, 0).swapaxes(1, 2)
@@ -94,7 +91,6 @@ def test_rocking_and_the_matrix_of_the_corrector_against_derivatives(name: str) 
 
 def test_products_of_inertia_with_the_vertical_are_allowed_for_in_the_frequencies() -> None:
     skew, rolling, split = bodies(), find("noslip+solid"), stiff_general.form_of(find("slip+viscous"))
-    assert split is not None
     fastest = np.abs(np.linalg.eigvals(linear.jacobian(rolling, rolling.constants.of(skew), np.zeros(COUNT))).imag)
     _, higher = frequencies(split.rocking(split.model.constants.of(skew)))
     np.testing.assert_allclose(higher, fastest.max(axis=1), rtol=1e-12)
@@ -105,7 +101,6 @@ def test_the_ripple_is_that_of_the_full_model() -> None:
     for body in (bodies(Ixz=0.0, Iyz=0.0), bodies()):
         model, y = find("slip+viscous"), states()
         split = stiff_general.form_of(model)
-        assert split is not None
         y[[0, 1, 2, 3, 5, 6]] *= 1e-6
         full, p = model.constants.of(body), split.model.constants.of(body)
         coefficients = model.ripple.of(body)

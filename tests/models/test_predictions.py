@@ -17,13 +17,6 @@ from sweep.models.theory.rocking import slower_period
 SLIP = MODELS["slip"]
 
 
-def test_critical_spins_equal_the_papers() -> None:
-    # Takano (2011), text of sec. VI B: n_c1 = 0.00179, -0.01; n_c2 = 0.00358, -0.0201 at μ = 75.
-    plus, minus = analytic.critical_spins(columns(mu=75))
-    assert [round(2 * plus[0], 5), round(2 * minus[0], 4)] == [0.00358, -0.0201]
-    assert [round(plus[0], 5), round(minus[0], 2)] == [0.00179, -0.01]
-
-
 def test_nothing_is_critical_by_the_formulas_without_coupling_or_friction() -> None:
     for body in (columns(delta=0.0), columns(a=5, b=5), columns(mu=0.0)):
         assert np.isnan(analytic.critical_spins(body)).all()

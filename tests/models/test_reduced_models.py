@@ -1,78 +1,23 @@
-"""The approximations of the full model: derivations, conserved quantities, limits, symmetry."""
+"""The approximations of the full model: derivations, balances, symmetry.
 
-from typing import Any
+What they conserve, and their limits, are rows of `sweep.reproduce.theory`, which `tests/test_reproduce.py` tests.
+"""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import Write, columns
-from support.kernels import finish, images, kernel, spin
+from support.kernels import kernel, run, spin
 
 import sweep
-from sweep.kernels.kernel import Kernel
-from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
 from sweep.models.ladder import averaged, effective
-from sweep.models.model import stack, take
+from sweep.models.model import take
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
-from sweep.models.theory.rocking import slower_period
 
 small, quick = st.floats(-0.3, 0.3), st.floats(-0.5, 0.5)
-
-
-def simulate(model: str, t_end: float, step: float | None = None, **parameters: Any) -> tuple[Kernel, np.ndarray]:
-    """Final images of trajectories that are never taken as settled."""
-    steps = automatic_step("dopri5", MODELS[model], columns(**parameters))[0] if step is None else step
-    ours = kernel(model=model)
-    table = finish(ours, images(ours, steps, t_end, **parameters), settle=False)
-    assert set(ours.table(table)["status"]) == {TIME_LIMIT}
-    return ours, table
-
-
-def test_rolling_energy_drift() -> None:
-    """Under 1e-9 over t = 1000 at the default step, and falling as the fifth power of the step or faster."""
-    rolling, table = simulate("noslip", 1000.0)
-    assert rolling.table(table)["violation"][0] / rolling.table(table)["energy_start"][0] < 1e-9
-    steps = np.array([0.16, 0.113, 0.08, 0.0566])
-    violation = [simulate("noslip", 1000.0, h)[1][0, rolling.layout.index("violation")] for h in steps]
-    assert np.polyfit(np.log(steps), np.log(violation), 1)[0] > 4.9
-
-
-def test_slip_tends_to_rolling_as_one_over_mu() -> None:
-    mu = np.array([1e3, 4e3, 1.6e4])
-    rolling = spin(*simulate("noslip", 100.0))[0]
-    difference = np.abs(spin(*simulate("slip", 100.0, mu=mu)) - rolling)
-    assert np.polyfit(np.log(mu), np.log(difference), 1)[0] == pytest.approx(-1, abs=0.02)
-
-
-def test_averaged_conserves_without_friction() -> None:
-    body = columns(mu=np.inf)
-    k = coefficients(body)
-
-    def invariants(y: np.ndarray) -> np.ndarray:
-        A, B, n = y
-        return np.array([(k.I3 * n**2 + A**2 + B**2)[0], (A ** (k.k4 / k.k1) * B)[0]])
-
-    before = invariants(stack(averaged.start(body))[:, 0])
-    change = []
-    for step in (0.4, 0.2):
-        _, table = simulate("averaged", 1000.0, step, mu=np.inf)
-        change.append(np.abs(invariants(table[0, :3]) / before - 1))
-    assert (change[1] < 1e-9).all()
-    assert (change[0] / np.maximum(change[1], 1e-15) > 2**4.5).all() or (change[0] < 1e-12).all()
-
-
-def test_effective_tends_to_averaged_for_small_rattle() -> None:
-    """With A = sqrt(ν1² + 1) X0: the paper's sqrt(ν1² - 1) would be off by a quarter of the spin lost."""
-    change = {}
-    for name in ("effective", "averaged"):
-        sizes = np.array([2e-3, 1e-3])
-        ends = simulate(name, 20 * slower_period(columns())[0], x0=sizes, y0=sizes, mu=1e4, n0=0.002)
-        change[name] = (spin(*ends) - 0.002) / sizes**2
-    ratio = change["effective"] / change["averaged"]
-    assert ratio == pytest.approx(1, abs=0.05)
 
 
 @given(
@@ -110,11 +55,11 @@ def test_averaged_energy_balance(y: np.ndarray, c: float) -> None:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_larger_body_moves_alike_in_its_own_time(name: str) -> None:
-    scale = 4.0
-    one = simulate(name, 300.0, 0.01)
+    made = kernel(model=name)
     large = {"a": 40.0, "b": 12.0, "c": 4.0, "mu": 30.0, "n0": 0.025, "x0": 0.04, "y0": 0.04}
-    other = simulate(name, 600.0, 0.02, **large)
-    assert spin(*other) * np.sqrt(scale) == pytest.approx(spin(*one), rel=1e-9)
+    one, other = run(made, 0.01, 300.0), run(made, 0.02, 600.0, **large)
+    assert made.table(one)["status"] == made.table(other)["status"] == TIME_LIMIT
+    assert spin(made, other) * np.sqrt(4) == pytest.approx(spin(made, one), rel=1e-9)
 
 
 @pytest.mark.parametrize("name", [*MODELS, "analytic"])
@@ -129,13 +74,6 @@ def test_mirror_image_reverses_alike(name: str, write: Write) -> None:
     if name != "noslip":
         np.testing.assert_allclose(one.n_c1_plus, -image.n_c1_minus, rtol=1e-10)
         np.testing.assert_array_equal(one.reversals_predicted, image.reversals_predicted)
-
-
-@pytest.mark.parametrize("name", ["effective", "averaged"])
-def test_reduced_models_have_the_papers_critical_spins(name: str, write: Write) -> None:
-    dataset = sweep.predict(write("friction: {mu: 75}\n"), model=name)
-    assert float(dataset.n_c1_plus_linear) == pytest.approx(float(dataset.n_c1_plus), rel=3e-2)
-    assert float(dataset.n_c1_minus_linear) == pytest.approx(float(dataset.n_c1_minus), rel=3e-2)
 
 
 def test_rolling_has_no_critical_spin(write: Write) -> None:

@@ -42,11 +42,11 @@ def at_start(p: dict[str, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "more", [{}, {"eccentricity": 0.2, "ratio": 1.4, "C": 0.35, "mu": 1.0, "n0": 5.0, "tilt": 0.4}]
+    "more", [{"tilt": 1.0}, {"eccentricity": 0.2, "ratio": 1.4, "C": 0.35, "mu": 1.0, "n0": 5.0, "tilt": 0.4}]
 )
 def test_it_moves_as_newton_and_euler_say(more: dict[str, float]) -> None:
     top = TOP | more
-    asked = {**top, "t_end": 30, "stop_when_settled": False}
+    asked = {**top, "t_end": 15, "stop_when_settled": False}
     one = sweep.trajectory(CONFIG, tolerance=1e-12, every=1.0, **asked).isel(trajectory=0)
     start, times = at_start(top), one["time"].values
     y = solve_ivp(lambda _, y: slopes(y, top), (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13).y
@@ -72,7 +72,7 @@ def test_it_turns_over_while_energy_balances_and_jelletts_integral_stays() -> No
 def test_it_turns_over_completely_if_its_moments_are_in_the_published_range() -> None:
     """1 - α < A/C < 1 + α; below it does not turn over, above not completely."""
     tops = {**TOP, "mu": 1.0, "ratio": [0.6, 0.9, 1.1, 1.5]}
-    ends = sweep.run(CONFIG, t_end=4000, stop_when_settled=False, **tops)
+    ends = sweep.run(CONFIG, t_end=2000, stop_when_settled=False, **tops)
     alpha, ratio = TOP["eccentricity"], ends["ratio"]
     upside_down = -TOP["n0"] * (np.cos(TOP["tilt"]) - alpha) / (1 + alpha)
     np.testing.assert_array_equal(
@@ -105,9 +105,9 @@ def test_no_settled_top_reverses_later() -> None:
     assert not (settled & (ends["spin_final"] * later["spin_final"] <= 0)).any()
 
 
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
-def test_the_automatic_step_keeps_the_tolerance(tolerance: float) -> None:
+def test_the_automatic_step_keeps_the_tolerance() -> None:
     asked = {**TOP, "n0": [2.0, 6.0], "eccentricity": [0.1, 0.3], "t_end": 100, "stop_when_settled": False}
-    found = sweep.run(CONFIG, tolerance=tolerance, **asked)["spin_final"]
     exact = sweep.run(CONFIG, tolerance=1e-13, **asked)["spin_final"]
-    assert abs(found - exact).max() < tolerance
+    for tolerance in (1e-6, 1e-8, 1e-10):
+        found = sweep.run(CONFIG, tolerance=tolerance, **asked)["spin_final"]
+        assert abs(found - exact).max() < tolerance

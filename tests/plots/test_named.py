@@ -8,9 +8,7 @@ from support.cli import invoke, refused
 import sweep
 from sweep.config import load_config
 from sweep.plots import picture
-from sweep.plots.quantities import check_pictures
 
-ROOT = Path(__file__).parents[2]
 FORMULA = """\
 model: analytic
 body: {b: [2, 3, 4, 5, 6]}
@@ -86,8 +84,3 @@ def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_drawn(tmp_pat
     assert result.exit_code == 0
     assert "no picture of probability: there is no variable probability" in result.stderr
     assert list(drawn(tmp_path / "out")) == ["map_status.png"]
-
-
-@pytest.mark.parametrize("file", sorted(ROOT.glob("configs/*.yaml")), ids=lambda file: file.stem)
-def test_shipped_configurations_measure_what_they_draw(file: Path) -> None:
-    check_pictures(load_config(file))

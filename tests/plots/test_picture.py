@@ -293,7 +293,7 @@ def test_the_suffix_names_the_format(suffix: str, tmp_path: Path) -> None:
     write(tmp_path / "made.nc", made())
     for name in ("one", "two"):
         target = tmp_path / f"{name}.{suffix}"
-        result = invoke("plot", tmp_path / "made.nc", "--sel", "n0=0.1", "--output", target)
+        result = invoke("plot", tmp_path / "made.nc", "--var", "reversals", "--sel", "n0=0.1", "--output", target)
         assert result.exit_code == 0, result.output
         assert "n0 = 0.05, nearest to 0.1" in result.stdout
         assert target.read_bytes().startswith(MAGIC[suffix])

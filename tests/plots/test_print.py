@@ -84,9 +84,9 @@ def test_maps_that_do_not_fit_side_by_side_stand_below_each_other() -> None:
 
 
 @pytest.mark.parametrize("suffix", ["pdf", "eps"])
-def test_fonts_can_be_edited(small: xr.Dataset, tmp_path: Path, suffix: str) -> None:
-    picture.plot(small, output=tmp_path / f"a.{suffix}")
-    picture.plot(small, width="85mm").savefig(tmp_path / f"b.{suffix}")
+def test_fonts_can_be_edited(tmp_path: Path, suffix: str) -> None:
+    picture.plot(made(), "reversals", output=tmp_path / f"a.{suffix}")
+    picture.plot(made(), "reversals", width="85mm").savefig(tmp_path / f"b.{suffix}")
     for name in "ab":
         written = (tmp_path / f"{name}.{suffix}").read_bytes()
         assert b"/FontType 42" in written if suffix == "eps" else b"/CIDFontType2" in written

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from support.cli import invoke, refused
+from support.figures import entries
 from support.runs import Stop, same_numbers
 
 import sweep
@@ -144,9 +145,7 @@ def test_margins_of_a_grid_draw_the_curves_without_a_search(found: xr.Dataset) -
     assert len(off) >= 4
     assert np.median(off) < 0.15
     assert max(off) < 0.5
-    assert "by the margins" in " ".join(
-        t.get_text() for k in picture.plot(grid, x="b", y="mu").legends for t in k.get_texts()
-    )
+    assert "by the margins" in " ".join(entries(picture.plot(grid, x="b", y="mu")))
     assert not drawn.lines(grid.drop_vars("margin_more"), *axes)
 
 
@@ -155,7 +154,7 @@ def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> Non
     done, sittings = None, 0
     while done is None:
         try:
-            done = sweep.boundaries(SCENE, output=tmp_path, reporter=Stop(120), **AXES)
+            done = sweep.boundaries(SCENE, output=tmp_path, reporter=Stop(300), **AXES)
         except KeyboardInterrupt:
             sittings += 1
     assert sittings > 1
@@ -171,7 +170,7 @@ def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> Non
 def test_what_does_not_end_is_open() -> None:
     early = sweep.boundaries(SCENE, **AXES, t_end=4500.0)
     assert (early.outcome == OPEN).any()
-    assert "did not end" in " ".join(t.get_text() for k in picture.plot(early).legends for t in k.get_texts())
+    assert "did not end" in " ".join(entries(picture.plot(early)))
 
 
 def test_a_map_without_boundaries_has_an_empty_picture(tmp_path: Path) -> None:

@@ -53,8 +53,8 @@ def test_rows_without_a_number_are_left_out(write: Write) -> None:
     np.testing.assert_allclose(found.value, np.delete(SPINS, [3, 7, 13]), rtol=1e-12)
 
 
-def test_a_film_of_a_million_rows_is_thinned(write: Write) -> None:
-    times = np.arange(1_000_000) * 1e-5
+def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
+    times = np.arange(5 * film.MOST_ROWS) * 1e-4
     found = film.read(write(table("time,spin", times, np.cos(times)), "film.csv"))
     assert len(found.time) == film.MOST_ROWS
     np.testing.assert_allclose(found.value, np.cos(found.time), rtol=1e-12)

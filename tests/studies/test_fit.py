@@ -182,10 +182,11 @@ def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
 
 def test_friction_that_hardly_slips_is_known_by_its_slope_alone(write: Write) -> None:
     """With a speed far above that of the slip only the ratio of the two counts."""
-    scene = write(STONE)
-    one = sweep.trajectory(scene, mu=0.3, speed=0.5, every=1 / 60).isel(trajectory=0)
-    film = Film(one.time.values, noisy(one.spin.values, 0.02))
-    found = sweep.fit(scene, film, ["mu", "speed"])
+    times, true = np.arange(0, 2, 1 / 60), {"mu": 0.3, "speed": 0.5}
+    config = sweep.load_config(write(STONE))
+    problem = Problem(config, Film(times, 0 * times), {n: (v, v) for n, v in true.items()})
+    film = Film(times, noisy(problem.curves(np.zeros((1, 2)), times)[0], 0.02))
+    found = sweep.fit(config, film, list(true))
     assert "speed and mu are known only together" in found.attrs["undetermined"]
     ratio = (found.value[0] / found.value[1]).item()
     assert ratio == pytest.approx(0.6, rel=0.1)
