@@ -60,6 +60,7 @@ def is_logarithmic(scale: Scale) -> bool:
 
 def beyond(part: Map, scale: Scale) -> str:
     """Say in words what lies beyond the scale; empty if nothing does."""
-    ends = {"min": f"down to {part.shown.min():.2g}", "max": f"up to {part.shown.max():.2g}"}
-    words = " and ".join(said for end, said in ends.items() if scale.arrows in (end, "both"))
+    ends = {"min": ("down to", np.min), "max": ("up to", np.max)}
+    there = (said for end, said in ends.items() if scale.arrows in (end, "both"))
+    words = " and ".join(f"{said} {extreme(part.shown):.2g}" for said, extreme in there)
     return f"the last colours also stand for values {words}" if words else ""
