@@ -75,8 +75,7 @@ class MapFigure:
         plot.image_rgba(image="image", x="x", y="y", dw="dw", dh="dh", source=overlay)
         self._lines = {name: _line(plot, *style) for name, style in LINES.items()}
         self._numbers = _counts(plot)
-        self._uncertain = ColumnDataSource({"x": [], "y": [], "size": []}, name="uncertain")
-        plot.scatter(source=self._uncertain, size="size", color="white", line_color="black", line_width=0.7)
+        self._uncertain = plot.scatter([], [], color="white", line_color="black", line_width=0.7)
         self.selected = ColumnDataSource({"xs": [], "ys": []}, name="selected")
         for colour, dash in (("black", "solid"), ("white", "dashed")):
             plot.patches("xs", "ys", source=self.selected, fill_color=None, line_color=colour, line_dash=dash)
@@ -84,12 +83,11 @@ class MapFigure:
         self.pins: ColumnDataSource = _pins(plot, main and main.pins)
         self._hover = models.HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
-        self._cuts = Cuts(source, [(self._x, plot.x_range), (self._y, plot.y_range)])
-        self.cuts = self._cuts.root
+        self.cuts = Cuts(source, [(self._x, plot.x_range), (self._y, plot.y_range)])
         _connect(plot, self._cells, {"figure": plot, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
                  "ex": ex, "ey": ey, "cursor": self.cursor, "probe": probe, "request": request, "cells": self._cells,
-                 "selected": self.selected, "main": main is None, "cuts": self._cuts.models,
+                 "selected": self.selected, "main": main is None, "cuts": self.cuts.models,
                  "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
     def show(self, part: Map, columns: Mapping[str, Array], state: State) -> Scale:
@@ -119,13 +117,10 @@ class MapFigure:
             "count": [count for *_, count in numbers],
         }
         up, across = np.nonzero(part.marks["uncertain"])
-        size = float(np.clip(120 / max(part.values.shape), 2.0, 6.0))
-        self._uncertain.data = {
-            "x": self._x.place(part.x.values[across]),
-            "y": self._y.place(part.y.values[up]),
-            "size": np.full(len(up), size),
-        }
-        self._cuts.spell((scale.ticks or {}) if part.flags else {})
+        at = {"x": self._x.place(part.x.values[across]), "y": self._y.place(part.y.values[up])}
+        self._uncertain.data_source.data = at
+        self._uncertain.glyph.size = float(np.clip(120 / max(part.values.shape), 2.0, 6.0))
+        self.cuts.spell((scale.ticks or {}) if part.flags else {})
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]

@@ -22,7 +22,6 @@ from sweep.explorer.runner import Curve, Job, Runner
 from sweep.explorer.setup import Setup, why_still
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State
-from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 
 _BESIDE = ("reversals", "reversals_predicted", "status")
@@ -40,9 +39,8 @@ class View:
     ) -> None:  # fmt: skip
         self._document, self._source, self._setup = document, source, setup
         self._base: Cell = setup.base if setup else {}
-        self._known = setup.config.table if setup else PARAMETERS
+        self._known = setup.config.table if setup else {}
         self.state, self._faults = states.read(query, source, self._base, self._known)
-        self._shown: figure.MapFigure | None = None
         self._second: figure.MapFigure | None = None
         self._build()
         self._drawn = Drawn(self.state.cells, runner, self._tell)
@@ -60,6 +58,7 @@ class View:
         controls.on(self._probe, "data", lambda _: self._point())
         self._request = ColumnDataSource({"i": [-1], "j": [-1], "add": [False], "count": [0]}, name="request")
         controls.on(self._request, "data", lambda _: self._requested())
+        self._shown = self._figure()
         self._map = Row(sizing_mode="stretch_width", name="map", styles={"flex-wrap": "wrap"})
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._selection = Div(sizing_mode="stretch_width", name="selection", visible=False)
@@ -88,9 +87,9 @@ class View:
 
     # ---- the map
 
-    def _change(self, state: State) -> None:
+    def _change(self, change: Callable[[State], State]) -> None:
         """Show another map."""
-        if state != self.state:
+        if (state := change(self.state)) != self.state:
             self.state = state
             self._faults = []
             self._draw_map()
@@ -101,12 +100,10 @@ class View:
         beside = [n for n in _BESIDE if n in self._source.variables]
         part = self._source.map(state.show, state.x, state.y, state.at)
         tables = self._source.tables(beside, state.x, state.y, state.at)
-        if self._shown is None or self._shown.axes != (state.x, state.y):
-            self._shown = figure.MapFigure(self._source, state.x, state.y, self._probe, self._request)
-            self._second = None
-            controls.on(self._shown.selected, "data", lambda _: self._draw_selection())
-        self._second = (self._second or self._beside(self._shown)) if state.beside else None
-        self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts]
+        if self._shown.axes != (state.x, state.y):
+            self._shown, self._second = self._figure(), None
+        self._second = (self._second or self._figure(self._shown)) if state.beside else None
+        self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts.root]
         if self._second:
             second = self._source.map(state.beside, state.x, state.y, state.at)
             self._second.show(
@@ -118,13 +115,14 @@ class View:
         self._controls.show(state)
         self._draw_selection()
 
-    def _beside(self, main: figure.MapFigure) -> figure.MapFigure:
-        """A second map of the same cells."""
-        return figure.MapFigure(self._source, self.state.x, self.state.y, self._probe, self._request, main)
+    def _figure(self, main: figure.MapFigure | None = None) -> figure.MapFigure:
+        """A map over the chosen axes, or a second one beside `main`."""
+        made = figure.MapFigure(self._source, self.state.x, self.state.y, self._probe, self._request, main)
+        controls.on(made.selected, "data", lambda _: self._draw_selection())
+        return made
 
     def _draw_selection(self) -> None:
         """Tell about the cells that are chosen."""
-        assert self._shown
         around = self._shown.selected.data
         self._selection.visible = len(around["xs"]) > 0
         if self._selection.visible:
@@ -209,7 +207,6 @@ class View:
         x, y = self.state.x, self.state.y
         on_map = [(k, cell) for k, cell in enumerate(cells) if x in cell and (not y or y in cell)]
         here = {d: source.axes[d].values[i] for d, i in self.state.at.items() if d not in (x, y)}
-        assert self._shown
         self._shown.pins.data = {
             "x": [source.axes[x].place(cell[x]) for _, cell in on_map],
             "y": [source.axes[y].place(cell[y]) if y else 0.0 for _, cell in on_map],
@@ -278,9 +275,10 @@ def make(source: Source, setup: Setup | None) -> Callable[[Document], None]:
         runner.submit(Job(setup.base, _end))
 
     def fill(document: Document) -> None:
-        request: Any = document.session_context.request if document.session_context else None
-        given = request.arguments if request else {}
-        query = {key: [v.decode(errors="replace") for v in values] for key, values in given.items()}
-        View(document, source, setup, runner, {k: v for k, v in query.items() if not k.startswith("bokeh-")})
+        context: Any = document.session_context
+        given = context.request.arguments.items()
+        own = {key: values for key, values in given if not key.startswith("bokeh-")}
+        query = {key: [value.decode(errors="replace") for value in values] for key, values in own.items()}
+        View(document, source, setup, runner, query)
 
     return fill
