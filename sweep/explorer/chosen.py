@@ -27,28 +27,21 @@ class CellControls:
     ) -> None:  # fmt: skip
         self._edit = edit
         self._quiet = False
-        self._keep = Checkbox(label="keep the curves when another cell is clicked", active=False, name="keep")
+        self.keep = Checkbox(label="keep the curves when another cell is clicked", active=False, name="keep")
+        """Whether a click adds a cell rather than replacing those drawn."""
         self._rows = [self._row(k, activate, remove) for k in range(MAX_CELLS)]
         self._title = Div(text="", margin=(8, 0, 0, 0))
         self._end = Div(text="", margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
         ordered = [*(n for n in source.dims if n in base), *(n for n in base if n not in source.dims)]
         self._inputs = {name: _Input(source, known[name], partial(self._edited, name)) for name in ordered}
         wrap = {"gap": "4px 10px", "flex-wrap": "wrap", "align-items": "flex-end"}
-        dragged = [
-            Row(one.field, one.slider, sizing_mode="stretch_width", styles=wrap)
-            for one in self._inputs.values()
-            if one.slider
-        ]
-        typed = [one.field for one in self._inputs.values() if not one.slider]
+        inputs = self._inputs.values()
+        dragged = [Row(one.field, one.slider, sizing_mode="stretch_width", styles=wrap) for one in inputs if one.slider]
+        typed = [one.field for one in inputs if not one.slider]
         self._editor = Column(self._title, *dragged, Row(*typed, sizing_mode="stretch_width", styles=wrap),
                               sizing_mode="stretch_width", visible=False, name="parameters")  # fmt: skip
-        self.root = Column(self._keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
+        self.root = Column(self.keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
                            stylesheets=[WIDGETS], sizing_mode="stretch_width", visible=bool(base))  # fmt: skip
-
-    @property
-    def keeps(self) -> bool:
-        """True if a click adds a cell rather than replacing those drawn."""
-        return bool(self._keep.active)
 
     def show(self, cells: Sequence[Cell], names: Sequence[str], active: int) -> None:
         for k, (row, button) in enumerate(self._rows):

@@ -42,10 +42,8 @@ def scale_of(part: Map, state: State) -> Scale:
         shown = shown[shown > 0]
     if not shown.size:
         return common_scale([part], cmap=palette)
-    low, high = (
-        shown.min() if state.low is None else state.low,
-        shown.max() if state.high is None else state.high,
-    )
+    low = shown.min() if state.low is None else state.low
+    high = shown.max() if state.high is None else state.high
     given = (state.low, state.high) != (None, None) and low < high
     scale = common_scale([part], (low, high) if given else None, palette)
     norm = {"linear": Normalize, "log": LogNorm}.get(state.spacing)

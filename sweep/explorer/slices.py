@@ -151,8 +151,5 @@ def open_source(path: Path) -> Source:
 def plain(values: Any) -> Array:
     """`values` in a type that browsers have, as small as it allows."""
     array = np.asarray(values)
-    if array.dtype.kind == "f":
-        return array.astype("float32")
-    if array.dtype.kind == "b":
-        return array.astype("uint8")
-    return array.astype("int32") if array.dtype.itemsize > 4 else array
+    small = {"float64": "float32", "int64": "int32", "uint64": "int32", "bool": "uint8"}
+    return array.astype(small.get(array.dtype.name, array.dtype), copy=False)

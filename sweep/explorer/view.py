@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from bokeh.document import Document
-from bokeh.models import Column, ColumnDataSource, CustomJS, Div, Row
+from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Div, Row
 
-from sweep.explorer import controls, export, figure, page, saving, selection
+from sweep.explorer import controls, export, figure, page, selection
 from sweep.explorer import state as states
 from sweep.explorer.chosen import CellControls
 from sweep.explorer.colours import CURVES
@@ -26,6 +26,9 @@ from sweep.plots import labels
 
 _BESIDE = ("reversals", "reversals_predicted", "status")
 """The pointer shows these of a cell at once; the server adds everything else."""
+
+_FILES = {"netCDF": ("nc", "application/x-netcdf"), "CSV": ("csv", "text/csv"), "YAML": ("yaml", "application/yaml")}
+"""What can be saved besides the picture: the endings and types of the files by what the buttons say."""
 
 _NOTICE = {"background": "#1b2733", "border-radius": "8px 8px 0 0", "color": "white", "padding": "6px 16px"}
 
@@ -71,14 +74,9 @@ class View:
         shown = self._figures
         curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
         player = Column(shown.player.figure, shown.player.controls, sizing_mode="stretch_width", name="played")
-        files = {"nc": self._netcdf} | ({"csv": self._csv, "yaml": self._yaml} if self._setup else {})
-        name = export.stem(self._source)
-        save = saving.buttons(name, self._map, [shown.spin, shown.energy, shown.player.figure], files, self._call)
-        # It travels with a root: what a callback of the document alone refers to is not kept up to date.
-        save.tags = [self._calls]
         self._document.js_on_event("document_ready", shown.player.moment)
         for root in (self._controls.root, self._notice, self._map, self._legend, self._selection, self._cell,
-                     curves, player, self._chosen.root, save):  # fmt: skip
+                     curves, player, self._chosen.root, self._buttons()):  # fmt: skip
             self._document.add_root(root)
 
     def _call(self, name: str, *given: Any) -> None:
@@ -165,7 +163,7 @@ class View:
             self._activate(self._drawn.cells.index(cell))
             return
         self._faults = []
-        self._drawn.add(cell, beside=bool(self._request.data["add"][0]) or self._chosen.keeps)
+        self._drawn.add(cell, beside=bool(self._request.data["add"][0]) or bool(self._chosen.keep.active))
         self._draw_cells()
 
     def _edit(self, name: str, value: float) -> None:
@@ -221,10 +219,8 @@ class View:
 
     def _draw_curves(self) -> None:
         curves = self._drawn.curves
-        names = [
-            f"{k}: {name}{_counted(curve) if curve else ''}"
-            for k, (name, curve) in enumerate(zip(self._names(), curves, strict=True), 1)
-        ]
+        named = enumerate(zip(self._names(), curves, strict=True), 1)
+        names = [f"{k}: {name}{_counted(curve)}" for k, (name, curve) in named]
         self._hint.visible = not any(curves)
         self._figures.show(curves, names, self._drawn.active)
         self._chosen.tell(curves)
@@ -247,19 +243,37 @@ class View:
     def _query(self) -> str:
         return states.write(self.state, self._source, self._base)
 
-    def _netcdf(self) -> bytes:
-        return export.netcdf(self._source, self._query(), self.state, list(filter(None, self._drawn.curves)))
+    def _buttons(self) -> Row:
+        """Make the buttons that copy the address and save what is seen."""
+        link = Button(label="Copy link", name="link", width=92)
+        link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
+        png = Button(label="PNG", name="png", width=64)
+        figures = [self._figures.spin, self._figures.energy, self._figures.player.figure]
+        args = {"plots": self._map, "figures": figures, "name": f"{export.stem(self._source)}.png"}
+        png.js_on_click(CustomJS(args=args, code="sweep.picture([...plots.children, ...figures], name)"))
+        files = [Button(label=label, name=label, width=76) for label in (_FILES if self._setup else ["netCDF"])]
+        for button in files:
+            button.on_click(partial(self._save, button.label))
+        # The calls travel with a root: what a callback of the document alone refers to is not kept up to date.
+        return Row(link, png, *files, name="save", tags=[self._calls], stylesheets=[controls.WIDGETS],
+                   styles={"flex-wrap": "wrap"})  # fmt: skip
 
-    def _csv(self) -> bytes:
-        return export.csv(list(filter(None, self._drawn.curves))).encode()
+    def _save(self, label: str) -> None:
+        """Let the browser save one of the `_FILES`."""
+        curves = list(filter(None, self._drawn.curves))
+        if label == "netCDF":
+            content = export.netcdf(self._source, self._query(), self.state, curves)
+        elif label == "CSV":
+            content = export.csv(curves).encode()
+        else:
+            assert self._setup
+            content = export.yaml(self._source, self._setup, self.state).encode()
+        ending, mime = _FILES[label]
+        self._call("save", np.frombuffer(content, "uint8"), f"{export.stem(self._source)}.{ending}", mime)
 
-    def _yaml(self) -> bytes:
-        assert self._setup
-        return export.yaml(self._source, self._setup, self.state).encode()
 
-
-def _counted(curve: Curve) -> str:
-    return f", {labels.reversals(len(curve.reversals))}{'' if curve.whole else ' …'}"
+def _counted(curve: Curve | None) -> str:
+    return f", {labels.reversals(len(curve.reversals))}{'' if curve.whole else ' …'}" if curve else ""
 
 
 def _end(job: Job) -> None:
