@@ -23,10 +23,16 @@ _STYLE = {
 }  # fmt: skip
 
 
-def style(plot: Any) -> None:
-    """Give the axes of a figure their style."""
-    for axis in plot.axis:
-        axis.update(formatter=numbers(), **_STYLE)
+def style(plot: Any, *shown: PlacedAxis) -> None:
+    """Give the axes of a figure their style; of those that are `shown`, uneven values are listed one by one."""
+    for drawn in plot.axis:
+        drawn.update(formatter=numbers(), **_STYLE)
+    for axis, drawn in zip(shown, (plot.xaxis[0], plot.yaxis[0]), strict=False):
+        if axis.spacing == "uneven":
+            ticks = [float(t) for t in range(0, len(axis.values), -(-len(axis.values) // _TICKS))]
+            drawn.ticker = FixedTicker(ticks=ticks, minor_ticks=[])
+            code = "return sweep.number(values[tick])"
+            drawn.formatter = CustomJSTickFormatter(args={"values": axis.values}, code=code)
 
 
 def numbers() -> CustomJSTickFormatter:
@@ -37,11 +43,3 @@ def numbers() -> CustomJSTickFormatter:
 def kind(axis: PlacedAxis) -> Any:
     """What Bokeh calls an axis of such values."""
     return "log" if axis.spacing == "log" else "linear"
-
-
-def place_ticks(axis: PlacedAxis, drawn: Any) -> None:
-    """List the values of an axis that are not evenly spaced."""
-    if axis.spacing == "uneven":
-        ticks = [float(t) for t in range(0, len(axis.values), -(-len(axis.values) // _TICKS))]
-        drawn.ticker = FixedTicker(ticks=ticks, minor_ticks=[])
-        drawn.formatter = CustomJSTickFormatter(args={"values": axis.values}, code="return sweep.number(values[tick])")

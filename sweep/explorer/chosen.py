@@ -9,7 +9,6 @@ from html import escape
 import numpy as np
 from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, TextInput
 
-from sweep.axis import Axis
 from sweep.explorer.colours import CURVES
 from sweep.explorer.controls import BARE, WIDGETS, on
 from sweep.explorer.runner import Curve
@@ -28,28 +27,21 @@ class CellControls:
     ) -> None:  # fmt: skip
         self._edit = edit
         self._quiet = False
-        self._keep = Checkbox(label="keep the curves when another cell is clicked", active=False, name="keep")
+        self.keep = Checkbox(label="keep the curves when another cell is clicked", active=False, name="keep")
+        """Whether a click adds a cell rather than replacing those drawn."""
         self._rows = [self._row(k, activate, remove) for k in range(MAX_CELLS)]
         self._title = Div(text="", margin=(8, 0, 0, 0))
         self._end = Div(text="", margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
         ordered = [*(n for n in source.dims if n in base), *(n for n in base if n not in source.dims)]
-        self._inputs = {name: self._input(source, known[name]) for name in ordered}
+        self._inputs = {name: _Input(source, known[name], partial(self._edited, name)) for name in ordered}
         wrap = {"gap": "4px 10px", "flex-wrap": "wrap", "align-items": "flex-end"}
-        dragged = [
-            Row(one.field, one.slider, sizing_mode="stretch_width", styles=wrap)
-            for one in self._inputs.values()
-            if one.slider
-        ]
-        typed = [one.field for one in self._inputs.values() if not one.slider]
-        grid = Column(*dragged, Row(*typed, sizing_mode="stretch_width", styles=wrap), sizing_mode="stretch_width")
-        self._editor = Column(self._title, grid, sizing_mode="stretch_width", visible=False, name="parameters")
-        self.root = Column(self._keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
+        inputs = self._inputs.values()
+        dragged = [Row(one.field, one.slider, sizing_mode="stretch_width", styles=wrap) for one in inputs if one.slider]
+        typed = [one.field for one in inputs if not one.slider]
+        self._editor = Column(self._title, *dragged, Row(*typed, sizing_mode="stretch_width", styles=wrap),
+                              sizing_mode="stretch_width", visible=False, name="parameters")  # fmt: skip
+        self.root = Column(self.keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
                            stylesheets=[WIDGETS], sizing_mode="stretch_width", visible=bool(base))  # fmt: skip
-
-    @property
-    def keeps(self) -> bool:
-        """True if a click adds a cell rather than replacing those drawn."""
-        return bool(self._keep.active)
 
     def show(self, cells: Sequence[Cell], names: Sequence[str], active: int) -> None:
         for k, (row, button) in enumerate(self._rows):
@@ -84,11 +76,6 @@ class CellControls:
         away.on_click(lambda: remove(k))
         return Row(button, away, visible=False, sizing_mode="stretch_width"), button
 
-    def _input(self, source: Source, parameter: Parameter) -> _Input:
-        unit = labels.si_unit(source.dataset, parameter.name).strip()
-        edited = partial(self._edited, parameter.name)
-        return _Input(parameter, source.axes.get(parameter.name), f" ({unit})" if unit else "", edited)
-
     def _edited(self, name: str, value: float) -> None:
         if not self._quiet:
             self._edit(name, float(f"{value:.10g}"))
@@ -97,10 +84,11 @@ class CellControls:
 class _Input:
     """A field for a number, and on an axis of the dataset a slider as well, logarithmic where the axis is."""
 
-    def __init__(self, parameter: Parameter, axis: Axis | None, unit: str, edited: Callable[[float], None]) -> None:
-        name, self._axis = parameter.name, axis
-        self.field = TextInput(value="", width=96, title=f"{labels.symbol(name)}{unit}", stylesheets=[BARE],
-                               name=f"parameter {name}")  # fmt: skip
+    def __init__(self, source: Source, parameter: Parameter, edited: Callable[[float], None]) -> None:
+        name = parameter.name
+        axis = self._axis = source.axes.get(name)
+        title = labels.with_unit(labels.symbol(name), labels.si_unit(source.dataset, name).strip())
+        self.field = TextInput(value="", width=96, title=title, stylesheets=[BARE], name=f"parameter {name}")
         on(self.field, "value", lambda text: edited(number(text)))
         self.slider: Slider | None = None
         if axis is None or len(axis.values) < 2:

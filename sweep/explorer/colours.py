@@ -42,10 +42,8 @@ def scale_of(part: Map, state: State) -> Scale:
         shown = shown[shown > 0]
     if not shown.size:
         return common_scale([part], cmap=palette)
-    low, high = (
-        shown.min() if state.low is None else state.low,
-        shown.max() if state.high is None else state.high,
-    )
+    low = shown.min() if state.low is None else state.low
+    high = shown.max() if state.high is None else state.high
     given = (state.low, state.high) != (None, None) and low < high
     scale = common_scale([part], (low, high) if given else None, palette)
     norm = {"linear": Normalize, "log": LogNorm}.get(state.spacing)
@@ -60,6 +58,7 @@ def is_logarithmic(scale: Scale) -> bool:
 
 def beyond(part: Map, scale: Scale) -> str:
     """Say in words what lies beyond the scale; empty if nothing does."""
-    ends = {"min": f"down to {part.shown.min():.2g}", "max": f"up to {part.shown.max():.2g}"}
-    words = " and ".join(said for end, said in ends.items() if scale.arrows in (end, "both"))
+    ends = {"min": ("down to", np.min), "max": ("up to", np.max)}
+    there = (said for end, said in ends.items() if scale.arrows in (end, "both"))
+    words = " and ".join(f"{said} {extreme(part.shown):.2g}" for said, extreme in there)
     return f"the last colours also stand for values {words}" if words else ""

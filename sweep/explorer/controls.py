@@ -22,19 +22,15 @@ BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6
 
 def on(model: Any, name: str, call: Callable[[Any], None]) -> None:
     """Call `call` with each new value of a property."""
-
-    def changed(attr: str, old: Any, new: Any) -> None:  # noqa: ARG001  Bokeh looks at the names
-        call(new)
-
-    model.on_change(name, changed)
+    model.on_change(name, lambda attr, old, new: call(new))  # noqa: ARG005  Bokeh looks at the names
 
 
 class MapControls:
     """The widgets of all choices: which variable is shown, over which axes, and where on the others."""
 
-    def __init__(self, source: Source, change: Callable[[State], None]) -> None:
+    def __init__(self, source: Source, change: Callable[[Callable[[State], State]], None]) -> None:
+        """`change` is told how the visitor changes the state."""
         self._source, self._change = source, change
-        self._state: State | None = None
         self._choices = choices(source)
         self._widgets = {name: _Widgets(choice, partial(self._pick, choice)) for name, choice in self._choices.items()}
         self._limits = {name: self._limit(name, words) for name, words in LIMITS.items()}
@@ -44,7 +40,6 @@ class MapControls:
 
     def show(self, state: State) -> None:
         """Let the widgets say what is shown."""
-        self._state = state
         along = self._source.dims_of(state.show) | set(self._source.dims)
         for name, widgets in self._widgets.items():
             widgets.show(self._choices[name].of(state))
@@ -55,8 +50,8 @@ class MapControls:
 
     def _pick(self, choice: Choice, k: Any) -> None:
         """Take an option that the browser sent, which may be anything."""
-        if self._state and isinstance(k, int | float) and 0 <= k < len(choice.options):
-            self._change(choice.put(self._state, int(k)))
+        if isinstance(k, int | float) and 0 <= k < len(choice.options):
+            self._change(lambda state: choice.put(state, int(k)))
 
     def _limit(self, name: str, words: str) -> TextInput:
         """The field of an end of the colour scale; what is no number leaves it to the values."""
@@ -65,8 +60,7 @@ class MapControls:
 
         def put(text: str) -> None:
             limit = number(text)
-            if self._state:
-                self._change(self._state.limited(name, limit if math.isfinite(limit) else None))
+            self._change(lambda state: state.limited(name, limit if math.isfinite(limit) else None))
 
         on(field, "value", put)
         return field
@@ -76,8 +70,7 @@ class _Widgets:
     """Buttons, a list or a slider, or buttons and a list, for the options of a choice."""
 
     def __init__(self, choice: Choice, pick: Callable[[Any], None]) -> None:
-        n = self._count = choice.buttons
-        self._options = choice.options
+        self._choice, n = choice, choice.buttons
         name, title = choice.name, "" if n else choice.title
         self._buttons = RadioButtonGroup(labels=list(choice.words[:n]), visible=n > 0, name=f"buttons {name}",
                                          stylesheets=[BARE])  # fmt: skip
@@ -98,11 +91,11 @@ class _Widgets:
 
     def show(self, k: int) -> None:
         """Let the widgets say that option `k` is chosen."""
-        self._buttons.active = k if k < self._count else None
+        self._buttons.active = k if k < self._choice.buttons else None
         if isinstance(self._more, Slider):
             self._more.value = k
         elif self._more:
-            self._more.value = self._options[k] if k >= self._count else ""
+            self._more.value = self._choice.options[k] if k >= self._choice.buttons else ""
 
 
 def _slider(choice: Choice) -> Slider:

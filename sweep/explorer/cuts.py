@@ -19,27 +19,18 @@ class Cuts:
     """A figure for each axis of a map, which follows its zoom."""
 
     def __init__(self, source: Source, ranges: list[tuple[PlacedAxis, Any]]) -> None:
-        drawn = [(axis, span) for axis, span in ranges if axis.name]
-        self._figures = [_figure(source, axis, span) for axis, span in drawn]
-        self.root = Row(
-            *self._figures, name="cuts", sizing_mode="stretch_width", styles={"flex-basis": "100%", "flex-wrap": "wrap"}
-        )
-        self.models = [
-            {
-                "source": plot.renderers[0].data_source, "title": plot.title, "at": axis.place(axis.values),
-                "values": axis.values, "symbol": labels.symbol(axis.name),
-            }
-            for plot, (axis, _) in zip(self._figures, drawn, strict=True)
-        ]  # fmt: skip
-        """What `sweep.cut` of page.js fills."""
+        self.models = [_cut(source, axis, span) for axis, span in ranges if axis.name]
+        self.root = Row(*(cut["plot"] for cut in self.models), name="cuts", sizing_mode="stretch_width",
+                        styles={"flex-basis": "100%", "flex-wrap": "wrap"})  # fmt: skip
 
     def spell(self, words: dict[float, str]) -> None:
         """Write the values of another map in words, if they stand for some."""
-        for plot in self._figures:
-            plot.yaxis.major_label_overrides = words
+        for cut in self.models:
+            cut["plot"].yaxis.major_label_overrides = words
 
 
-def _figure(source: Source, axis: PlacedAxis, span: Any) -> Any:
+def _cut(source: Source, axis: PlacedAxis, span: Any) -> dict[str, Any]:
+    """A figure, and what `cut` of page.js has to know to fill it."""
     plot = figure(
         height=_HEIGHT, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, x_range=span,
         x_axis_type=axes.kind(axis), x_axis_label=source.label(axis.name), name=f"cut along {axis.name}", title=" ",
@@ -48,8 +39,9 @@ def _figure(source: Source, axis: PlacedAxis, span: Any) -> Any:
     data = ColumnDataSource({"at": [], "value": [], "here": []}, syncable=False)
     plot.step("at", "value", source=data, mode="center", color="#0072b2", line_width=1.5)
     plot.scatter("at", "here", source=data, color="#d55e00", size=8)
-    axes.style(plot)
-    axes.place_ticks(axis, plot.xaxis[0])
+    axes.style(plot, axis)
     plot.title.update(text_font_size="12px", text_font_style="normal")
     plot.grid.grid_line_color = axes.GRID
-    return plot
+    return {
+        "plot": plot, "at": axis.place(axis.values), "values": axis.values, "symbol": labels.symbol(axis.name),
+    }  # fmt: skip

@@ -27,8 +27,7 @@ def stem(source: Source) -> str:
 def netcdf(source: Source, address: str, state: State, curves: Sequence[Curve]) -> bytes:
     """The slice with all its variables, and in the groups `trajectory_1`, … the trajectories, as a netCDF file."""
     fixed = {d: state.at.get(d, 0) for d in source.dims if d not in (state.x, state.y)}
-    part = source.dataset.isel(fixed, missing_dims="ignore").load()
-    part = part.assign_attrs(explored=address)
+    part = source.dataset.isel(fixed).load().assign_attrs(explored=address)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "slice.nc")
         part.to_netcdf(path, engine="netcdf4")
@@ -62,12 +61,9 @@ def yaml(source: Source, setup: Setup, state: State) -> str:
 
 def _sliced(source: Source, config: Config, state: State) -> Config:
     """`config` with a number for each axis that is not drawn."""
-    parameters = dict(config.parameters)
-    for name, at in state.at.items():
-        if name in parameters and name not in (state.x, state.y):
-            value = float(source.axes[name].values[at])
-            parameters[name] = Values.one(value)
-    return replace(config, parameters=parameters)
+    fixed = {name: at for name, at in state.at.items() if name in config.parameters and name not in (state.x, state.y)}
+    values = {name: Values.one(float(source.axes[name].values[at])) for name, at in fixed.items()}
+    return replace(config, parameters={**config.parameters, **values})
 
 
 def _options(config: Config, cell: Cell) -> str:

@@ -9,18 +9,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from bokeh.models import (
-    BasicTicker,
-    ColorBar,
-    ColumnDataSource,
-    CustomJS,
-    CustomJSHover,
-    FixedTicker,
-    HoverTool,
-    LinearColorMapper,
-    LogColorMapper,
-    Range1d,
-)  # fmt: skip
+from bokeh import models
+from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure
 
 from sweep.explorer import axes
@@ -69,44 +59,36 @@ class MapFigure:
         self._source, self.axes = source, (x, y)
         self._x, self._y = (source.axes.get(axis, PlacedAxis("", np.zeros(1))) for axis in (x, y))
         self.placed = self._x, self._y
-        edges_x, edges_y = self._x.drawn_edges, self._y.drawn_edges
-        self._place = {
-            "x": [edges_x[0]],
-            "y": [edges_y[0]],
-            "dw": [edges_x[-1] - edges_x[0]],
-            "dh": [edges_y[-1] - edges_y[0]],
-        }
+        ex, ey = self._x.drawn_edges, self._y.drawn_edges
+        place = {"x": ex[0], "y": ey[0], "dw": ex[-1] - ex[0], "dh": ey[-1] - ey[0]}
         self.figure = plot = _frame(source, self._x, self._y)
         if main:
             plot.x_range, plot.y_range = main.figure.x_range, main.figure.y_range
-        self._cells = ColumnDataSource({"image": [np.zeros((1, 1), "uint8")], **self._place})
+        self._cells = ColumnDataSource({"image": [np.zeros((1, 1), "uint8")], "kinds": [np.zeros((1, 1), "uint8")]})
         # Two images, because an image goes on with the mapper that it was made with.
         self._images = [
-            plot.image(image="image", x="x", y="y", dw="dw", dh="dh", source=self._cells, color_mapper=mapper)
-            for mapper in (LinearColorMapper(palette=["black"]), LogColorMapper(palette=["black"]))
+            plot.image(image="image", source=self._cells, color_mapper=mapper, **place)
+            for mapper in (models.LinearColorMapper(palette=["black"]), models.LogColorMapper(palette=["black"]))
         ]
-        overlay = ColumnDataSource({"image": [np.zeros((2, 2), "uint32")], **self._place}, syncable=False)
+        over = {"image": [np.zeros((2, 2), "uint32")]} | {name: [at] for name, at in place.items()}
+        overlay = ColumnDataSource(over, syncable=False)
         plot.image_rgba(image="image", x="x", y="y", dw="dw", dh="dh", source=overlay)
         self._lines = {name: _line(plot, *style) for name, style in LINES.items()}
         self._numbers = _counts(plot)
-        self._uncertain = ColumnDataSource({"x": [], "y": [], "size": []}, name="uncertain")
-        plot.scatter(source=self._uncertain, size="size", color="white", line_color="black", line_width=0.7)
+        self._uncertain = plot.scatter([], [], color="white", line_color="black", line_width=0.7)
         self.selected = ColumnDataSource({"xs": [], "ys": []}, name="selected")
         for colour, dash in (("black", "solid"), ("white", "dashed")):
             plot.patches("xs", "ys", source=self.selected, fill_color=None, line_color=colour, line_dash=dash)
         self.cursor: ColumnDataSource = _cursor(plot, main and main.cursor)
         self.pins: ColumnDataSource = _pins(plot, main and main.pins)
-        self._hover = HoverTool(renderers=self._images, point_policy="follow_mouse")
+        self._hover = models.HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
-        self._kinds = ColumnDataSource({"kinds": [np.zeros((1, 1), "uint8")]})
-        self._cuts = Cuts(source, [(self._x, plot.x_range), (self._y, plot.y_range)])
-        self.cuts = self._cuts.root
-        _connect(plot, self._kinds, {"figure": plot, "kinds": self._kinds, "overlay": overlay,
+        self.cuts = Cuts(source, [(self._x, plot.x_range), (self._y, plot.y_range)])
+        _connect(plot, self._cells, {"figure": plot, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
-                 "ex": edges_x, "ey": edges_y, "cursor": self.cursor, "probe": probe, "cells": self._cells,
-                 "selected": self.selected, "main": main is None,
-                 "cuts": self._cuts.models, "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK),
-                 "request": request})  # fmt: skip
+                 "ex": ex, "ey": ey, "cursor": self.cursor, "probe": probe, "request": request, "cells": self._cells,
+                 "selected": self.selected, "main": main is None, "cuts": self.cuts.models,
+                 "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
     def show(self, part: Map, columns: Mapping[str, Array], state: State) -> Scale:
         """Show a map over these axes; returns how its values become colours.
@@ -122,10 +104,9 @@ class MapFigure:
             image.visible = (image is self._images[1]) == logarithmic
         mapper = self._images[logarithmic].glyph.color_mapper
         mapper.update(**mapping(scale))
-        tables = {name: [plain(table)] for name, table in columns.items()}
-        self._cells.data = {"image": [plain(part.values)], **self._place, **tables}
         kinds = np.packbits(np.stack(list(part.marks.values()), axis=-1), axis=-1, bitorder="little")
-        self._kinds.data = {"kinds": [kinds[..., 0]]}
+        tables = {name: [plain(table)] for name, table in columns.items()}
+        self._cells.data = {"image": [plain(part.values)], "kinds": [kinds[..., 0]], **tables}
         for name, source in self._lines.items():
             parts = [points for line in part.lines if line.name == name for points in line.parts]
             source.data = {"xs": [self._x.place(x) for x, _ in parts], "ys": [self._y.place(y) for _, y in parts]}
@@ -136,13 +117,10 @@ class MapFigure:
             "count": [count for *_, count in numbers],
         }
         up, across = np.nonzero(part.marks["uncertain"])
-        size = float(np.clip(120 / max(part.values.shape), 2.0, 6.0))
-        self._uncertain.data = {
-            "x": self._x.place(part.x.values[across]),
-            "y": self._y.place(part.y.values[up]),
-            "size": np.full(len(up), size),
-        }
-        self._cuts.spell((scale.ticks or {}) if part.flags else {})
+        at = {"x": self._x.place(part.x.values[across]), "y": self._y.place(part.y.values[up])}
+        self._uncertain.data_source.data = at
+        self._uncertain.glyph.size = float(np.clip(120 / max(part.values.shape), 2.0, 6.0))
+        self.cuts.spell((scale.ticks or {}) if part.flags else {})
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]
@@ -150,11 +128,12 @@ class MapFigure:
         self._hover.update(tooltips=tip, formatters=formatters)
         return scale
 
-    def _bar(self, part: Map, scale: Scale, mapper: Any) -> ColorBar:
-        chosen_by_bokeh: Any = "auto" if is_logarithmic(scale) else BasicTicker()
+    def _bar(self, part: Map, scale: Scale, mapper: Any) -> models.ColorBar:
+        chosen_by_bokeh: Any = "auto" if is_logarithmic(scale) else models.BasicTicker()
         ticks = scale.ticks or {}
-        return ColorBar(
-            color_mapper=mapper, ticker=FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
+        return models.ColorBar(
+            color_mapper=mapper,
+            ticker=models.FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
             title=labels.unit(self._source.cell, part.name) or None, formatter=axes.numbers(),
             major_label_overrides=ticks, **_BAR,
         )  # fmt: skip
@@ -201,8 +180,8 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
     plot = figure(
         height=HEIGHT if up.name else 240,
         sizing_mode="stretch_width", min_width=240,
-        x_range=Range1d(x[0], x[-1], bounds=(x[0], x[-1])),
-        y_range=Range1d(y[0], y[-1], bounds=(y[0], y[-1])),
+        x_range=models.Range1d(x[0], x[-1], bounds=(x[0], x[-1])),
+        y_range=models.Range1d(y[0], y[-1], bounds=(y[0], y[-1])),
         x_axis_type=axes.kind(across),
         y_axis_type=axes.kind(up),
         x_axis_label=source.label(across.name),
@@ -212,27 +191,25 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
     )  # fmt: skip
     plot.toolbar.logo = None
     plot.grid.visible = False
-    axes.style(plot)
+    axes.style(plot, across, up)
     plot.title.update(text_font_size="14px", text_font_style="bold")
     plot.yaxis.visible = bool(up.name)
-    for axis, drawn in ((across, plot.xaxis[0]), (up, plot.yaxis[0])):
-        axes.place_ticks(axis, drawn)
     return plot
 
 
-def _tip(source: Source, part: Map, columns: list[str]) -> tuple[str, dict[str, CustomJSHover]]:
+def _tip(source: Source, part: Map, columns: list[str]) -> tuple[str, dict[str, models.CustomJSHover]]:
     """A table of the cell under the pointer, and what looks its numbers up by the index of the cell."""
     rows, formatters = [], dict[str, Any]()
     for axis, variable, index in ((part.x, "$x", "i"), (part.y, "$y", "j")):
         if axis.name:
             rows.append((labels.symbol(axis.name), f"{variable}{{custom}}"))
             code = f"return sweep.number(values[special_vars.image_index.{index}])"
-            formatters[variable] = CustomJSHover(args={"values": axis.values}, code=code)
+            formatters[variable] = models.CustomJSHover(args={"values": axis.values}, code=code)
     for name in columns:
         rows.append((_SHORT.get(name) or source.words(name), f"@{{{name}}}{{custom}}"))
-        flags = labels.flag_words(source.cell, name)
+        flags = {str(k): words for k, words in labels.flag_words(source.cell, name).items()}
         code = "return words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')"
-        formatters[f"@{{{name}}}"] = CustomJSHover(args={"words": {str(k): w for k, w in flags.items()}}, code=code)
+        formatters[f"@{{{name}}}"] = models.CustomJSHover(args={"words": flags}, code=code)
     table = "".join(
         f'<tr><td style="color:#5b6875;padding-right:10px">{_escaped(words)}</td><td><b>{value}</b></td></tr>'
         for words, value in rows
@@ -242,21 +219,19 @@ def _tip(source: Source, part: Map, columns: list[str]) -> tuple[str, dict[str, 
 
 def _escaped(text: str) -> str:
     """Text for a tooltip: neither markup nor one of Bokeh's placeholders."""
-    for character, entity in (("&", "&amp;"), ("<", "&lt;"), ("@", "&#64;"), ("$", "&#36;"), ("{", "&#123;")):
-        text = text.replace(character, entity)
-    return text
+    return text.translate({ord(character): f"&#{ord(character)};" for character in "&<@${"})
 
 
-def _connect(plot: Any, kinds: ColumnDataSource, models: dict[str, Any]) -> None:
+def _connect(plot: Any, cells: ColumnDataSource, parts: dict[str, Any]) -> None:
     """Let the browser paint the patterns whenever the view changes, and answer pointer and clicks."""
-    repaint = CustomJS(args={"map": models}, code="sweep.use(map)")
-    kinds.js_on_change("data", repaint)
+    repaint = models.CustomJS(args={"map": parts}, code="sweep.use(map)")
+    cells.js_on_change("data", repaint)
     for span in (plot.x_range, plot.y_range):
         span.js_on_change("start", repaint)
         span.js_on_change("end", repaint)
     for size in ("inner_width", "inner_height"):
         plot.js_on_change(size, repaint)
-    plot.js_on_event("selectiongeometry", CustomJS(code="sweep.select(cb_obj)"))
-    plot.js_on_event("tap", CustomJS(code="sweep.tap(cb_obj)"))
-    plot.js_on_event("mousemove", CustomJS(code="sweep.point(cb_obj)"))
-    plot.js_on_event("mouseleave", CustomJS(code="sweep.point(null)"))
+    plot.js_on_event("selectiongeometry", models.CustomJS(code="sweep.select(cb_obj)"))
+    plot.js_on_event("tap", models.CustomJS(code="sweep.tap(cb_obj)"))
+    plot.js_on_event("mousemove", models.CustomJS(code="sweep.point(cb_obj)"))
+    plot.js_on_event("mouseleave", models.CustomJS(code="sweep.point(null)"))

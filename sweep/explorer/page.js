@@ -13,21 +13,25 @@ const sweep = (() => {
 
   // ---- cells and edges
 
-  /** Index of the cell whose edges enclose `at`, or -1. */
-  function cell(edges, at) {
-    let low = 0
-    let high = edges.length - 1
-    if (!(at >= edges[low] && at <= edges[high])) return -1
-    while (high - low > 1) {
-      const middle = (low + high) >> 1
-      if (edges[middle] <= at) low = middle
-      else high = middle
+  /** Index of the last of ascending numbers that is not after `at`, or 0. */
+  function before(numbers, at) {
+    let low = 0, high = numbers.length - 1
+    while (low < high) {
+      const middle = (low + high + 1) >> 1
+      if (numbers[middle] <= at) low = middle
+      else high = middle - 1
     }
     return low
   }
 
+  /** Index of the cell whose edges enclose `at`, or -1. */
+  function cell(edges, at) {
+    const last = edges.length - 1
+    return at >= edges[0] && at <= edges[last] ? Math.min(before(edges, at), last - 1) : -1
+  }
+
   /** For each of `count` pixels along an axis, the index of its cell or -1. */
-  function cells(edges, range, log, count) {
+  function indices(edges, range, log, count) {
     const found = new Int32Array(count)
     const [start, end] = log ? [Math.log(range.start), Math.log(range.end)] : [range.start, range.end]
     for (let k = 0; k < count; k++) {
@@ -39,13 +43,13 @@ const sweep = (() => {
 
   // ---- patterns over cells that are not plain results, drawn in screen pixels at every zoom
 
-  function paint({figure, kinds, tiles, overlay, ex, ey}) {
+  function paint({figure, cells, tiles, overlay, ex, ey}) {
     const width = Math.round(figure.inner_width), height = Math.round(figure.inner_height)
-    const table = kinds.data.kinds[0]
+    const [table] = cells.data.kinds
     if (!(width > 1 && height > 1)) return
     const [x, y] = [figure.x_range, figure.y_range]
-    const columns = cells(ex, x, figure.x_scale.type === "LogScale", width)
-    const rows = cells(ey, y, figure.y_scale.type === "LogScale", height)
+    const columns = indices(ex, x, figure.x_scale.type === "LogScale", width)
+    const rows = indices(ey, y, figure.y_scale.type === "LogScale", height)
     const across = ex.length - 1
     const out = new Uint32Array(width * height)
     for (let r = 0; r < height; r++) {
@@ -93,16 +97,16 @@ const sweep = (() => {
 
   /** Draw the values of the row and of the column of a cell; with cells without a value, there are gaps. */
   function cut(i, j) {
-    const {cuts, cells, kinds, blank, ex, ey} = current
+    const {cuts, cells, blank, ex, ey} = current
     if (i < 0 || j < 0) [i, j] = [(ex.length - 1) >> 1, (ey.length - 1) >> 1]
     current.cut = [i, j]
-    const values = cells.data.image[0], bits = kinds.data.kinds[0], across = ex.length - 1
-    cuts.forEach(({source, title, at, values: places, symbol}, n) => {
+    const {image: [values], kinds: [bits]} = cells.data, across = ex.length - 1
+    cuts.forEach(({plot, at}, n) => {
       const [along, other] = n ? [j, cuts[0]] : [i, cuts[1]]
       const cell = (k) => n ? k * across + i : j * across + k
       const value = Array.from(at, (_, k) => bits[cell(k)] & blank ? NaN : values[cell(k)])
-      source.data = {at, value, here: value.map((v, k) => k === along ? v : NaN)}
-      title.text = other ? `at ${other.symbol} = ${number(other.values[n ? i : j])}` : " "
+      plot.renderers[0].data_source.data = {at, value, here: value.map((v, k) => k === along ? v : NaN)}
+      plot.title.text = other ? `at ${other.symbol} = ${number(other.values[n ? i : j])}` : " "
     })
   }
 
@@ -217,17 +221,6 @@ const sweep = (() => {
       data.colour.push(`rgb(${[0, 1, 2].map((k) => Math.round(255 * light * tones[3 * face + k]))})`)
     }
     return data
-  }
-
-  /** Index of the last sample not after `time`. */
-  function before(t, time) {
-    let low = 0, high = t.length - 1
-    while (low < high) {
-      const middle = (low + high + 1) >> 1
-      if (t[middle] <= time) low = middle
-      else high = middle - 1
-    }
-    return low
   }
 
   function play(models, active) {

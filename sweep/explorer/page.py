@@ -78,9 +78,9 @@ def save_html(
         raise ValueError("; ".join(faults))
     part = source.map(shown.show, shown.x, shown.y, shown.at)
     drawn = figure.MapFigure(source, shown.x, shown.y)
-    scale = drawn.show(part, _all_values(source, shown), shown)
+    scale = drawn.show(part, _all_values(source, shown, part.values.size), shown)
     document = Document()
-    document.add_root(Column(drawn.figure, drawn.cuts, sizing_mode="stretch_width", name="map"))
+    document.add_root(Column(drawn.figure, drawn.cuts.root, sizing_mode="stretch_width", name="map"))
     document.add_root(Div(text=legend(part, scale), sizing_mode="stretch_width", name="legend"))
     dress(document, source)
     variables = document.template_variables
@@ -92,10 +92,9 @@ def save_html(
         temporary.write_text(html, encoding="utf-8")
 
 
-def _all_values(source: Source, shown: state.State) -> dict[str, Array]:
+def _all_values(source: Source, shown: state.State, cells: int) -> dict[str, Array]:
     """The tables of all variables over the map; of a large one only the counts and how they came about."""
     plain = [n for n in source.variables if source.dims_of(n) <= set(source.dims)]
-    cells = len(source.axes[shown.x].values) * (len(source.axes[shown.y].values) if shown.y else 1)
     if cells * len(plain) > _MOST_VALUES:
         plain = [n for n in plain if n in (shown.show, "reversals", "reversals_predicted", "difference", "status")]
     return source.tables(plain, shown.x, shown.y, shown.at)

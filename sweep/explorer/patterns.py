@@ -14,7 +14,7 @@ from sweep.plots import marks
 
 _WHITE, _BLACK, _DARK, _LIGHT = 0xC8FFFFFF, 0x90000000, 0xFF474340, 0xFFA8A39E  # ABGR; 0 is transparent
 
-_EXAMPLE = (0x21, 0x91, 0x8C)
+_EXAMPLE = "#21918c"
 """A colour of a map under a pattern that lets it be seen."""
 
 
@@ -48,6 +48,5 @@ def swatch(kind: str) -> str:
     tile = Image.fromarray(TILES[kind][::-1].view("uint8").reshape(*TILES[kind].shape, 4), "RGBA")
     file = io.BytesIO()
     tile.save(file, "PNG")
-    colour = "#" + bytes(_EXAMPLE).hex()
     picture = f"url(data:image/png;base64,{base64.b64encode(file.getvalue()).decode()})"
-    return f"height:14px;border:1px solid #8a949e;border-radius:2px;background:{picture} {colour}"
+    return f"height:14px;border:1px solid #8a949e;border-radius:2px;background:{picture} {_EXAMPLE}"

@@ -10,11 +10,11 @@ from bokeh import models
 from bokeh.plotting import figure
 from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import proj3d
 
 from sweep.explorer import axes
 from sweep.explorer.controls import WIDGETS
 from sweep.explorer.runner import Curve
-from sweep.grid import Array
 from sweep.plots import body, labels
 
 _MOMENTS = 20_000
@@ -81,9 +81,10 @@ class Player:
         self._slider.tags = [labels.unit(one, "time")]
         times = one["time"].values[:: -(-one.sizes["time"] // _MOMENTS)]
         moving = body.moving(one, times)
-        matrix = _projection(moving)
-        seen = [_seen(matrix, line) for line in moving.table]
-        self._table.data = {"xs": [x for x, _ in seen], "ys": [y for _, y in seen]}
+        moving.look(_camera())
+        matrix = _camera().get_proj()
+        seen = [proj3d.proj_transform(*line, matrix) for line in moving.table]
+        self._table.data = {"xs": [x for x, *_ in seen], "ys": [y for _, y, _ in seen]}
         self._shape.data = {
             "points": [moving.points], "tones": [moving.colours(colour)], "matrix": [matrix],
             "sun": [LightSource(**body.SUN).direction],
@@ -92,20 +93,7 @@ class Player:
         self._motion.data = {name: np.ascontiguousarray(column, "float32") for name, column in columns.items()}
 
 
-def _projection(moving: body.Moving) -> Array:
-    """The matrix of the perspective of `sweep animate`, shape (4, 4)."""
-    shown = _camera()
-    moving.look(shown)
-    return np.asarray(shown.get_proj())
-
-
 @cache
 def _camera() -> Any:
-    """Axes that know the perspective; to make them takes 30 ms."""
+    """Axes that know the perspective of `sweep animate`; to make them takes 30 ms."""
     return Figure().add_axes((0, 0, 1, 1), projection="3d")
-
-
-def _seen(matrix: Array, points: Array) -> Array:
-    """Where points of shape (3, points) are drawn, shape (2, points)."""
-    x, y, _, w = matrix @ np.append(points, np.ones((1, points.shape[1])), axis=0)
-    return np.array([x / w, y / w])

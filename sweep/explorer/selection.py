@@ -18,11 +18,10 @@ _BINS = 12
 
 def enclosed(corners: Array, x: PlacedAxis, y: PlacedAxis) -> Array:
     """Which cells have their middles within corners of shape (2, corners), shape (y, x)."""
-    places = np.meshgrid(x.place(x.values), y.place(y.values))
-    log = [axis.spacing == "log" for axis in (x, y)]
-    at, around = ([np.log(v) if bent else v for v, bent in zip(pair, log, strict=True)] for pair in (places, corners))
-    points = np.stack([each.ravel() for each in at], axis=1)
-    return np.asarray(Path(np.stack(around, axis=1)).contains_points(points)).reshape(places[0].shape)
+    places = np.meshgrid(x.straight(x.place(x.values)), y.straight(y.place(y.values)))
+    around = np.stack([x.straight(corners[0]), y.straight(corners[1])], axis=1)
+    points = np.stack([each.ravel() for each in places], axis=1)
+    return np.asarray(Path(around).contains_points(points)).reshape(places[0].shape)
 
 
 def statistics(part: Map, chosen: Array) -> tuple[list[tuple[str, int]], list[str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -66,17 +67,8 @@ class Source:
 
     def _all_dims(self) -> list[str]:
         """The dimensions of the cells, then those further ones along which a variable lists several values a cell."""
-        more = [
-            str(d)
-            for variable in self.dataset.data_vars.values()
-            if set(self.dims) & set(variable.dims)
-            for d in variable.dims
-        ]
-        return list(dict.fromkeys([*self.dims, *more]))
-
-    @property
-    def cells(self) -> int:
-        return math.prod(self.dataset.sizes[d] for d in self.dims)
+        of_cells = [v.dims for v in self.dataset.data_vars.values() if set(self.dims) & set(v.dims)]
+        return list(dict.fromkeys(map(str, chain(self.dims, *of_cells))))
 
     @cached_property
     def variables(self) -> list[str]:
@@ -123,12 +115,8 @@ class Source:
 
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:
         """The parameters `names` of the cell at `index`, as far as the dataset tells them."""
-        found = {}
-        for name in names:
-            if name in self.dataset.coords:
-                coordinate = self.dataset.coords[name]
-                found[name] = float(coordinate.isel({d: index[str(d)] for d in coordinate.dims}))
-        return found
+        there = self.dataset.coords
+        return {name: float(there[name].isel(index, missing_dims="ignore")) for name in names if name in there}
 
     def describe(self, index: Mapping[str, int]) -> dict[str, str]:
         """All that the dataset tells of the cell at `index`: each variable in words, and its value with its unit."""
@@ -143,8 +131,7 @@ class Source:
         values = np.ravel(cell[name].values)
         if name == "difference":
             return labels.number(values[0]) if values[0] <= 0 else f"+{values[0]}"
-        flags = labels.flag_words(cell, name)
-        if flags:
+        if flags := labels.flag_words(cell, name):
             return ", ".join(flags.get(int(v), str(v)) for v in values)
         finite = [labels.number(v) for v in values if np.isfinite(v)]
         return f"{', '.join(finite)} {labels.unit(cell, name)}".strip() if finite else "none"
@@ -154,7 +141,7 @@ def open_source(path: Path) -> Source:
     """Open a dataset for the explorer: into memory if it is not too large."""
     lazy = open_dataset(path, load=False)
     source = Source(lazy, str(path))
-    if source.cells > IN_MEMORY:
+    if math.prod(lazy.sizes[d] for d in source.dims) > IN_MEMORY:
         return source
     with lazy:
         return Source(open_dataset(path), str(path))
@@ -163,8 +150,5 @@ def open_source(path: Path) -> Source:
 def plain(values: Any) -> Array:
     """`values` in a type that browsers have, as small as it allows."""
     array = np.asarray(values)
-    if array.dtype.kind == "f":
-        return array.astype("float32")
-    if array.dtype.kind == "b":
-        return array.astype("uint8")
-    return array.astype("int32") if array.dtype.itemsize > 4 else array
+    small = {"float64": "float32", "int64": "int32", "uint64": "int32", "bool": "uint8"}
+    return array.astype(small.get(array.dtype.name, array.dtype), copy=False)

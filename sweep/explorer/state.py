@@ -139,9 +139,8 @@ def first(source: Source) -> State:
 
 def write(state: State, source: Source, base: Cell) -> str:
     """The query of the address that opens `state`; of a cell it names what lies on an axis or differs from `base`."""
-    told = [choice for name, choice in choices(source).items() if name not in (state.x, state.y)]
-    pairs = [(choice.name, choice.options[choice.of(state)]) for choice in told]
-    pairs = [(name, option) for name, option in pairs if option or name == "y"]
+    told = {name: c.options[c.of(state)] for name, c in choices(source).items() if name not in (state.x, state.y)}
+    pairs = [(name, option) for name, option in told.items() if option]
     limits = {name: getattr(state, name) for name in LIMITS}
     pairs += [(name, f"{limit:.12g}") for name, limit in limits.items() if limit is not None]
     for cell in state.cells:

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from bokeh.document import Document
-from bokeh.models import Column, ColumnDataSource, CustomJS, Div, Row
+from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Div, Row
 
-from sweep.explorer import controls, export, figure, page, saving, selection
+from sweep.explorer import controls, export, figure, page, selection
 from sweep.explorer import state as states
 from sweep.explorer.chosen import CellControls
 from sweep.explorer.colours import CURVES
@@ -22,11 +22,13 @@ from sweep.explorer.runner import Curve, Job, Runner
 from sweep.explorer.setup import Setup, why_still
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State
-from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 
 _BESIDE = ("reversals", "reversals_predicted", "status")
 """The pointer shows these of a cell at once; the server adds everything else."""
+
+_FILES = {"netCDF": ("nc", "application/x-netcdf"), "CSV": ("csv", "text/csv"), "YAML": ("yaml", "application/yaml")}
+"""What can be saved besides the picture: the endings and types of the files by what the buttons say."""
 
 _NOTICE = {"background": "#1b2733", "border-radius": "8px 8px 0 0", "color": "white", "padding": "6px 16px"}
 
@@ -40,9 +42,8 @@ class View:
     ) -> None:  # fmt: skip
         self._document, self._source, self._setup = document, source, setup
         self._base: Cell = setup.base if setup else {}
-        self._known = setup.config.table if setup else PARAMETERS
+        self._known = setup.config.table if setup else {}
         self.state, self._faults = states.read(query, source, self._base, self._known)
-        self._shown: figure.MapFigure | None = None
         self._second: figure.MapFigure | None = None
         self._build()
         self._drawn = Drawn(self.state.cells, runner, self._tell)
@@ -60,6 +61,7 @@ class View:
         controls.on(self._probe, "data", lambda _: self._point())
         self._request = ColumnDataSource({"i": [-1], "j": [-1], "add": [False], "count": [0]}, name="request")
         controls.on(self._request, "data", lambda _: self._requested())
+        self._shown = self._figure()
         self._map = Row(sizing_mode="stretch_width", name="map", styles={"flex-wrap": "wrap"})
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._selection = Div(sizing_mode="stretch_width", name="selection", visible=False)
@@ -72,14 +74,9 @@ class View:
         shown = self._figures
         curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
         player = Column(shown.player.figure, shown.player.controls, sizing_mode="stretch_width", name="played")
-        files = {"nc": self._netcdf} | ({"csv": self._csv, "yaml": self._yaml} if self._setup else {})
-        name = export.stem(self._source)
-        save = saving.buttons(name, self._map, [shown.spin, shown.energy, shown.player.figure], files, self._call)
-        # It travels with a root: what a callback of the document alone refers to is not kept up to date.
-        save.tags = [self._calls]
         self._document.js_on_event("document_ready", shown.player.moment)
         for root in (self._controls.root, self._notice, self._map, self._legend, self._selection, self._cell,
-                     curves, player, self._chosen.root, save):  # fmt: skip
+                     curves, player, self._chosen.root, self._buttons()):  # fmt: skip
             self._document.add_root(root)
 
     def _call(self, name: str, *given: Any) -> None:
@@ -88,9 +85,9 @@ class View:
 
     # ---- the map
 
-    def _change(self, state: State) -> None:
+    def _change(self, change: Callable[[State], State]) -> None:
         """Show another map."""
-        if state != self.state:
+        if (state := change(self.state)) != self.state:
             self.state = state
             self._faults = []
             self._draw_map()
@@ -101,12 +98,10 @@ class View:
         beside = [n for n in _BESIDE if n in self._source.variables]
         part = self._source.map(state.show, state.x, state.y, state.at)
         tables = self._source.tables(beside, state.x, state.y, state.at)
-        if self._shown is None or self._shown.axes != (state.x, state.y):
-            self._shown = figure.MapFigure(self._source, state.x, state.y, self._probe, self._request)
-            self._second = None
-            controls.on(self._shown.selected, "data", lambda _: self._draw_selection())
-        self._second = (self._second or self._beside(self._shown)) if state.beside else None
-        self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts]
+        if self._shown.axes != (state.x, state.y):
+            self._shown, self._second = self._figure(), None
+        self._second = (self._second or self._figure(self._shown)) if state.beside else None
+        self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts.root]
         if self._second:
             second = self._source.map(state.beside, state.x, state.y, state.at)
             self._second.show(
@@ -118,13 +113,14 @@ class View:
         self._controls.show(state)
         self._draw_selection()
 
-    def _beside(self, main: figure.MapFigure) -> figure.MapFigure:
-        """A second map of the same cells."""
-        return figure.MapFigure(self._source, self.state.x, self.state.y, self._probe, self._request, main)
+    def _figure(self, main: figure.MapFigure | None = None) -> figure.MapFigure:
+        """A map over the chosen axes, or a second one beside `main`."""
+        made = figure.MapFigure(self._source, self.state.x, self.state.y, self._probe, self._request, main)
+        controls.on(made.selected, "data", lambda _: self._draw_selection())
+        return made
 
     def _draw_selection(self) -> None:
         """Tell about the cells that are chosen."""
-        assert self._shown
         around = self._shown.selected.data
         self._selection.visible = len(around["xs"]) > 0
         if self._selection.visible:
@@ -167,7 +163,7 @@ class View:
             self._activate(self._drawn.cells.index(cell))
             return
         self._faults = []
-        self._drawn.add(cell, beside=bool(self._request.data["add"][0]) or self._chosen.keeps)
+        self._drawn.add(cell, beside=bool(self._request.data["add"][0]) or bool(self._chosen.keep.active))
         self._draw_cells()
 
     def _edit(self, name: str, value: float) -> None:
@@ -209,7 +205,6 @@ class View:
         x, y = self.state.x, self.state.y
         on_map = [(k, cell) for k, cell in enumerate(cells) if x in cell and (not y or y in cell)]
         here = {d: source.axes[d].values[i] for d, i in self.state.at.items() if d not in (x, y)}
-        assert self._shown
         self._shown.pins.data = {
             "x": [source.axes[x].place(cell[x]) for _, cell in on_map],
             "y": [source.axes[y].place(cell[y]) if y else 0.0 for _, cell in on_map],
@@ -226,10 +221,8 @@ class View:
         curves = self._drawn.curves
         if not any(curves) and any(self._drawn.running()):
             return  # the last curves stay until the first is there: figures that went and came back took 0.3 s
-        names = [
-            f"{k}: {name}{_counted(curve) if curve else ''}"
-            for k, (name, curve) in enumerate(zip(self._names(), curves, strict=True), 1)
-        ]
+        named = enumerate(zip(self._names(), curves, strict=True), 1)
+        names = [f"{k}: {name}{_counted(curve)}" for k, (name, curve) in named]
         self._hint.visible = not any(curves)
         self._figures.show(curves, names, self._drawn.active)
         self._chosen.tell(curves)
@@ -252,19 +245,37 @@ class View:
     def _query(self) -> str:
         return states.write(self.state, self._source, self._base)
 
-    def _netcdf(self) -> bytes:
-        return export.netcdf(self._source, self._query(), self.state, list(filter(None, self._drawn.curves)))
+    def _buttons(self) -> Row:
+        """Make the buttons that copy the address and save what is seen."""
+        link = Button(label="Copy link", name="link", width=92)
+        link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
+        png = Button(label="PNG", name="png", width=64)
+        figures = [self._figures.spin, self._figures.energy, self._figures.player.figure]
+        args = {"plots": self._map, "figures": figures, "name": f"{export.stem(self._source)}.png"}
+        png.js_on_click(CustomJS(args=args, code="sweep.picture([...plots.children, ...figures], name)"))
+        files = [Button(label=label, name=label, width=76) for label in (_FILES if self._setup else ["netCDF"])]
+        for button in files:
+            button.on_click(partial(self._save, button.label))
+        # The calls travel with a root: what a callback of the document alone refers to is not kept up to date.
+        return Row(link, png, *files, name="save", tags=[self._calls], stylesheets=[controls.WIDGETS],
+                   styles={"flex-wrap": "wrap"})  # fmt: skip
 
-    def _csv(self) -> bytes:
-        return export.csv(list(filter(None, self._drawn.curves))).encode()
+    def _save(self, label: str) -> None:
+        """Let the browser save one of the `_FILES`."""
+        curves = list(filter(None, self._drawn.curves))
+        if label == "netCDF":
+            content = export.netcdf(self._source, self._query(), self.state, curves)
+        elif label == "CSV":
+            content = export.csv(curves).encode()
+        else:
+            assert self._setup
+            content = export.yaml(self._source, self._setup, self.state).encode()
+        ending, mime = _FILES[label]
+        self._call("save", np.frombuffer(content, "uint8"), f"{export.stem(self._source)}.{ending}", mime)
 
-    def _yaml(self) -> bytes:
-        assert self._setup
-        return export.yaml(self._source, self._setup, self.state).encode()
 
-
-def _counted(curve: Curve) -> str:
-    return f", {labels.reversals(len(curve.reversals))}{'' if curve.whole else ' …'}"
+def _counted(curve: Curve | None) -> str:
+    return f", {labels.reversals(len(curve.reversals))}{'' if curve.whole else ' …'}" if curve else ""
 
 
 def _end(job: Job) -> None:
@@ -280,9 +291,10 @@ def make(source: Source, setup: Setup | None) -> Callable[[Document], None]:
         runner.submit(Job(setup.base, _end))
 
     def fill(document: Document) -> None:
-        request: Any = document.session_context.request if document.session_context else None
-        given = request.arguments if request else {}
-        query = {key: [v.decode(errors="replace") for v in values] for key, values in given.items()}
-        View(document, source, setup, runner, {k: v for k, v in query.items() if not k.startswith("bokeh-")})
+        context: Any = document.session_context
+        given = context.request.arguments.items()
+        own = {key: values for key, values in given if not key.startswith("bokeh-")}
+        query = {key: [value.decode(errors="replace") for value in values] for key, values in own.items()}
+        View(document, source, setup, runner, query)
 
     return fill

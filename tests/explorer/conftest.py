@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray as xr
 
@@ -34,11 +33,9 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
     dataset = sweep.run(config)
     status = dataset["status"].values
     status[:3, 0, 1] = LIFT_OFF, 1, TIME_LIMIT
-    noise = np.zeros(dataset["status"].shape, "int8")
-    noise[3, 0, 1] = 1
     status[3, 0, 1] = 1
-    words = {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes", "long_name": "noise", "units": "1"}
-    dataset["noise_limited"] = (dataset["status"].dims, noise, words)
+    dataset["noise_limited"].values[:] = 0
+    dataset["noise_limited"].values[3, 0, 1] = 1
     path = folder / "tiny.nc"
     dataset.to_netcdf(path)
     return path
@@ -56,5 +53,4 @@ def setup(source: Source) -> Setup:
 
 @pytest.fixture
 def opened(tiny: Path) -> xr.Dataset:
-    with xr.open_dataset(tiny, decode_times=False) as dataset:
-        return dataset.load()
+    return xr.load_dataset(tiny, decode_times=False)

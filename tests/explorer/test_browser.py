@@ -13,7 +13,7 @@ import sys
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, contextmanager
 from http import HTTPStatus
 from http.client import HTTPConnection
 from pathlib import Path
@@ -24,6 +24,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from mpl_toolkits.mplot3d import proj3d
+from PIL import Image
 from support import ROOT, own
 
 import sweep
@@ -32,6 +33,8 @@ from sweep.plots import animation, labels
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Download, Locator, Page
+
+    Open = Callable[[str], Page]
 
 pytestmark = pytest.mark.browser
 
@@ -50,9 +53,15 @@ def served(tiny: Path) -> Iterator[str]:
         assert stopped(process) == (0, "stopped\n", "")
 
 
-def explorer(*arguments: str | Path) -> subprocess.Popen[str]:
+@contextmanager
+def explorer(*arguments: str | Path) -> Iterator[subprocess.Popen[str]]:
     command = [sys.executable, "-m", "sweep", "explore", *map(str, arguments), "--no-browser"]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=ROOT, stdout=pipe, stderr=pipe, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def address(process: subprocess.Popen[str]) -> str:
@@ -72,31 +81,55 @@ def stopped(process: subprocess.Popen[str]) -> tuple[int, str, str]:
 
 
 @pytest.fixture
-def visit(browser: Browser, served: str) -> Iterator[Callable[..., Page]]:
-    """Opens the page at a query; errors on its console fail the test."""
+def go(browser: Browser) -> Iterator[Open]:
+    """Opens an address on a page of its own; errors on its console fail the test."""
     complaints = list[str]()
-    context = browser.new_context(viewport={"width": 1400, "height": 950}, accept_downloads=True)
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
 
-    def open_page(query: str = "", ready: bool = True) -> Page:
+    def opened_at(place: str) -> Page:
         page = context.new_page()
         page.set_default_timeout(TIMEOUT)
         page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.goto(f"{served}?x=mu&y=b&{query}" if query else served)
-        if ready:
-            settle(page)
+        page.goto(place)
         return page
 
-    yield open_page
-    context.close()
+    with browser.new_context(viewport={"width": 1400, "height": 950}, accept_downloads=True) as context:
+        context.grant_permissions(["clipboard-read", "clipboard-write"])
+        yield opened_at
     assert not complaints
 
 
-def settle(page: Page) -> None:
+@pytest.fixture
+def visit(go: Open, served: str) -> Open:
+    """Opens the explorer at a query."""
+    return lambda query: settle(go(f"{served}?x=mu&y=b&{query}"))
+
+
+@pytest.fixture
+def page(visit: Open) -> Page:
+    """The map of the slice with cells of many kinds."""
+    return visit("n0=0.05")
+
+
+@pytest.fixture
+def clicked(visit: Open) -> Page:
+    """The same, where a cell was clicked whose trajectory is drawn."""
+    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
+    wait_for_curves(page, 1)
+    return page
+
+
+@pytest.fixture
+def counts(opened: xr.Dataset) -> np.ndarray:
+    """The reversals of that slice as the map shows them, shape (b, mu)."""
+    return opened["reversals"].isel(n0=N0).transpose("b", "mu").values
+
+
+def settle(page: Page) -> Page:
     """Wait until the map and its patterns are drawn."""
     page.wait_for_function("document.querySelector('#map canvas, #map *') && window.Bokeh?.documents[0]?.is_idle")
     page.wait_for_function(f"{MAP}.inner_width > 10 && {MAP}.renderers[2].data_source.data.image[0].length > 4")
+    return page
 
 
 NAMED = "Bokeh.documents[0].get_model_by_name"
@@ -135,9 +168,9 @@ def wait(page: Page, name: str, expression: str) -> None:
     page.wait_for_function(f"(() => {{ const m = {found(name)}; return m && ({expression}) }})()")
 
 
-def place(page: Page, i: float, j: float) -> tuple[float, float]:
+def place(page: Page, i: float, j: float) -> Any:
     """The middle of the cell in column i and row j of the map, in pixels of the window."""
-    spot = page.evaluate(
+    return page.evaluate(
         f"""([i, j]) => {{
             scrollTo(0, 0)
             const map = {MAP}, view = Bokeh.index.find_one(map), image = map.renderers[0].data_source.data
@@ -149,7 +182,20 @@ def place(page: Page, i: float, j: float) -> tuple[float, float]:
         }}""",
         [i, j],
     )
-    return spot[0], spot[1]
+
+
+def tip(page: Page, i: int, j: int) -> str:
+    """What stands beside the pointer on a cell."""
+    page.mouse.move(*place(page, i, j + 1))
+    page.mouse.move(*place(page, i, j))
+    return str(page.locator(".bk-tooltip-content").first.text_content())
+
+
+def resize(page: Page, width: int) -> None:
+    """Give the window another width, and wait until the figures have theirs."""
+    page.set_viewport_size({"width": width, "height": 950})
+    page.wait_for_function(f"{MAP}.outer_width <= {width}")
+    page.wait_for_timeout(300)
 
 
 def curves(page: Page) -> list[str]:
@@ -170,8 +216,6 @@ def pixels(page: Page, i: float, j: float, columns: int = 5, rows: int = 4) -> n
 
 def shot(page: Page, x: float, y: float, width: float, height: float) -> np.ndarray:
     """The colours around a place in the window, shape (pixels, 3)."""
-    from PIL import Image
-
     clip = {"x": x - width / 2, "y": y - height / 2, "width": width, "height": height}
     picture = Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB")
     return np.asarray(picture).reshape(-1, 3)
@@ -184,30 +228,33 @@ def colour_in_palette(page: Page, count: int) -> list[int]:
     return [int(text[k : k + 2], 16) for k in (1, 3, 5)]
 
 
-def select(page: Page, name: str, words: str) -> None:
+def enter(page: Page, name: str, text: str, url: str = "") -> None:
+    """Type into the field of this name, and wait for what the address says then."""
+    field = control(page, name, "input")
+    field.fill(text)
+    field.press("Enter")
+    page.wait_for_url(re.compile(url))
+
+
+def select(page: Page, name: str, words: str, url: str = "") -> None:
+    """Choose from the list of this name, and wait for what the address says then."""
     control(page, name, "select").select_option(label=words)
+    page.wait_for_url(re.compile(url))
 
 
 def control(page: Page, name: str, kind: str) -> Locator:
     """The element of this kind in the widget of this name."""
     marker = f"sweep-{re.sub('[^a-z0-9]', '-', name.lower())}"
-    page.evaluate(
-        f"""(() => {{
-            const m = {found(name)}
-            Bokeh.index.find_one(m).el.classList.add('{marker}')
-        }})()"""
-    )
+    model(page, name, f"Bokeh.index.find_one(m).el.classList.add('{marker}')")
     return page.locator(f".{marker} {kind}").first
 
 
 # ---- opening and reading
 
 
-def test_the_map_shows_the_dataset(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+def test_the_map_shows_the_dataset(page: Page, opened: xr.Dataset, counts: np.ndarray) -> None:
     """Settled counts have the colour of the bar; other cells have a pattern over it, or in place of it."""
-    page = visit("n0=0.05")
     assert page.title() == opened.attrs["title"]
-    counts = opened["reversals"].isel(n0=N0).transpose("b", "mu").values
     assert image(page) == counts.ravel().tolist()
     for i, j in np.ndindex(5, 4):
         share = (pixels(page, i, j) == colour_in_palette(page, int(counts[j, i]))).all(axis=1).mean()
@@ -223,13 +270,9 @@ def test_the_map_shows_the_dataset(visit: Callable[..., Page], opened: xr.Datase
 
 
 @pytest.mark.parametrize("width", [1400, 420])
-def test_boundaries_have_their_counts(width: int, visit: Callable[..., Page], opened: xr.Dataset) -> None:
+def test_boundaries_have_their_counts(width: int, page: Page, counts: np.ndarray) -> None:
     """Each stands between cells that count fewer and cells that count as many, and can be read."""
-    page = visit("n0=0.05")
-    page.set_viewport_size({"width": width, "height": 950})
-    page.wait_for_function(f"{MAP}.outer_width <= {width}")
-    page.wait_for_timeout(300)
-    counts = opened["reversals"].isel(n0=N0).transpose("b", "mu").values
+    resize(page, width)
     numbers = model(page, "map figure", f"{NUMBERS}.count.map((n, k) => [Number(n), {NUMBERS}.x[k], {NUMBERS}.y[k]])")
     assert {count for count, *_ in numbers} == {2, 3, 4}
     for count, mu, b in numbers:
@@ -246,9 +289,8 @@ def test_boundaries_have_their_counts(width: int, visit: Callable[..., Page], op
     wait(page, "map figure", f"!{NUMBERS}.count.length")
 
 
-def test_patterns_follow_the_view(visit: Callable[..., Page]) -> None:
+def test_patterns_follow_the_view(page: Page) -> None:
     """Lines keep their distance in pixels when the map is enlarged."""
-    page = visit("n0=0.05")
     before = pixels(page, 2, 0)
     page.evaluate(f"{MAP}.x_range.setv({{start: 55, end: 65}}); {MAP}.y_range.setv({{start: 1.5, end: 2.5}})")
     page.wait_for_timeout(300)
@@ -258,11 +300,8 @@ def test_patterns_follow_the_view(visit: Callable[..., Page]) -> None:
     assert lines[0] == pytest.approx(lines[1], abs=0.06)
 
 
-def test_the_pointer_tells_all_of_a_cell(visit: Callable[..., Page], opened: xr.Dataset) -> None:
-    page = visit("n0=0.05")
-    page.mouse.move(*place(page, 2, 1))
-    page.mouse.move(*place(page, 2, 0))
-    tip = page.locator(".bk-tooltip-content").first
+def test_the_pointer_tells_all_of_a_cell(page: Page, opened: xr.Dataset) -> None:
+    near = tip(page, 2, 0)
     page.locator("#cell").get_by_text("μ = 60, b = 2, n₀ = 0.05").wait_for()
     told = text(page, "cell")
     cell = opened.isel(mu=2, b=0, n0=N0)
@@ -270,21 +309,19 @@ def test_the_pointer_tells_all_of_a_cell(visit: Callable[..., Page], opened: xr.
     for name in ("spin_final", "t_stop", "n_c1_plus_linear", "form_factor", "energy_error"):
         assert labels.number(cell[name].item()) in told
     assert "ended at the time limit" in told
-    near = tip.text_content() or ""
     assert re.search(rf"simulated\s*{int(cell['reversals'])}predicted", near), near
     assert re.search(rf"predicted\s*{int(cell['reversals_predicted'])}end", near), near
     assert re.search(r"end\s*ended at the time limit", near), near
 
 
-def test_cuts_follow_the_pointer(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+def test_cuts_follow_the_pointer(page: Page, counts: np.ndarray) -> None:
     """Those of the row and of the column; a cell that failed is a gap."""
-    page = visit("n0=0.05")
-    counts = opened["reversals"].isel(n0=N0).transpose("b", "mu").values.astype(float)
-    counts[0, 0] = np.nan
+    shown = counts.astype(float)
+    shown[0, 0] = np.nan
     for i, j in [(2, 1), (3, 0)]:
         page.mouse.move(*place(page, i, j))
         wait(page, "cut along mu", f"m.title.text === 'at b = {2 + j}'")
-        for name, expected in (("mu", counts[j]), ("b", counts[:, i])):
+        for name, expected in (("mu", shown[j]), ("b", shown[:, i])):
             value = model(page, f"cut along {name}", "[...m.renderers[0].data_source.data.value]")
             np.testing.assert_array_equal(value, expected)
         here = model(page, "cut along b", "[...m.renderers[1].data_source.data.here]")
@@ -293,11 +330,9 @@ def test_cuts_follow_the_pointer(visit: Callable[..., Page], opened: xr.Dataset)
     assert model(page, "cut along mu", "m.x_range.start") == 50
 
 
-def test_two_maps_stand_side_by_side(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+def test_two_maps_stand_side_by_side(page: Page, opened: xr.Dataset) -> None:
     """They zoom together, and a click on the second runs the cell."""
-    page = visit("n0=0.05")
-    select(page, "beside", "predicted")
-    page.wait_for_url(re.compile("beside=reversals_predicted"))
+    select(page, "beside", "predicted", "beside=reversals_predicted")
     settle(page)
     second = f"{NAMED}('map').children[1]"
     page.wait_for_function(f"{second}.inner_width > 100")
@@ -310,16 +345,12 @@ def test_two_maps_stand_side_by_side(visit: Callable[..., Page], opened: xr.Data
     assert page.evaluate(f"{second}.x_range.start") == 45
     page.mouse.click(boxes[1]["x"] + boxes[1]["width"] / 2, boxes[1]["y"] + boxes[1]["height"] / 2)
     page.wait_for_url(re.compile("cell=b:[34],mu:60"))
-    page.set_viewport_size({"width": 400, "height": 800})
-    page.wait_for_function(f"{MAP}.outer_width <= 400")
-    page.wait_for_timeout(300)
+    resize(page, 400)
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
-def test_a_selection_is_counted(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+def test_a_selection_is_counted(page: Page, opened: xr.Dataset, counts: np.ndarray) -> None:
     """By a box and by a lasso, and again when another slice is shown; a cell that failed has no count."""
-    page = visit("n0=0.05")
-    counts = opened["reversals"].isel(n0=N0).transpose("b", "mu").values
     for tool, corners, inside in (
         ("BoxSelectTool", [(-0.4, -0.4), (2.4, 1.4)], np.s_[:2, :3]),
         ("LassoSelectTool", [(0.5, 0.5), (4.4, 0.5), (4.4, 3.4), (0.5, 3.4), (0.5, 0.6)], np.s_[1:, 1:]),
@@ -344,13 +375,11 @@ def test_a_selection_is_counted(visit: Callable[..., Page], opened: xr.Dataset) 
     page.get_by_text(f"mean {labels.number(other.mean())}").wait_for()
 
 
-def test_axes_variable_and_selection_change(visit: Callable[..., Page], opened: xr.Dataset) -> None:
-    page = visit()
+def test_axes_variable_and_selection_change(go: Open, served: str, opened: xr.Dataset) -> None:
+    page = settle(go(served))
     assert page.url.endswith("?show=reversals&x=b&y=mu&n0=0.02")
-    select(page, "x", "friction μ")
-    page.wait_for_url(re.compile("x=mu&y=b"))
-    select(page, "y", "start spin n₀")
-    page.wait_for_url(re.compile("x=mu&y=n0"))
+    select(page, "x", "friction μ", "x=mu&y=b")
+    select(page, "y", "start spin n₀", "x=mu&y=n0")
     settle(page)
     assert model(page, "map figure", "m.left[0].axis_label") == "start spin n₀ (√(g/c))"
     page.get_by_role("button", name="3", exact=True).click()
@@ -366,21 +395,16 @@ def test_axes_variable_and_selection_change(visit: Callable[..., Page], opened: 
             assert colour_in_palette(page, int(difference[j, i])) in colours.tolist(), (i, j)
     mapper = model(page, "map figure", "(({low, high}) => [low, high])(m.renderers[0].glyph.color_mapper)")
     assert mapper[0] == -mapper[1]
-    select(page, "show", "final spin n")
-    page.wait_for_url(re.compile("show=spin_final"))
-    select(page, "x", "start spin n₀")
-    page.wait_for_url(re.compile("x=n0&y=mu"))
+    select(page, "show", "final spin n", "show=spin_final")
+    select(page, "x", "start spin n₀", "x=n0&y=mu")
 
 
-def test_the_colour_scale_is_chosen(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+def test_the_colour_scale_is_chosen(visit: Open, opened: xr.Dataset) -> None:
     """Its palette, its spacing and its ends, which a link keeps; colours are compared with matplotlib's own."""
     page = visit("show=t_last_reversal&n0=0.05")
     select(page, "palette", "gray")
     select(page, "spacing", "logarithmic")
-    field = control(page, "high", "input")
-    field.fill("2000")
-    field.press("Enter")
-    page.wait_for_url(re.compile("palette=gray&spacing=log&high=2000"))
+    enter(page, "high", "2000", "palette=gray&spacing=log&high=2000")
     other = visit(page.url.partition("?")[2])
     last = opened["t_last_reversal"].isel(n0=N0)
     low = float(last.where(opened["status"].isel(n0=N0) != LIFT_OFF).min())
@@ -392,16 +416,13 @@ def test_the_colour_scale_is_chosen(visit: Callable[..., Page], opened: xr.Datas
         each.mouse.move(0, 0)
         grey = np.median(pixels(each, 4, 3), axis=0)
         np.testing.assert_allclose(grey, 255 * share, atol=3)
-    field.fill("")
-    field.press("Enter")
-    page.wait_for_url(re.compile("spacing=log$"))
+    enter(page, "high", "", "spacing=log$")
 
 
 # ---- trajectories
 
 
-def test_a_click_runs_the_cell(visit: Callable[..., Page], opened: xr.Dataset) -> None:
-    page = visit("n0=0.05")
+def test_a_click_runs_the_cell(page: Page, opened: xr.Dataset) -> None:
     page.mouse.click(*place(page, 3, 2))
     wait_for_curves(page, 1)
     cell = opened.isel(mu=3, b=2, n0=N0)
@@ -410,15 +431,13 @@ def test_a_click_runs_the_cell(visit: Callable[..., Page], opened: xr.Dataset) -
     assert time[-1] == pytest.approx(float(cell["t_stop"]), rel=1e-6)
     assert spin[0] == pytest.approx(0.05)
     assert spin[-1] == pytest.approx(float(cell["spin_final"]), rel=1e-6)
-    energy, lost = model(
-        page, "energies", "['energy', 'dissipated'].map((k) => [...m.renderers[0].data_source.data[k]])"
-    )
+    series = "['energy', 'dissipated'].map((k) => [...m.renderers[0].data_source.data[k]])"
+    energy, lost = model(page, "energies", series)
     np.testing.assert_allclose(np.array(energy)[[0, -1]] + np.array(lost)[[0, -1]], energy[0], rtol=1e-5)
     assert page.url.endswith("cell=b:4,mu:70,n0:0.05")
 
 
-def test_a_curve_is_seen_while_it_grows(visit: Callable[..., Page]) -> None:
-    page = visit("n0=0.05")
+def test_a_curve_is_seen_while_it_grows(page: Page) -> None:
     page.evaluate(f"""(() => {{
         const data = {NAMED}('spin').renderers[0].data_source
         window.ends = []
@@ -431,8 +450,7 @@ def test_a_curve_is_seen_while_it_grows(visit: Callable[..., Page]) -> None:
     assert ends[0] < ends[-1] / 100
 
 
-def test_cells_are_overlaid_and_removed(visit: Callable[..., Page]) -> None:
-    page = visit("n0=0.05")
+def test_cells_are_overlaid_and_removed(page: Page) -> None:
     page.mouse.click(*place(page, 1, 1))
     wait_for_curves(page, 1)
     page.keyboard.down("Shift")
@@ -450,62 +468,50 @@ def test_cells_are_overlaid_and_removed(visit: Callable[..., Page]) -> None:
     assert not page.evaluate("window.flickers")  # the old curve stays until there is something of the new one
 
 
-def test_parameters_leave_the_grid(visit: Callable[..., Page]) -> None:
-    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
-    wait_for_curves(page, 1)
-    field = control(page, "parameter mu", "input")
-    field.fill("63.5")
-    field.press("Enter")
-    page.wait_for_url(re.compile("mu:63.5"))
-    wait(page, "curve legend", "/μ = 63.5.*reversals/.test(m.items[0].label.value)")
+def test_parameters_leave_the_grid(clicked: Page) -> None:
+    enter(clicked, "parameter mu", "63.5", "mu:63.5")
+    wait(clicked, "curve legend", "/μ = 63.5.*reversals/.test(m.items[0].label.value)")
     curve = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=63.5, b=4, n0=0.05)
-    spin = model(page, "spin", "[...m.renderers[0].data_source.data.spin]")
+    spin = model(clicked, "spin", "[...m.renderers[0].data_source.data.spin]")
     assert spin[100] == pytest.approx(float(curve["spin"][0, 100]), abs=0.02)
-    handle = control(page, "drag b", "[role=slider]")
-    handle.focus()
-    before = page.url
-    page.keyboard.press("ArrowRight")
-    page.wait_for_function(f"location.href !== {before!r}")
-    wait_for_curves(page, 1)
-    field.fill("-5")
-    field.press("Enter")
-    page.get_by_text("mu has to be a finite number >= 0").wait_for()
-    assert "mu:63.5" in page.url
+    control(clicked, "drag b", "[role=slider]").focus()
+    before = clicked.url
+    clicked.keyboard.press("ArrowRight")
+    clicked.wait_for_function(f"location.href !== {before!r}")
+    wait_for_curves(clicked, 1)
+    enter(clicked, "parameter mu", "-5")
+    clicked.get_by_text("mu has to be a finite number >= 0").wait_for()
+    assert "mu:63.5" in clicked.url
 
 
-def test_the_trajectory_is_played(visit: Callable[..., Page]) -> None:
-    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
-    wait_for_curves(page, 1)
-    control(page, "play", "button").click()
-    wait(page, "time", "m.value > 0.02 * m.end")
-    control(page, "play", "button").click()
-    moment = model(page, "time", "m.value")
-    page.wait_for_timeout(300)
-    assert model(page, "time", "m.value") == moment
-    assert model(page, "spin", "m.center.filter((c) => c.type === 'Span' && c.dimension === 'height')[0].location") == (
-        moment
-    )
-    assert model(page, "body", CLOCK) == f"t = {moment:.{1 if moment < 100 else 0}f} √(c/g)"
+def test_the_trajectory_is_played(clicked: Page) -> None:
+    control(clicked, "play", "button").click()
+    wait(clicked, "time", "m.value > 0.02 * m.end")
+    control(clicked, "play", "button").click()
+    moment = model(clicked, "time", "m.value")
+    clicked.wait_for_timeout(300)
+    assert model(clicked, "time", "m.value") == moment
+    line = "m.center.filter((c) => c.type === 'Span' && c.dimension === 'height')[0]"
+    assert model(clicked, "spin", f"{line}.location") == moment
+    assert model(clicked, "body", CLOCK) == f"t = {moment:.{1 if moment < 100 else 0}f} √(c/g)"
 
 
-def test_the_body_turns_as_in_an_animation(visit: Callable[..., Page]) -> None:
+def test_the_body_turns_as_in_an_animation(clicked: Page) -> None:
     """Its outline, its middle and its trace lie where matplotlib's perspective puts them."""
-    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
-    wait_for_curves(page, 1)
     one = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=70, b=4, n0=0.05, t_end=1500).isel(trajectory=0)
-    wait(page, "body", f"{FACES}.xs.length")
-    times = one["time"].sel(time=slice(0, model(page, "time", "m.end"))).values
+    wait(clicked, "body", f"{FACES}.xs.length")
+    times = one["time"].sel(time=slice(0, model(clicked, "time", "m.end"))).values
     scene = animation._Scene(one.expand_dims("trajectory"), times)
     (body,) = scene.bodies
     for frame in (0, 100, 1000):
-        page.evaluate(f"{NAMED}('time').value = {times[frame] + 1e-6}")
-        page.wait_for_timeout(300)
+        clicked.evaluate(f"{NAMED}('time').value = {times[frame] + 1e-6}")
+        clicked.wait_for_timeout(300)
         scene.show(frame)
         faces = np.array(body.surface._faces)
         x, y, depth = (
             v.reshape(faces.shape[:2]) for v in proj3d.proj_transform(*faces.reshape(-1, 3).T, body.axes.get_proj())
         )
-        seen = np.array(model(page, "body", f"['xs', 'ys'].map((k) => {FACES}[k].map((each) => [...each]))"))
+        seen = np.array(model(clicked, "body", f"['xs', 'ys'].map((k) => {FACES}[k].map((each) => [...each]))"))
         for drawn, expected in zip(seen, (x, y), strict=True):
             assert drawn.min() == pytest.approx(expected.min(), abs=0.03 * np.ptp(expected))
             assert drawn.max() == pytest.approx(expected.max(), abs=0.03 * np.ptp(expected))
@@ -514,10 +520,8 @@ def test_the_body_turns_as_in_an_animation(visit: Callable[..., Page]) -> None:
         assert np.hypot(*(middles - middle[:, None])).min() < 0.01 * np.ptp(x)
 
 
-def test_a_link_reopens_the_page(visit: Callable[..., Page]) -> None:
-    page = visit("n0=0.05")
-    select(page, "show", "final spin n")
-    page.wait_for_url(re.compile("show=spin_final"))
+def test_a_link_reopens_the_page(page: Page, visit: Open) -> None:
+    select(page, "show", "final spin n", "show=spin_final")
     settle(page)
     page.mouse.click(*place(page, 3, 2))
     wait_for_curves(page, 1)
@@ -530,7 +534,7 @@ def test_a_link_reopens_the_page(visit: Callable[..., Page]) -> None:
     assert (other.url, curves(other), image(other)) == (link, curves(page), image(page))
 
 
-def test_a_wrong_link_is_told_and_harmless(visit: Callable[..., Page]) -> None:
+def test_a_wrong_link_is_told_and_harmless(visit: Open) -> None:
     page = visit("show=<img src=x onerror=alert(1)>&n0=9&cell=mu:-3&file=/etc/passwd")
     said = text(page, "notice")
     for words in ("<img src=x onerror=alert(1)> is not", "n0=9 is not", "cell=mu:-3", "file is no part"):
@@ -542,8 +546,7 @@ def test_a_wrong_link_is_told_and_harmless(visit: Callable[..., Page]) -> None:
 # ---- the keyboard, and narrow windows
 
 
-def test_everything_can_be_done_with_the_keyboard(visit: Callable[..., Page]) -> None:
-    page = visit("n0=0.05")
+def test_everything_can_be_done_with_the_keyboard(page: Page) -> None:
     for _ in range(40):
         page.keyboard.press("Tab")
         if page.evaluate("document.activeElement.id") == "map":
@@ -562,139 +565,107 @@ def test_everything_can_be_done_with_the_keyboard(visit: Callable[..., Page]) ->
     wait_for_curves(page, 2)
 
 
-def test_the_page_is_dark_where_the_system_is(visit: Callable[..., Page], opened: xr.Dataset) -> None:
+def test_the_page_is_dark_where_the_system_is(clicked: Page, opened: xr.Dataset) -> None:
     """Grounds become dark and letters light, in figures too; the colours of the map stay; the button is remembered."""
-    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
-    wait_for_curves(page, 1)
 
     def grounds() -> list[float]:
         """How light the middles of the page's parts are."""
-        page.mouse.move(0, 0)
-        page.wait_for_timeout(300)
-        picture = Image.open(io.BytesIO(page.screenshot(full_page=True))).convert("L")
-        boxes = [
-            page.locator(place).first.bounding_box()
-            for place in ("#controls", "#cell", "#curves", "#chosen", "#played")
-        ]
+        clicked.mouse.move(0, 0)
+        clicked.wait_for_timeout(300)
+        picture = Image.open(io.BytesIO(clicked.screenshot(full_page=True))).convert("L")
+        places = ("#controls", "#cell", "#curves", "#chosen", "#played")
+        boxes = [clicked.locator(place).first.bounding_box() for place in places]
         parts = [picture.crop((b["x"], b["y"], b["x"] + b["width"], b["y"] + b["height"])) for b in boxes if b]
         return [float(np.median(np.asarray(part))) for part in parts]
 
-    from PIL import Image
-
     assert min(grounds()) > 240
-    page.emulate_media(color_scheme="dark")
-    page.reload()
-    settle(page)
-    wait_for_curves(page, 1)
+    clicked.emulate_media(color_scheme="dark")
+    clicked.reload()
+    settle(clicked)
+    wait_for_curves(clicked, 1)
     assert max(grounds()) < 60
     counts = opened["reversals"].isel(n0=N0).values
-    assert (pixels(page, 2, 2) == colour_in_palette(page, int(counts[2, 2]))).all(axis=1).mean() > 0.8
-    page.get_by_role("button", name="Light or dark page").click()
+    assert (pixels(clicked, 2, 2) == colour_in_palette(clicked, int(counts[2, 2]))).all(axis=1).mean() > 0.8
+    clicked.get_by_role("button", name="Light or dark page").click()
     assert min(grounds()) > 240
-    page.reload()
-    settle(page)
+    clicked.reload()
+    settle(clicked)
     assert min(grounds()[:3]) > 240
 
 
 @pytest.mark.parametrize("width", [1400, 900, 400])
-def test_nothing_runs_out_of_the_window(width: int, visit: Callable[..., Page]) -> None:
-    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
-    wait_for_curves(page, 1)
-    page.set_viewport_size({"width": width, "height": 800})
-    page.wait_for_function(f"{MAP}.outer_width <= {width}")
-    page.wait_for_timeout(300)
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
+def test_nothing_runs_out_of_the_window(width: int, clicked: Page) -> None:
+    resize(clicked, width)
+    assert clicked.evaluate("document.documentElement.scrollWidth") <= width
     for name in ("map figure", "spin", "energies", "body"):
-        assert 200 < model(page, name, "m.outer_width") <= width
+        assert 200 < model(clicked, name, "m.outer_width") <= width
     # The patterns are painted for the new size.
-    shape = model(page, "map figure", "m.renderers[2].data_source.data.image[0].shape")
-    assert abs(shape[1] - model(page, "map figure", "m.inner_width")) <= 1
+    shape = model(clicked, "map figure", "m.renderers[2].data_source.data.image[0].shape")
+    assert abs(shape[1] - model(clicked, "map figure", "m.inner_width")) <= 1
 
 
-def test_a_click_runs_a_users_model_that_the_user_names(browser: Browser, tmp_path: Path) -> None:
+def test_a_click_runs_a_users_model_that_the_user_names(go: Open, tmp_path: Path) -> None:
     own.write(tmp_path)
     run = sweep.run(tmp_path / "pendulum.yaml", tmp_path, torque=[0.5, 1.0, 1.2], damping=[0.3, 0.5], t_end=60)
     with explorer(tmp_path / "pendulum.nc", "--model", tmp_path / "pendulum.py") as process:
-        try:
-            page, complaints = browser.new_page(), list[str]()
-            page.set_default_timeout(TIMEOUT)
-            page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.goto(address(process))
-            settle(page)
-            spot = {"torque": 2, "damping": 1}
-            page.mouse.click(*place(page, *(spot[str(dim)] for dim in reversed(run["reversals"].dims))))
-            wait_for_curves(page, 1)
-            count = run["reversals"].isel(spot).item()
-            assert curves(page)[0].endswith(f"torque = 1.2, {count} reversals")
-            wait(page, "spin", "m.left[0].axis_label === 'spin n'")
-            wait(page, "spin", "m.below[0].axis_label === 'time t'")
-            wait(page, "body", "!m.visible")
-            assert model(page, "body", CLOCK) == "t = 0.0"
-            field = control(page, "parameter torque", "input")
-            field.fill("1.5")
-            field.press("Enter")
-            wait(page, "curve legend", "/torque = 1.5, .*reversals/.test(m.items[0].label.value)")
-            page.close()
-            code, said, announced = stopped(process)
-        finally:
-            process.kill()
-    assert (code, said, complaints) == (0, "stopped\n", [])
+        page = settle(go(address(process)))
+        spot = {"torque": 2, "damping": 1}
+        page.mouse.click(*place(page, *(spot[str(dim)] for dim in reversed(run["reversals"].dims))))
+        wait_for_curves(page, 1)
+        count = run["reversals"].isel(spot).item()
+        assert curves(page)[0].endswith(f"torque = 1.2, {count} reversals")
+        wait(page, "spin", "m.left[0].axis_label === 'spin n'")
+        wait(page, "spin", "m.below[0].axis_label === 'time t'")
+        wait(page, "body", "!m.visible")
+        assert model(page, "body", CLOCK) == "t = 0.0"
+        enter(page, "parameter torque", "1.5")
+        wait(page, "curve legend", "/torque = 1.5, .*reversals/.test(m.items[0].label.value)")
+        page.close()
+        code, said, announced = stopped(process)
+    assert (code, said) == (0, "stopped\n")
     assert re.fullmatch(rf"running the code of {tmp_path / 'pendulum.py'} \(SHA-256 \w{{16}}…\)\n", announced)
 
 
-def test_a_body_in_si_units_says_them(browser: Browser, tmp_path: Path) -> None:
+def test_a_body_in_si_units_says_them(go: Open, tmp_path: Path) -> None:
     """Fields, sliders, axes and words carry units; small numbers can be typed, and sliders be logarithmic."""
     sigma = {"start": 1e-6, "stop": 1e-5, "num": 6, "spacing": "log"}
     sweep.run(ROOT / "configs" / "wooden.yaml", tmp_path, sigma=sigma, n0=[-8.0, -6.0, 6.0], t_end=100)
     with explorer(tmp_path / "wooden.nc") as process:
-        try:
-            page = browser.new_page()
-            page.set_default_timeout(TIMEOUT)
-            page.goto(f"{address(process)}?cell=sigma:3.2e-6,n0:6")
-            settle(page)
-            wait_for_curves(page, 1)
-            wait(page, "parameter sigma", "m.value === '3.2e-06'")
-            assert model(page, "parameter sigma", "m.title") == "σ (kg m²/s)"
-            wait(page, "drag sigma", f"Math.abs(m.value - {np.log(3.2e-6)}) < 1e-3")
-            wait(page, "energies", "m.below[0].axis_label === 'time t (s)'")
-            ticks = "m.below[0].formatter.doFormat([1e-5, 5e-6, -0.02, 1200000], {})"
-            assert model(page, "map figure", ticks) == ["10⁻⁵", "5×10⁻⁶", "−0.02", "1.2×10⁶"]
-            assert page.evaluate("[0, 1, -1e-7, NaN].map(sweep.number)") == ["0", "1", "−10⁻⁷", "NaN"]
-            page.get_by_text(re.compile(r"followed to t = \d+ s")).wait_for()
-            saved(page, "CSV").save_as(tmp_path / "a.csv")
-            head, *lines = (tmp_path / "a.csv").read_text().splitlines()
-            assert head.startswith("trajectory,time (s),spin (rad/s),")
-            curve = sweep.trajectory(ROOT / "configs" / "wooden.yaml", sigma=3.2e-6, n0=6.0, t_end=100)
-            rows = np.array([line.split(",")[:3] for line in lines], float)
-            assert rows[0].tolist() == [1, 0, 6]
-            np.testing.assert_allclose(
-                rows[:500, 2], np.interp(rows[:500, 1], curve["time"], curve["spin"][0]), atol=0.02
-            )
-            field = control(page, "parameter sigma", "input")
-            field.fill("5e-6")
-            field.press("Enter")
-            page.wait_for_url(re.compile("sigma:5e-06"))
-            control(page, "drag sigma", "[role=slider]").focus()
-            page.keyboard.press("ArrowRight")
-            page.wait_for_url(re.compile(r"sigma:5\.0\d+e-06"))
-            field.fill("five")
-            field.press("Enter")
-            page.get_by_text("sigma has to be a finite number >= 0").wait_for()
-            page.keyboard.press("Escape")
-            page.mouse.move(*place(page, 1, 0))
-            page.locator("#cell").get_by_text(re.compile(r"n₀ = −8 rad/s, σ = .*×10⁻⁶ kg m²/s")).first.wait_for()
-        finally:
-            process.kill()
+        page = settle(go(f"{address(process)}?cell=sigma:3.2e-6,n0:6"))
+        wait_for_curves(page, 1)
+        wait(page, "parameter sigma", "m.value === '3.2e-06'")
+        assert model(page, "parameter sigma", "m.title") == "σ (kg m²/s)"
+        wait(page, "drag sigma", f"Math.abs(m.value - {np.log(3.2e-6)}) < 1e-3")
+        wait(page, "energies", "m.below[0].axis_label === 'time t (s)'")
+        ticks = "m.below[0].formatter.doFormat([1e-5, 5e-6, -0.02, 1200000], {})"
+        assert model(page, "map figure", ticks) == ["10⁻⁵", "5×10⁻⁶", "−0.02", "1.2×10⁶"]
+        assert page.evaluate("[0, 1, -1e-7, NaN].map(sweep.number)") == ["0", "1", "−10⁻⁷", "NaN"]
+        page.get_by_text(re.compile(r"followed to t = \d+ s")).wait_for()
+        saved(page, "CSV").save_as(tmp_path / "a.csv")
+        head, *lines = (tmp_path / "a.csv").read_text().splitlines()
+        assert head.startswith("trajectory,time (s),spin (rad/s),")
+        curve = sweep.trajectory(ROOT / "configs" / "wooden.yaml", sigma=3.2e-6, n0=6.0, t_end=100)
+        rows = np.array([line.split(",")[:3] for line in lines], float)
+        assert rows[0].tolist() == [1, 0, 6]
+        np.testing.assert_allclose(rows[:500, 2], np.interp(rows[:500, 1], curve["time"], curve["spin"][0]), atol=0.02)
+        enter(page, "parameter sigma", "5e-6", "sigma:5e-06")
+        control(page, "drag sigma", "[role=slider]").focus()
+        page.keyboard.press("ArrowRight")
+        page.wait_for_url(re.compile(r"sigma:5\.0\d+e-06"))
+        enter(page, "parameter sigma", "five")
+        page.get_by_text("sigma has to be a finite number >= 0").wait_for()
+        page.keyboard.press("Escape")
+        page.mouse.move(*place(page, 1, 0))
+        page.locator("#cell").get_by_text(re.compile(r"n₀ = −8 rad/s, σ = .*×10⁻⁶ kg m²/s")).first.wait_for()
+        page.close()
 
 
-def test_a_notebook_shows_the_explorer_of_a_dataset(browser: Browser, tmp_path: Path) -> None:
+def test_a_notebook_shows_the_explorer_of_a_dataset(go: Open, tmp_path: Path) -> None:
     found = sweep.run(ROOT / "configs" / "mu.yaml", mu=[60, 70], n0=[0.04, 0.05], t_end=300)
     shown = sweep.explore(found, height=700)
     try:
         (tmp_path / "notebook.html").write_text(f"<!doctype html><title>n</title>{shown._repr_html_()}")
-        page = browser.new_page()
-        page.set_default_timeout(TIMEOUT)
-        page.goto(f"file://{tmp_path / 'notebook.html'}")
+        page = go(f"file://{tmp_path / 'notebook.html'}")
         assert page.locator("iframe").evaluate("(frame) => frame.clientHeight") == 700
         page.frames[1].wait_for_function(f"window.Bokeh?.documents[0]?.is_idle && {MAP}.inner_width > 10")
         assert page.frames[1].title() == found.attrs["title"]
@@ -714,54 +685,44 @@ def saved(page: Page, button: str) -> Download:
     return download.value
 
 
-def test_what_is_seen_is_saved(visit: Callable[..., Page], opened: xr.Dataset, tmp_path: Path) -> None:
-    from PIL import Image
-
-    page = visit("n0=0.05&cell=mu:70,b:4,n0:0.05")
-    wait_for_curves(page, 1)
-    assert saved(page, "netCDF").suggested_filename == "tiny_explored.nc"
-    saved(page, "netCDF").save_as(tmp_path / "a.nc")
+def test_what_is_seen_is_saved(clicked: Page, opened: xr.Dataset, tmp_path: Path) -> None:
+    file = saved(clicked, "netCDF")
+    assert file.suggested_filename == "tiny_explored.nc"
+    file.save_as(tmp_path / "a.nc")
     with xr.open_dataset(tmp_path / "a.nc", decode_times=False) as part:
         xr.testing.assert_equal(part.load(), opened.isel(n0=N0))
     with xr.open_dataset(tmp_path / "a.nc", group="trajectory_1", decode_times=False) as dense:
         assert dense["spin"].values[0] == pytest.approx(0.05)
-    saved(page, "YAML").save_as(tmp_path / "a.yaml")
+    saved(clicked, "YAML").save_as(tmp_path / "a.yaml")
     config = sweep.load_config(tmp_path / "a.yaml")
     assert config.parameters["n0"].numbers == (0.05,)
-    saved(page, "PNG").save_as(tmp_path / "a.png")
+    saved(clicked, "PNG").save_as(tmp_path / "a.png")
     picture = np.asarray(Image.open(tmp_path / "a.png").convert("RGB"))
     assert picture.shape[0] > 1000
     colours = np.unique(picture.reshape(-1, 3), axis=0).tolist()
     shown = opened["reversals"].isel(n0=N0).values[1, 0]
-    for colour in (colour_in_palette(page, int(shown)), [0, 0x72, 0xB2]):
+    for colour in (colour_in_palette(clicked, int(shown)), [0, 0x72, 0xB2]):
         assert colour in colours
-    legend = picture[56 + round(model(page, "map figure", "m.outer_height")) :][:20]
+    legend = picture[56 + round(model(clicked, "map figure", "m.outer_height")) :][:20]
     assert [0x21, 0x91, 0x8C] in legend.reshape(-1, 3).tolist()  # the ground of its patterns
 
 
-def test_a_map_is_one_file_that_needs_no_network(browser: Browser, opened: xr.Dataset, tmp_path: Path) -> None:
+def test_a_map_is_one_file_that_needs_no_network(go: Open, opened: xr.Dataset, tmp_path: Path) -> None:
     from sweep.explorer.page import save_html
 
     save_html(opened, tmp_path / "map.html", "reversals", "mu", "b", at={"n0": 0.05})
-    context = browser.new_context(offline=True, viewport={"width": 1000, "height": 800})
-    context.set_offline(True)
-    page = context.new_page()
-    asked = list[str]()
+    page, asked = go("about:blank"), list[str]()
+    page.context.set_offline(True)
     page.on("request", lambda request: asked.append(request.url))
     page.goto((tmp_path / "map.html").as_uri())
     settle(page)
-    page.mouse.move(*place(page, 2, 1))
-    page.mouse.move(*place(page, 2, 0))
-    tip = page.locator(".bk-tooltip-content").first
-    tip.wait_for()
+    near = tip(page, 2, 0)
     cell = opened.isel(mu=2, b=0, n0=N0)
-    near = tip.text_content() or ""
     assert labels.number(float(cell["spin_final"]))[:7] in near
     assert "ended at the time limit" in near
     assert "lower bound" in text(page, "legend")
     assert len(np.unique(pixels(page, 2, 0), axis=0)) > 1
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
-    context.close()
 
 
 # ---- who may come in

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sweep.explorer import slices
+from sweep.explorer import colours, slices, state
 from sweep.explorer.slices import PlacedAxis, Source, open_source
+from sweep.kernels.status import LIFT_OFF
 from sweep.plots import marks
 from sweep.results.store import StoreError
 
@@ -30,6 +31,13 @@ def test_kinds_are_those_of_the_figures(source: Source, opened: xr.Dataset) -> N
         np.testing.assert_array_equal(part.marks[kind], where.transpose("b", "mu").values, kind)
     assert part.marks["failed"][0, 0]
     assert len(part.shown) == 19
+
+
+def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
+    source = Source(opened.assign(status=xr.full_like(opened["status"], LIFT_OFF)))
+    part = source.map("reversals", "mu", "b", {"n0": 1})
+    assert not part.shown.size
+    assert colours.beyond(part, colours.scale_of(part, state.first(source))) == ""
 
 
 def test_descending_axes_are_turned(opened: xr.Dataset) -> None:
