@@ -29,11 +29,11 @@ GROUPS: dict[str, Callable[[], list[Any]]] = {
 SIMULATE, DONE = theory.simulate, dict[Any, Ends]()
 
 
-def simulate_once(model: str, columns: Any, t_end: float, step: float | None = None) -> Ends:
+def simulate_once(columns: Any, t_end: float, model: str = "slip", step: float | None = None) -> Ends:
     """As `theory.simulate`: what a wrong coefficient of another model does not change is remembered."""
     key = MODELS[model].constants, str(columns), t_end, step
     if key not in DONE:
-        DONE[key] = SIMULATE(model, columns, t_end, step)
+        DONE[key] = SIMULATE(columns, t_end, model=model, step=step)
     return DONE[key]
 
 

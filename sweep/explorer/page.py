@@ -86,7 +86,7 @@ def save_html(
     variables = document.template_variables
     rest = {*source.dims_of(shown.show), *source.dims} - {shown.x, shown.y}
     fixed = [labels.measured(source.dataset, d, source.axes[d].values[i]) for d, i in shown.at.items() if d in rest]
-    variables["constants"] = ", ".join([*fixed, variables["constants"]])
+    variables["constants"] = ", ".join(filter(None, [*fixed, variables["constants"]]))
     html = file_html(document, INLINE, document.title, template=document.template, template_variables=variables)
     with replacing(path) as temporary:
         temporary.write_text(html, encoding="utf-8")
