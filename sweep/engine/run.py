@@ -159,9 +159,9 @@ def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count
         for batch, left in local.batches(grid, tiles, todo, store)
         for done in local.run_batch(config, tiles, batch, store=store, left=left, after_chunk=count.chunk)
     )
-    for done in cluster.run(config, tiles, todo) if cluster else here:
-        store.save(done.tile, done.arrays | {"seconds": np.array(done.seconds), "cpu": np.array(done.cpu)})
-        count.tile(done.arrays["status"])
+    for tile, arrays in cluster.run(config, tiles, todo) if cluster else here:
+        store.save(tile, arrays)
+        count.tile(arrays["status"])
 
 
 def _draw(variables: Sequence[str], result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
