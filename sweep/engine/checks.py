@@ -17,8 +17,8 @@ import numpy as np
 from sweep.config import Config
 from sweep.engine import final
 from sweep.engine.errors import Errors
+from sweep.engine.executor import Work
 from sweep.engine.plan import Part, Plan, kernel_of
-from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.kernels import methods
 from sweep.kernels.measures.sensitivity import SHORTER, Sensitivity
@@ -123,8 +123,7 @@ def _again(part: Part, number: int, work: Work) -> Array:
         columns = {name: values[sound] for name, values in part.columns.items()}
         columns |= {name: columns[name] * (1 + number * NUDGE) for name in START & columns.keys()}
         step = SHORTER * part.kernel.table(part.images)["step"][sound]
-        near = replace(part.take(sound), columns=columns, step=step)
-        near = near.start()
+        near = replace(part.take(sound), columns=columns, step=step).start()
         final.run(near, work, f"{part.method} nudged {number}")
         counts[sound] = near.kernel.table(near.images)["reversals"]
     return counts

@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numba
@@ -124,8 +123,6 @@ def _share(*given: Any) -> tuple[Any, ...]:
     return given
 
 
-_own_sources = cache(sources)
-
 # Kernels of several tasks at once would share threads, which not all of numba's threading layers allow.
 _one_tile = threading.Lock()
 
@@ -134,7 +131,7 @@ def _work(shared: Shared, tile: int) -> Done:
     from distributed import get_worker
 
     config, tiles, identity = shared
-    source_hash, versions = _own_sources()
+    source_hash, versions = sources()
     if reason := identity.difference(replace(identity, source_hash=source_hash, versions=versions)):
         raise StoreError(f"{get_worker().address}: the worker has {reason}")
     with _one_tile:

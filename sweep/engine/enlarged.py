@@ -12,9 +12,9 @@ import xarray as xr
 from sweep.config import Config
 from sweep.config.document import parse_value
 from sweep.engine.checks import verify
+from sweep.engine.executor import Work
 from sweep.engine.plan import choose
 from sweep.engine.whole import Apart, Some
-from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures.sensitivity import Sensitivity

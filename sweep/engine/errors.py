@@ -21,9 +21,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from sweep.engine import final
+from sweep.engine.executor import Work
 from sweep.engine.plan import Part, Plan
 from sweep.engine.repeats import MOST_STEPS, decide_failures
-from sweep.engine.work import Work
 from sweep.grid import Array
 from sweep.kernels.measures.margin import EXTREMES
 from sweep.kernels.method import MISSED, REPEAT

@@ -12,9 +12,9 @@ from sweep.config import Config
 from sweep.engine import final
 from sweep.engine.checks import results, verify
 from sweep.engine.errors import keep_tolerance
+from sweep.engine.executor import Work
 from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
-from sweep.engine.work import Work
 from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
 from sweep.kernels.status import FAILURES, RUNNING, SETTLED

@@ -144,21 +144,16 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     """
     grids = grids or (Grid.of(config),)
     chosen = choose(config, *grids)
-    build(needed(config, chosen), *also)
+    build(kernels(config, chosen), *also)
     return fill(config, grids, chosen)
 
 
-def needed(config: Config, chosen: tuple[Choice, ...]) -> list[Kernel]:
-    """The kernels that run the cells of `chosen`, and that verify some of them."""
-    return [*(each.kernel for each in chosen), *([kernel_of(methods.PLAIN, config)] if config.verify else [])]
-
-
-def kernels(config: Config) -> list[Kernel]:
-    """All kernels that a run of a configuration may need."""
+def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
+    """The kernels that run the cells of `chosen`, or all that a run may need, and the one that verifies some cells."""
     method = config.integrator.method
-    names = methods.allowed(config.equations) if method == AUTO else (method,)
-    names += (methods.PLAIN,) if config.verify and methods.PLAIN not in names else ()
-    return [kernel_of(name, config) for name in names]
+    names = [each.method for each in chosen] or (methods.allowed(config.equations) if method == AUTO else [method])
+    names = [*names, methods.PLAIN] if config.verify else names
+    return [kernel_of(name, config) for name in dict.fromkeys(names)]
 
 
 def kernel_of(method: str, config: Config) -> Kernel:

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sweep.engine import final
+from sweep.engine.executor import Work
 from sweep.engine.plan import Part
-from sweep.engine.work import Work
 from sweep.grid import Array
 from sweep.kernels.build import APPROACH, build
 from sweep.kernels.failure import approach

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -194,15 +194,12 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
 
 def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
     """`dataset`, of samples, with the probability of each number of reversals."""
-    axes = [dim for dim in dataset["status"].dims if dim != SAMPLE]
+    axes = [str(dim) for dim in dataset["status"].dims if dim != SAMPLE]
     found = probabilities(dataset)
     counts = np.arange(1, found["probability"].shape[-1] + 1)
     coordinate = xr.Variable(("count",), counts, {"long_name": "number of reversals or more"})
     return dataset.assign_coords(count=coordinate).assign(
-        {
-            name: xr.Variable((*axes, "count"), found[name], described(spec, config.units))
-            for name, spec in PROBABILITIES.items()
-        }
+        variables(PROBABILITIES, (*axes, "count"), found, config.units)
     )
 
 
@@ -247,18 +244,23 @@ def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, A
 
 def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
     """`result`, with the results of a second run of some cells (`again`) along the dimension `verified`."""
-    result = result.assign(
-        {
-            name: xr.Variable("verified", np.asarray(again[name]).astype(spec.dtype), described(spec, config.units))
-            for name, spec in VERIFIED.items()
-            if name in again
-        }
-    )
+    result = result.assign(variables(VERIFIED, ["verified"], again, config.units))
     if "verified_count_changed" in again:
         result.attrs["verified_counts_changed"] = int(again["verified_count_changed"].sum())
     if "verified_spin_difference" in again:
         result.attrs["verified_largest_spin_difference"] = float(again["verified_spin_difference"].max())
     return result
+
+
+def variables(
+    specs: Mapping[str, Variable], dims: Sequence[str], found: Mapping[str, Array], system: str = PAPER_UNITS
+) -> dict[str, xr.Variable]:
+    """Those variables of `specs` that are `found`, along common dimensions."""
+    return {
+        name: xr.Variable(dims, np.asarray(found[name]).astype(spec.dtype), described(spec, system))
+        for name, spec in specs.items()
+        if name in found
+    }
 
 
 def described(spec: Variable, system: str = PAPER_UNITS) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from sweep.results import netcdf
-from sweep.results.identity import Identity, require_same
+from sweep.results.identity import Identity
 from sweep.results.store import StoreError
 from sweep.results.writing import remove_unfinished, replacing
 
@@ -96,19 +96,6 @@ class RunFiles:
             return None
         with netcdf.open_dataset(self.dataset, load=False) as dataset:
             return Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
-
-    def has_dataset(self, identity: Identity) -> bool:
-        """Tell whether the finished dataset of `identity` is there.
-
-        Raises
-        ------
-        StoreError
-            if the file is of another run, or not a dataset.
-        """
-        found = self.identity()
-        if found:
-            require_same(self.dataset, found, identity)
-        return bool(found)
 
     def keep_earlier(self) -> None:
         """Keep the dataset that is there while the run that enlarges it goes on."""

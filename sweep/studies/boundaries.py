@@ -23,7 +23,7 @@ from sweep.engine.reporter import Reporter
 from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.models.model import COUNT
-from sweep.results.dataset import described
+from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH
@@ -147,8 +147,7 @@ class Boundaries(Search):
         head |= {"x": self.across[0], "y": self.across[1]} | self.told()
         middles = [middle for curve in self.curves for middle in curve.middles.values()]
         head |= {"deviation": self.deviation, "middles_off": sum(not middle.confirmed for middle in middles)}
-        own = {name: xr.Variable("point", columns[name].astype(spec.dtype), described(spec))
-               for name, spec in POINTS.items()}  # fmt: skip
+        own = variables(POINTS, ["point"], columns)
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})
         places = {name: xr.Variable("point", columns[name], self.config.described(name)) for name in self.config.axes}
         for name, axis in self.axes.items():

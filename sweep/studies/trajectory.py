@@ -21,11 +21,10 @@ from sweep.config.values import numbers_of
 from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
-from sweep.engine.executor import STEP_SECONDS, UNTIL_ALL_STOP
+from sweep.engine.executor import STEP_SECONDS, UNTIL_ALL_STOP, Work
 from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
-from sweep.engine.work import Work
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
 from sweep.jit import threads

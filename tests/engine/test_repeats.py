@@ -12,9 +12,9 @@ from support.runs import run_cells, same_numbers
 
 import sweep
 from sweep.engine import local, repeats
+from sweep.engine.executor import Work
 from sweep.engine.plan import plan
 from sweep.engine.reporter import Progress, Reporter
-from sweep.engine.work import Work
 from sweep.kernels import methods
 from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, SETTLED, TIME_LIMIT, TOPPLED
