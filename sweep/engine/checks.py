@@ -18,9 +18,8 @@ from sweep.config import Config
 from sweep.engine import final
 from sweep.engine.errors import Errors
 from sweep.engine.executor import Work
-from sweep.engine.plan import Part, Plan, kernel_of
+from sweep.engine.plan import Part, Plan, kernel_of, steps_of
 from sweep.grid import Array, Grid
-from sweep.kernels import methods
 from sweep.kernels.measures.sensitivity import SHORTER, Sensitivity
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -60,10 +59,7 @@ def verify(config: Config, cells: Array, first: Mapping[str, Array], work: Work)
         return {"verified_cell": rows}
     first = {name: first[name][rows] for name in ("t_stop", "spin_final", "reversals") if name in first}
     kernel, columns, t_stop = kernel_of(PLAIN, config), grid.take(cells[rows]).columns(), first["t_stop"]
-    if config.integrator.step == "auto":
-        step, _ = methods.automatic_step(PLAIN, kernel.model, columns, config.integrator.tolerance)
-    else:
-        step = np.full(len(t_stop), config.integrator.step)
+    step, _ = steps_of(PLAIN, config, columns)
     images = kernel.images(columns, step / 2, t_stop)
     work.run("verified", kernel, images)
     again = dataset.measured(kernel, images, t_stop)

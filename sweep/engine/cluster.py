@@ -70,7 +70,7 @@ class Cluster:
         if self.local and config.simulated:
             build(kernels(config), APPROACH)
         # A task's result rather than scattered data, which would be lost along with the workers that hold it.
-        shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
+        shared = self.client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
         waiting, numbers = iter(todo), dict[Any, int]()
         running = as_completed(loop=self.client.loop)
         workers, counted = 0, -math.inf
@@ -117,10 +117,6 @@ def _arriving(running: Any) -> Iterator[Any]:
 
 Shared = tuple[Config, list[Tile], Identity]
 """What the tasks of a run have in common."""
-
-
-def _share(*given: Any) -> tuple[Any, ...]:
-    return given
 
 
 # Kernels of several tasks at once would share threads, which not all of numba's threading layers allow.

@@ -59,10 +59,9 @@ class Earlier:
         if not len(cells):
             return cells, arrays
         grid = _grid(self.dataset)
-        _, body = grid.bodies()
+        at, (_, body) = self.cells[cells], grid.bodies()
         for name, (_, spec) in dataset.layout(grid, set(map(str, self.dataset.data_vars))).items():
             tail = (self.dataset.sizes[spec.along],) if spec.along else ()
-            at = self.cells[cells]
             arrays[name] = self.dataset[name].values.reshape(-1, *tail)[body[at] if spec.per_body else at]
         return cells, arrays
 

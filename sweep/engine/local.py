@@ -112,17 +112,10 @@ def batches(
     if left and set(left.tiles) <= set(todo):
         yield left.tiles, left
         todo = [i for i in todo if i not in left.tiles]
-    batch: list[int] = []
-    cells = 0
-    for i in todo:
-        size = grid.part(tiles[i]).size
-        if batch and cells + size > BATCH:
-            yield batch, None
-            batch, cells = [], 0
-        batch.append(i)
-        cells += size
-    if batch:
-        yield batch, None
+    largest = max((grid.part(tiles[i]).size for i in todo), default=1)
+    together = max(1, BATCH // largest)
+    for first in range(0, len(todo), together):
+        yield list(todo[first : first + together]), None
 
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:

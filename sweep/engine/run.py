@@ -143,8 +143,7 @@ def _kept(result: Whole, store: Store, running: Running | None) -> str:
     """Find what an earlier run left."""
     grid = Grid.of(result.simulated())
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
-    tables = running.tables if running else {}
-    started = sum(len(table) for name, table in tables.items() if name in METHODS)
+    started = sum(len(table) for name, table in running.tables.items() if name in METHODS) if running else 0
     more = f", {started} under way" if running else ""
     return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 

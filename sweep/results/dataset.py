@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -36,20 +37,23 @@ _STATUSES = {
 STATUSES, STATUS_WORDS = ({code: each[k] for code, each in _STATUSES.items()} for k in (0, 1))
 """How a trajectory ended: the flags of the variable `status`, and what figures call them."""
 
-# 4 was a simulated n_c1 that disagreed with the eigenvalues.
-EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, REVERSES_AT_N_C1, UNDECIDED, FAILED, NO_BODY = 0, 1, 2, 3, 5, 6, 7, 8
-REASONS = {
-    EXISTS: "exists",
-    NO_FRICTION: "no_friction",
-    NO_COUPLING: "no_coupling",
-    NOT_FOUND: "not_found",
-    REVERSES_AT_N_C1: "reverses_at_n_c1",
-    UNDECIDED: "undecided",
-    FAILED: "failed",
-    NO_BODY: "impossible",
-}
-"""Whether there is a critical spin, n_c1 by the eigenvalues and n_c2 by simulation, and why not."""
 
+class Reason(IntEnum):
+    """Whether there is a critical spin, n_c1 by the eigenvalues and n_c2 by simulation, and why not."""
+
+    EXISTS = 0
+    NO_FRICTION = 1
+    NO_COUPLING = 2
+    NOT_FOUND = 3
+    # 4 was a simulated n_c1 that disagreed with the eigenvalues.
+    REVERSES_AT_N_C1 = 5
+    UNDECIDED = 6
+    FAILED = 7
+    IMPOSSIBLE = 8
+
+
+REASONS = {int(reason): reason.name.lower() for reason in Reason}
+"""The flags of the variables that tell a `Reason`."""
 
 ROWS = {CASE: "row of the table of cases", SAMPLE: "number of the sample"}
 """What the index along the rows of a table says."""

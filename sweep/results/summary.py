@@ -9,7 +9,7 @@ import xarray as xr
 
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
-from sweep.results.dataset import EXISTS, REASONS, STATUSES
+from sweep.results.dataset import REASONS, STATUSES, Reason
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, TRAJECTORY, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
@@ -120,7 +120,7 @@ def _critical(dataset: xr.Dataset) -> Iterator[str]:
         source = "linear" if name.startswith("n_c1") else "simulated"
         codes, spins = dataset[f"{name}_reason"].values, dataset[f"{name}_{source}"].values
         counts = {words: int((codes == code).sum()) for code, words in REASONS.items()}
-        counts["found"] = counts.pop(REASONS[EXISTS])
+        counts["found"] = counts.pop(REASONS[Reason.EXISTS])
         ends = ", ".join(f"{count} {words.replace('_', ' ')}" for words, count in counts.items() if count)
         span = f"; {np.nanmin(spins):.4g} to {np.nanmax(spins):.4g}" if np.isfinite(spins).any() else ""
         yield f"  {name}: {ends}{span}"
@@ -143,10 +143,9 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         yield f"impossible: {dataset.attrs['impossible']}"
     if "simulated_share" in dataset.attrs:
         yield f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the others are inferred"
-    if "reversals" in dataset:
-        valid = np.isin(status, (SETTLED, TIME_LIMIT))
-        if valid.any():
-            yield _reversals(dataset, valid)
+    valid = np.isin(status, (SETTLED, TIME_LIMIT))
+    if "reversals" in dataset and valid.any():
+        yield _reversals(dataset, valid)
     if "probability" in dataset and dataset["probability"].dims == ("count",):
         yield f"probability: {', '.join(_probabilities(dataset))}"
     if "misfit" in dataset and np.isfinite(dataset["misfit"]).any():
