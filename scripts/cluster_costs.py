@@ -32,7 +32,7 @@ CONFIG = Path(__file__).parent.parent / "configs" / "mu_b.yaml"
 
 
 def answer(arrays: dict[str, Any], _: Config, __: object, batch: list[int]) -> list[Done]:
-    return [Done(batch[0], arrays, 0.0, "")]
+    return [(batch[0], arrays)]
 
 
 def replace_work(arrays: dict[str, Any]) -> None:
@@ -46,20 +46,20 @@ def main(workers: int = 8) -> None:
     config = load_config(CONFIG, {"verify": 0, "t_end": 20, "mu": list(range(1, 1 + CELLS)), "b": 3, "n0": 0.05})
     grid = Grid.of(config)
     tiles = grid.tiles(CELLS)
-    (real,) = local.run_batch(config, tiles, [0])
-    print(f"bytes a cell on the way: {len(pickle.dumps(real.arrays)) / grid.size:.0f}")
+    ((_, real),) = local.run_batch(config, tiles, [0])
+    print(f"bytes a cell on the way: {len(pickle.dumps(real)) / grid.size:.0f}")
     with (
         distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as there,
         distributed.Client(there) as client,
         tempfile.TemporaryDirectory() as folder,
     ):
         store = Checkpoint(Path(folder) / "store", identify(config), print)
-        for name, arrays, number in (("no bytes", {}, 500), ("a whole tile", real.arrays, 100)):
+        for name, arrays, number in (("no bytes", {}, 500), ("a whole tile", real, 100)):
             client.run(replace_work, arrays)
             began, used = time.perf_counter(), time.process_time()
             for done in Cluster(client).run(config, tiles[:1] * number, range(number)):
-                if done.arrays:
-                    store.save(done.tile, done.arrays)
+                if done[1]:
+                    store.save(*done)
             rate, busy = number / (time.perf_counter() - began), (time.process_time() - used) / number
             print(f"{name}: {rate:.0f} tiles a second; scheduler, client and store {1e3 * busy:.1f} ms for each")
 

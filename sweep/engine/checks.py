@@ -17,10 +17,9 @@ import numpy as np
 from sweep.config import Config
 from sweep.engine import final
 from sweep.engine.errors import Errors
-from sweep.engine.plan import Part, Plan, kernel_of
-from sweep.engine.work import Work
+from sweep.engine.executor import Work
+from sweep.engine.plan import Part, Plan, kernel_of, steps_of
 from sweep.grid import Array, Grid
-from sweep.kernels import methods
 from sweep.kernels.measures.sensitivity import SHORTER, Sensitivity
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -60,10 +59,7 @@ def verify(config: Config, cells: Array, first: Mapping[str, Array], work: Work)
         return {"verified_cell": rows}
     first = {name: first[name][rows] for name in ("t_stop", "spin_final", "reversals") if name in first}
     kernel, columns, t_stop = kernel_of(PLAIN, config), grid.take(cells[rows]).columns(), first["t_stop"]
-    if config.integrator.step == "auto":
-        step, _ = methods.automatic_step(PLAIN, kernel.model, columns, config.integrator.tolerance)
-    else:
-        step = np.full(len(t_stop), config.integrator.step)
+    step, _ = steps_of(PLAIN, config, columns)
     images = kernel.images(columns, step / 2, t_stop)
     work.run("verified", kernel, images)
     again = dataset.measured(kernel, images, t_stop)
@@ -123,8 +119,7 @@ def _again(part: Part, number: int, work: Work) -> Array:
         columns = {name: values[sound] for name, values in part.columns.items()}
         columns |= {name: columns[name] * (1 + number * NUDGE) for name in START & columns.keys()}
         step = SHORTER * part.kernel.table(part.images)["step"][sound]
-        near = replace(part.take(sound), columns=columns, step=step)
-        near = near.start()
+        near = replace(part.take(sound), columns=columns, step=step).start()
         final.run(near, work, f"{part.method} nudged {number}")
         counts[sound] = near.kernel.table(near.images)["reversals"]
     return counts

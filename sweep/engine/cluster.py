@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numba
@@ -71,7 +70,7 @@ class Cluster:
         if self.local and config.simulated:
             build(kernels(config), APPROACH)
         # A task's result rather than scattered data, which would be lost along with the workers that hold it.
-        shared = self.client.submit(_share, config, list(tiles), identify(config), pure=False)
+        shared = self.client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
         waiting, numbers = iter(todo), dict[Any, int]()
         running = as_completed(loop=self.client.loop)
         workers, counted = 0, -math.inf
@@ -120,12 +119,6 @@ Shared = tuple[Config, list[Tile], Identity]
 """What the tasks of a run have in common."""
 
 
-def _share(*given: Any) -> tuple[Any, ...]:
-    return given
-
-
-_own_sources = cache(sources)
-
 # Kernels of several tasks at once would share threads, which not all of numba's threading layers allow.
 _one_tile = threading.Lock()
 
@@ -134,7 +127,7 @@ def _work(shared: Shared, tile: int) -> Done:
     from distributed import get_worker
 
     config, tiles, identity = shared
-    source_hash, versions = _own_sources()
+    source_hash, versions = sources()
     if reason := identity.difference(replace(identity, source_hash=source_hash, versions=versions)):
         raise StoreError(f"{get_worker().address}: the worker has {reason}")
     with _one_tile:

@@ -12,9 +12,9 @@ import xarray as xr
 from sweep.config import Config
 from sweep.config.document import parse_value
 from sweep.engine.checks import verify
+from sweep.engine.executor import Work
 from sweep.engine.plan import choose
 from sweep.engine.whole import Apart, Some
-from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures.sensitivity import Sensitivity
@@ -59,10 +59,9 @@ class Earlier:
         if not len(cells):
             return cells, arrays
         grid = _grid(self.dataset)
-        _, body = grid.bodies()
+        at, (_, body) = self.cells[cells], grid.bodies()
         for name, (_, spec) in dataset.layout(grid, set(map(str, self.dataset.data_vars))).items():
             tail = (self.dataset.sizes[spec.along],) if spec.along else ()
-            at = self.cells[cells]
             arrays[name] = self.dataset[name].values.reshape(-1, *tail)[body[at] if spec.per_body else at]
         return cells, arrays
 

@@ -21,9 +21,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from sweep.engine import final
+from sweep.engine.executor import Work
 from sweep.engine.plan import Part, Plan
 from sweep.engine.repeats import MOST_STEPS, decide_failures
-from sweep.engine.work import Work
 from sweep.grid import Array
 from sweep.kernels.measures.margin import EXTREMES
 from sweep.kernels.method import MISSED, REPEAT
@@ -93,10 +93,6 @@ class Errors:
         """Estimated error of the spin at the end, shape (cells,)."""
         return np.asarray(np.fmax(self.spin, self.least))
 
-    @classmethod
-    def none(cls, cells: int) -> Errors:
-        return cls(*np.full((len(fields(cls)), cells), np.nan))
-
     def put(self, rows: Array, other: Errors) -> None:
         for each in fields(self):
             getattr(self, each.name)[rows] = getattr(other, each.name)
@@ -113,7 +109,7 @@ def keep_tolerance(job: Plan, work: Work) -> Errors:
 
     While `work` goes on, the cells whose error is not known yet are `RUNNING`.
     """
-    found = Errors.none(sum(grid.size for grid in job.grids))
+    found = Errors(*np.full((len(fields(Errors)), sum(grid.size for grid in job.grids)), np.nan))
     waiting = []
     for part in job.parts:
         rows = np.flatnonzero(~part.failed)
@@ -121,9 +117,7 @@ def keep_tolerance(job: Plan, work: Work) -> Errors:
         waiting.append((part, rows, first))
         part.kernel.table(part.images)["status"][rows] = RUNNING
     for part, rows, first in waiting:
-        errors = Errors.none(len(part.cells))
-        _keep(part, rows, first, errors, work)
-        found.put(part.cells, errors)
+        _keep(part, rows, first, found, work)
     found.spin[np.isinf(found.spin)] = np.nan
     return found
 
@@ -149,7 +143,10 @@ def imbalance(part: Part) -> Array:
 
 
 def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None:
-    """Decide the cells of `part` with the indices `rows`; `now` are these cells after their first run."""
+    """Decide the cells of `part` with the indices `rows`; `now` are these cells after their first run.
+
+    Their errors are put into those `found`, which are over all cells.
+    """
     rules, most = part.step_rule[rows], np.full(len(rows), np.inf)
     for round_ in range(ROUNDS + 1):
         name = f"{part.method} repeat {round_}"
@@ -167,7 +164,7 @@ def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None
         missed = (errors.told > limit) & (not part.fixed)
         done = now.take(~again)
         part.put(rows[~again], done, np.where(missed, MISSED, rules)[~again])
-        found.put(rows[~again], errors.take(~again))
+        found.put(part.cells[rows[~again]], errors.take(~again))
         if not again.any():
             return
         most = np.where(by_chance, np.inf, errors.spin / shorter**_LEAST_ORDER)[again]

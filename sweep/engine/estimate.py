@@ -10,7 +10,7 @@ import numpy as np
 from sweep.config import Config
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import BATCH
-from sweep.engine.plan import Choice, choose, needed
+from sweep.engine.plan import Choice, choose, kernels
 from sweep.grid import Array, Grid
 from sweep.kernels.build import compile_seconds, missing
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
@@ -43,7 +43,7 @@ def estimate(config: Config) -> str:
         chosen = tuple(each for each in choose(config, sample) if len(each.cells))
         steps = [np.ceil(config.integrator.patient.t_end / each.step) for each in chosen]
         seconds = sum(map(nominal_seconds, _works(config, chosen, steps, share)))
-        compiling = compile_seconds(missing(needed(config, chosen)))
+        compiling = compile_seconds(missing(kernels(config, chosen)))
     total = sum(each.sum() for each in steps) * share
     numbers = sum(len(each.cells) * len(each.kernel.layout.names) for each in chosen)
     bytes_a_cell = np.dtype(float).itemsize * numbers / sample.size

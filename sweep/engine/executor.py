@@ -1,9 +1,12 @@
-"""Advances a table of trajectories to their ends, in chunks of work."""
+"""Advances trajectories to their ends, in chunks of work, and keeps them for a batch that is interrupted.
+
+What follows from images that have ended, such as which cells are repeated and in which steps, is found again from them.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -31,7 +34,6 @@ def execute(
     stop_when_settled: bool,
     after_chunk: Callable[[], None] | None = None,
     chunk_blocks: int | None = None,
-    chunk_seconds: float | None = None,
 ) -> None:
     """Advance all unfinished `images`, in place, until every trajectory has ended.
 
@@ -41,8 +43,7 @@ def execute(
     stop_when_settled : end a trajectory as soon as its spin can no longer reverse
     after_chunk : called after each chunk, when `images` is consistent: to report, save, or stop
         by raising an exception
-    chunk_blocks : blocks of steps per chunk; by default as many as take about `chunk_seconds`
-    chunk_seconds : by default `CHUNK_SECONDS`
+    chunk_blocks : blocks of steps per chunk; by default as many as take about `CHUNK_SECONDS`
 
     Notes
     -----
@@ -60,7 +61,7 @@ def execute(
         kernel.advance(images, pending, blocks, stop_when_settled)
         kernel.carry(images)
         if chunk_blocks is None:
-            blocks = _rescale(blocks, time.perf_counter() - chunk_began, chunk_seconds or CHUNK_SECONDS)
+            blocks = _rescale(blocks, time.perf_counter() - chunk_began, CHUNK_SECONDS)
         if after_chunk:
             after_chunk()
         point()
@@ -76,3 +77,38 @@ def nominal_seconds(steps: Array) -> float:
     lanes = max(threads() * LANES, len(steps))
     blocks = np.ceil(steps / BLOCK)
     return float(max(blocks.mean() * lanes / threads(), blocks.max() * LANES) * BLOCK * STEP_SECONDS)
+
+
+class Work:
+    """The runs of a batch, each with a name of its own.
+
+    Parameters
+    ----------
+    left : images by the names of their runs, as an interrupted batch has left them in `kept`
+    after_chunk : called after each chunk of work: to report, to save `kept`, or to stop by raising an exception
+    """
+
+    def __init__(self, left: Mapping[str, Array] | None = None, after_chunk: Callable[[], None] = lambda: None) -> None:
+        self.kept, self.after_chunk = dict(left or {}), after_chunk
+
+    def run(
+        self, name: str, kernel: Kernel, images: Array, *, settle: bool = False, most: Array | float = np.inf
+    ) -> None:
+        """Run `images` to their ends, in place.
+
+        Parameters
+        ----------
+        settle : whether a run ends where its spin can reverse no more
+        most : steps after which a run ends at the latest, shape (cells,)
+        """
+        goal = kernel.table(images)["goal"]
+        wanted = goal.copy()
+        left = self.kept.get(name)
+        if left is not None and left.shape == images.shape:
+            images[:] = left
+        self.kept[name] = images
+        goal[:] = np.minimum(wanted, most)
+        execute(kernel, images, stop_when_settled=settle, after_chunk=self.after_chunk)
+        goal[:] = wanted
+        # What is found out about these runs later changes their images.
+        self.kept[name] = images.copy()

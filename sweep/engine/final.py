@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from sweep.engine.executor import Work
 from sweep.engine.plan import Part
 from sweep.engine.winding import whole_blocks, wind_down
-from sweep.engine.work import Work
 from sweep.grid import Array
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT

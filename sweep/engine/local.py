@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from sweep.config import Config
 from sweep.engine import final
 from sweep.engine.checks import results, verify
 from sweep.engine.errors import keep_tolerance
-from sweep.engine.plan import Plan, plan
+from sweep.engine.executor import Work
+from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
-from sweep.engine.work import Work
 from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
-from sweep.kernels.status import RUNNING, SETTLED
+from sweep.kernels.status import FAILURES, RUNNING, SETTLED
 from sweep.prediction import predict
 from sweep.results import dataset
 from sweep.results.provenance import this_cpu
@@ -30,15 +30,8 @@ _FIRST = 0.6
 """The share of a cell's work that its first run is, where a second one tells its error."""
 
 
-@dataclass(frozen=True)
-class Done:
-    """A finished tile."""
-
-    tile: int
-    arrays: dict[str, Array]
-    """Results by name, each of shape (cells,)."""
-    seconds: float
-    cpu: str
+Done = tuple[int, dict[str, Array]]
+"""The number of a finished tile, and by name its results, each of shape (cells,), its cost and the type of CPU."""
 
 
 def run_batch(
@@ -59,11 +52,11 @@ def run_batch(
     after_chunk : called with the number of the batch's cells that are done, a fraction where a cell is run more than
         once, and how many of them have failed
     """
-    grid, cpu = Grid.of(config), this_cpu()
+    grid, cpu = Grid.of(config), np.array(this_cpu())
     if not config.simulated:
         for i in batch:
             point()
-            yield Done(i, _evaluate(config, grid.part(tiles[i])), 0.0, cpu)
+            yield i, _evaluate(config, grid.part(tiles[i])) | {"seconds": np.array(0.0), "cpu": cpu}
         return
     job = plan(config, *(grid.part(tiles[i]) for i in batch))
     for part in job.parts:
@@ -75,49 +68,31 @@ def run_batch(
     # cycles: 10⁶ cells took 629 MiB, 10⁵ 366.
     kept = work.kept
 
-    def save() -> None:
+    def save(share: float, before: float = 0.0, *, decided: bool = True) -> None:
+        """Save the images, and report as done a share of each cell, and of each that has ended another one."""
         # Images are saved only between two chunks: anywhere else an interrupt may find half of them advanced.
         if store:
             store.save_running(Running(list(batch), kept, time.perf_counter() - began))
-
-    def running() -> None:
-        save()
+        status = np.concatenate([part.status for part in job.parts])
+        ended, failed = int((status != RUNNING).sum()), int(np.isin(status, FAILURES).sum())
         # What looks like a failure is decided only after all cells have ended.
-        after_chunk(first * sum(int(((p.status != RUNNING) & ~p.failed).sum()) for p in job.parts), 0)
+        ended, failed = (ended, failed) if decided else (ended - failed, 0)
+        after_chunk(before * len(status) + share * ended, failed)
 
-    def deciding() -> None:
-        save()
-        after_chunk(first * _ended(job), _failed(job))
-
-    def measuring() -> None:
-        save()
-        cells = sum(len(part.cells) for part in job.parts)
-        after_chunk(first * cells + (1 - first) * _ended(job), _failed(job))
-
-    work.after_chunk = running
+    work.after_chunk = partial(save, first, decided=False)
     for part in job.parts:
         final.run(part, work, part.method)
-    work.after_chunk = deciding
+    work.after_chunk = partial(save, first)
     for part in job.parts:
         decide_failures(part, work, part.method)
-    work.after_chunk = measuring
+    work.after_chunk = partial(save, 1 - first, first)
     errors = keep_tolerance(job, work) if twice else None
     found = results(job, errors, work)
     numbers = np.concatenate([grid.first_cell(tiles[i]) + np.arange(grid.part(tiles[i]).size) for i in batch])
     again = verify(config, numbers, found, work) if config.verify else {}
-    seconds = (time.perf_counter() - began) / len(batch)
+    cost = {"seconds": np.array((time.perf_counter() - began) / len(batch)), "cpu": cpu}
     for i, arrays in zip(batch, job.by_grid(found), strict=True):
-        yield Done(i, arrays | _inside(grid, tiles[i], again), seconds, cpu)
-
-
-def _ended(job: Plan) -> int:
-    """The number of cells that have ended."""
-    return sum(int((part.status != RUNNING).sum()) for part in job.parts)
-
-
-def _failed(job: Plan) -> int:
-    """The number of cells that have failed."""
-    return sum(int(part.failed.sum()) for part in job.parts)
+        yield i, arrays | _inside(grid, tiles[i], again) | cost
 
 
 def _inside(grid: Grid, tile: Tile, again: Mapping[str, Array]) -> dict[str, Array]:
@@ -137,17 +112,10 @@ def batches(
     if left and set(left.tiles) <= set(todo):
         yield left.tiles, left
         todo = [i for i in todo if i not in left.tiles]
-    batch: list[int] = []
-    cells = 0
-    for i in todo:
-        size = grid.part(tiles[i]).size
-        if batch and cells + size > BATCH:
-            yield batch, None
-            batch, cells = [], 0
-        batch.append(i)
-        cells += size
-    if batch:
-        yield batch, None
+    largest = max((grid.part(tiles[i]).size for i in todo), default=1)
+    together = max(1, BATCH // largest)
+    for first in range(0, len(todo), together):
+        yield list(todo[first : first + together]), None
 
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:

@@ -144,21 +144,16 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     """
     grids = grids or (Grid.of(config),)
     chosen = choose(config, *grids)
-    build(needed(config, chosen), *also)
+    build(kernels(config, chosen), *also)
     return fill(config, grids, chosen)
 
 
-def needed(config: Config, chosen: tuple[Choice, ...]) -> list[Kernel]:
-    """The kernels that run the cells of `chosen`, and that verify some of them."""
-    return [*(each.kernel for each in chosen), *([kernel_of(methods.PLAIN, config)] if config.verify else [])]
-
-
-def kernels(config: Config) -> list[Kernel]:
-    """All kernels that a run of a configuration may need."""
+def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
+    """The kernels that run the cells of `chosen`, or all that a run may need, and the one that verifies some cells."""
     method = config.integrator.method
-    names = methods.allowed(config.equations) if method == AUTO else (method,)
-    names += (methods.PLAIN,) if config.verify and methods.PLAIN not in names else ()
-    return [kernel_of(name, config) for name in names]
+    names = [each.method for each in chosen] or (methods.allowed(config.equations) if method == AUTO else [method])
+    names = [*names, methods.PLAIN] if config.verify else names
+    return [kernel_of(name, config) for name in dict.fromkeys(names)]
 
 
 def kernel_of(method: str, config: Config) -> Kernel:
@@ -174,27 +169,28 @@ def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
     model, integrator = config.equations, config.integrator
     each = [grid.columns() for grid in grids]
     columns = {name: np.concatenate([some[name] for some in each]) for name in each[0]}
-    impossible = model.impossible(columns)
-    possible = np.flatnonzero(~impossible)
-    if impossible.any():
-        columns = {name: values[possible] for name, values in columns.items()}
+    possible = np.flatnonzero(~model.impossible(columns))
+    columns = {name: values[possible] for name, values in columns.items()}
     if not len(possible):
         return (Choice(kernels(config)[0], possible, columns, np.empty(0), np.empty(0)),)
     if integrator.method == AUTO:
         chosen, steps, rules = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:
-        chosen = np.full(len(possible), integrator.method)
-        if integrator.step == "auto":
-            steps, rules = methods.automatic_step(integrator.method, model, columns, integrator.tolerance)
-        else:
-            steps, rules = np.full(len(possible), integrator.step), np.full(len(possible), FIXED)
+        chosen, (steps, rules) = np.full(len(possible), integrator.method), steps_of(integrator.method, config, columns)
     choices = []
     for method in METHODS:
-        if not len(cells := np.flatnonzero(chosen == method)):
-            continue
-        theirs = {name: values[cells] for name, values in columns.items()}
-        choices.append(Choice(kernel_of(method, config), possible[cells], theirs, steps[cells], rules[cells]))
+        if len(cells := np.flatnonzero(chosen == method)):
+            theirs = {name: values[cells] for name, values in columns.items()}
+            choices.append(Choice(kernel_of(method, config), possible[cells], theirs, steps[cells], rules[cells]))
     return tuple(choices)
+
+
+def steps_of(method: str, config: Config, columns: Columns) -> tuple[Array, Array]:
+    """Step of each cell with a method, the configured or the automatic one, and what set it; both of shape (cells,)."""
+    step, cells = config.integrator.step, len(next(iter(columns.values())))
+    if step == "auto":
+        return methods.automatic_step(method, config.equations, columns, config.integrator.tolerance)
+    return np.full(cells, step), np.full(cells, FIXED)
 
 
 def fill(config: Config, grids: tuple[Grid, ...], chosen: tuple[Choice, ...]) -> Plan:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property
 
 import numpy as np
 import xarray as xr
@@ -36,13 +35,9 @@ class Refined(Some):
         self._outcome.ravel()[self._impossible] = IMPOSSIBLE
         self._learned = 0
         """Tiles whose outcomes are known."""
-
-    @cached_property
-    def _refined(self) -> list[int]:
+        specs, patch = (config.parameters[name].spec for name in self.grid.axes), 2**config.refine
+        self._refined = [i for i, spec in enumerate(specs) if isinstance(spec, dict) and self.grid.shape[i] > patch]
         """Indices of the axes that are ranges and longer than a patch."""
-        specs = [self.config.parameters[name].spec for name in self.grid.axes]
-        patch = 2**self.config.refine
-        return [i for i, spec in enumerate(specs) if isinstance(spec, dict) and self.grid.shape[i] > patch]
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
         """Add the nodes to simulate next, judging by the outcomes of all tiles so far.  False if there are none.

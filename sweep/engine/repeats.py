@@ -15,13 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sweep.engine import final
+from sweep.engine.executor import Work
 from sweep.engine.plan import Part
-from sweep.engine.work import Work
 from sweep.grid import Array
 from sweep.kernels.build import APPROACH, build
 from sweep.kernels.failure import approach
 from sweep.kernels.method import MISSED, REPEAT
-from sweep.kernels.status import DIVERGED, RUNNING
+from sweep.kernels.status import DIVERGED, RUNNING, SETTLED
 from sweep.models.model import stack, take
 
 ROUNDS, FALSE_ROUNDS = 3, 8
@@ -153,6 +153,9 @@ def _meet(part: Part, work: Work, name: str) -> Met:
     if late.any():
         again = ahead.take(late).start()
         work.run(name, again.kernel, again.images, settle=again.settles, most=goal[late])
+        # What failed later has gone on from where it settled (`sweep.engine.final`).
+        again.kernel.table(again.images)["status"][again.status == SETTLED] = RUNNING
+        work.run(f"{name} unsettled", again.kernel, again.images, most=goal[late])
         states[:, late] = part.kernel.model_states(again.images)
     constants = model.constants.of(ahead.columns)
     stretch = end + _BEYOND * step - begin

@@ -143,8 +143,7 @@ def _kept(result: Whole, store: Store, running: Running | None) -> str:
     """Find what an earlier run left."""
     grid = Grid.of(result.simulated())
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
-    tables = running.tables if running else {}
-    started = sum(len(table) for name, table in tables.items() if name in METHODS)
+    started = sum(len(table) for name, table in running.tables.items() if name in METHODS) if running else 0
     more = f", {started} under way" if running else ""
     return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 
@@ -159,9 +158,9 @@ def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count
         for batch, left in local.batches(grid, tiles, todo, store)
         for done in local.run_batch(config, tiles, batch, store=store, left=left, after_chunk=count.chunk)
     )
-    for done in cluster.run(config, tiles, todo) if cluster else here:
-        store.save(done.tile, done.arrays | {"seconds": np.array(done.seconds), "cpu": np.array(done.cpu)})
-        count.tile(done.arrays["status"])
+    for tile, arrays in cluster.run(config, tiles, todo) if cluster else here:
+        store.save(tile, arrays)
+        count.tile(arrays["status"])
 
 
 def _draw(variables: Sequence[str], result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:

@@ -21,6 +21,7 @@ class Sampled(Enlarged):
     """The samples of all rounds so far; an earlier run may have had some of them."""
 
     def __init__(self, config: Config, store: Store, earlier: Earlier | None) -> None:
+        self._most = config.samples or 1
         super().__init__(config, store, earlier or Earlier(xr.Dataset(), np.full(Grid.of(config).size, -1)))
         known = (self.earlier.cells >= 0).reshape(-1, self._most).all(axis=0)
         self._rows = int(np.argmin(known)) if not known.all() else self._most
@@ -51,10 +52,6 @@ class Sampled(Enlarged):
         """Label the samples of all rounds, without a check of some of them."""
         found = super().labelled().isel({SAMPLE: slice(self._rows)})
         return with_probabilities(self.config, found.drop_dims("count"))
-
-    @property
-    def _most(self) -> int:
-        return self.config.samples or 1
 
     def _narrow(self) -> bool:
         found = self.labelled()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -58,8 +58,7 @@ class Whole:
             netcdf.write(path, self.dataset())
             return
         tails, apart = dict[str, tuple[int, ...]](), list[Apart]()
-        for i in range(len(self.tiles)):
-            arrays = self.store.load(i)
+        for _, arrays in self._finished():
             tails |= {name: values.shape[1:] for name, values in arrays.items()}
             apart.append(apart_from(arrays))
         first = dict(zip(self.grid.dims, self.tiles[0], strict=True))
@@ -67,8 +66,7 @@ class Whole:
         for name, (over, spec) in dataset.layout(self.grid, tails).items():
             empty[name] = np.broadcast_to(np.zeros((), spec.dtype), over.shape + tails[name])
             sizes[name] = tuple(first[dim].stop for dim in over.dims) + tails[name]
-        loaded = ((tile, self.store.load(i)) for i, tile in enumerate(self.tiles))
-        pieces = (piece for tile, arrays in loaded for piece in dataset.pieces(self.grid, tile, arrays))
+        pieces = (piece for tile, arrays in self._finished() for piece in dataset.pieces(self.grid, tile, arrays))
         netcdf.write(path, self._frame(empty, apart), sizes, pieces)
 
     def _cut(self, cells: int, tile_size: Callable[[int], int]) -> bool:
@@ -79,15 +77,12 @@ class Whole:
 
     def _gather(self) -> tuple[dict[str, Array], list[Apart]]:
         """Arrays over all simulated cells (or bodies), and what the tiles hold apart from them."""
-        apart: list[Apart] = []
+        apart = [apart_from(arrays) for _, arrays in self._finished()]
+        return dataset.assemble(Grid.of(self.simulated()), self._finished()), apart
 
-        def read() -> Iterator[tuple[Tile, dict[str, Array]]]:
-            for i, tile in enumerate(self.tiles):
-                arrays = self.store.load(i)
-                apart.append(apart_from(arrays))
-                yield tile, arrays
-
-        return dataset.assemble(Grid.of(self.simulated()), read()), apart
+    def _finished(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
+        """Read the tiles one after another, with what each holds."""
+        return ((tile, self.store.load(i)) for i, tile in enumerate(self.tiles))
 
     def _frame(self, arrays: Mapping[str, Array], apart: Sequence[Apart]) -> xr.Dataset:
         """A dataset of `arrays` with coordinates, attributes, and the cells that were run again."""
@@ -96,12 +91,9 @@ class Whole:
         again = {name: np.concatenate([tile[name] for tile in apart if name in tile]) for name in names}
         return dataset.beside(self.config, framed, again) if again else framed
 
-    def _attributes(self, cells: int, apart: Iterable[Apart]) -> dict[str, Any]:
+    def _attributes(self, cells: int, apart: Sequence[Apart]) -> dict[str, Any]:
         """Where the numbers of a finished run come from, and what its `cells` have cost."""
-        seconds, cpus = 0.0, set[str]()
-        for tile in apart:
-            seconds += float(tile["seconds"])
-            cpus.add(str(tile["cpu"]))
+        seconds, cpus = sum(float(tile["seconds"]) for tile in apart), {str(tile["cpu"]) for tile in apart}
         return provenance(self.config, seconds, cells, cpus) | described_impossible(self.config)
 
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.engine import executor
+from sweep.engine.executor import UNTIL_ALL_STOP, Work, execute
 from sweep.engine.plan import Part
-from sweep.engine.work import Work
 from sweep.grid import Array
 from sweep.kernels.lanes import BEYOND, STABLE
 from sweep.kernels.layout import BLOCK, Table
@@ -81,7 +80,7 @@ def _looks(part: Part, work: Work, name: str, patience: float) -> Array:
     for look in range(len(looks), _LOOKS + 1):
         table["goal"] = begun + look * between
         table["status"][(table["status"] == TIME_LIMIT) & (table["done"] < table["goal"])] = RUNNING
-        executor.execute(part.kernel, part.images, stop_when_settled=False, chunk_blocks=executor.UNTIL_ALL_STOP)
+        execute(part.kernel, part.images, stop_when_settled=False, chunk_blocks=UNTIL_ALL_STOP)
         looks.append(vertical_spin(*slow_states(table)))
         if look % _KEPT == 0:
             work.kept |= {name: part.images.copy(), f"{name} looks": np.array(looks)}

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from sweep.config import load_config
-from sweep.engine.executor import execute
+from sweep.engine.executor import Work, execute
 from sweep.engine.plan import Part
 from sweep.engine.repeats import decide_failures
-from sweep.engine.work import Work
 from sweep.grid import Array, Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.build import build

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -36,20 +37,23 @@ _STATUSES = {
 STATUSES, STATUS_WORDS = ({code: each[k] for code, each in _STATUSES.items()} for k in (0, 1))
 """How a trajectory ended: the flags of the variable `status`, and what figures call them."""
 
-# 4 was a simulated n_c1 that disagreed with the eigenvalues.
-EXISTS, NO_FRICTION, NO_COUPLING, NOT_FOUND, REVERSES_AT_N_C1, UNDECIDED, FAILED, NO_BODY = 0, 1, 2, 3, 5, 6, 7, 8
-REASONS = {
-    EXISTS: "exists",
-    NO_FRICTION: "no_friction",
-    NO_COUPLING: "no_coupling",
-    NOT_FOUND: "not_found",
-    REVERSES_AT_N_C1: "reverses_at_n_c1",
-    UNDECIDED: "undecided",
-    FAILED: "failed",
-    NO_BODY: "impossible",
-}
-"""Whether there is a critical spin, n_c1 by the eigenvalues and n_c2 by simulation, and why not."""
 
+class Reason(IntEnum):
+    """Whether there is a critical spin, n_c1 by the eigenvalues and n_c2 by simulation, and why not."""
+
+    EXISTS = 0
+    NO_FRICTION = 1
+    NO_COUPLING = 2
+    NOT_FOUND = 3
+    # 4 was a simulated n_c1 that disagreed with the eigenvalues.
+    REVERSES_AT_N_C1 = 5
+    UNDECIDED = 6
+    FAILED = 7
+    IMPOSSIBLE = 8
+
+
+REASONS = {int(reason): reason.name.lower() for reason in Reason}
+"""The flags of the variables that tell a `Reason`."""
 
 ROWS = {CASE: "row of the table of cases", SAMPLE: "number of the sample"}
 """What the index along the rows of a table says."""
@@ -194,15 +198,12 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
 
 def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
     """`dataset`, of samples, with the probability of each number of reversals."""
-    axes = [dim for dim in dataset["status"].dims if dim != SAMPLE]
+    axes = [str(dim) for dim in dataset["status"].dims if dim != SAMPLE]
     found = probabilities(dataset)
     counts = np.arange(1, found["probability"].shape[-1] + 1)
     coordinate = xr.Variable(("count",), counts, {"long_name": "number of reversals or more"})
     return dataset.assign_coords(count=coordinate).assign(
-        {
-            name: xr.Variable((*axes, "count"), found[name], described(spec, config.units))
-            for name, spec in PROBABILITIES.items()
-        }
+        variables(PROBABILITIES, (*axes, "count"), found, config.units)
     )
 
 
@@ -247,18 +248,23 @@ def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, A
 
 def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
     """`result`, with the results of a second run of some cells (`again`) along the dimension `verified`."""
-    result = result.assign(
-        {
-            name: xr.Variable("verified", np.asarray(again[name]).astype(spec.dtype), described(spec, config.units))
-            for name, spec in VERIFIED.items()
-            if name in again
-        }
-    )
+    result = result.assign(variables(VERIFIED, ["verified"], again, config.units))
     if "verified_count_changed" in again:
         result.attrs["verified_counts_changed"] = int(again["verified_count_changed"].sum())
     if "verified_spin_difference" in again:
         result.attrs["verified_largest_spin_difference"] = float(again["verified_spin_difference"].max())
     return result
+
+
+def variables(
+    specs: Mapping[str, Variable], dims: Sequence[str], found: Mapping[str, Array], system: str = PAPER_UNITS
+) -> dict[str, xr.Variable]:
+    """Those variables of `specs` that are `found`, along common dimensions."""
+    return {
+        name: xr.Variable(dims, np.asarray(found[name]).astype(spec.dtype), described(spec, system))
+        for name, spec in specs.items()
+        if name in found
+    }
 
 
 def described(spec: Variable, system: str = PAPER_UNITS) -> dict[str, Any]:

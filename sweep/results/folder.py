@@ -7,14 +7,13 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import xarray as xr
 
 from sweep.results import netcdf
-from sweep.results.identity import Identity, require_same
+from sweep.results.identity import Identity
 from sweep.results.store import StoreError
 from sweep.results.writing import remove_unfinished, replacing
 
@@ -22,33 +21,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
 class RunFiles:
     """The files of the run `name` in `folder`."""
 
-    folder: Path
-    name: str
-
-    @property
-    def dataset(self) -> Path:
-        return self.folder / f"{self.name}.nc"
-
-    @property
-    def picture(self) -> Path:
-        return self.folder / f"{self.name}.png"
+    def __init__(self, folder: Path, name: str) -> None:
+        self.folder, self.name = folder, name
+        self.dataset, self.picture, self.configuration, self.checkpoint = (
+            folder / f"{name}.{suffix}" for suffix in ("nc", "png", "yaml", "checkpoint")
+        )
+        self.earlier = self.checkpoint / "earlier.nc"
+        """The dataset of a smaller run, kept here until that of the larger one takes its place."""
 
     def pictures(self, variables: Sequence[str]) -> dict[Path, str | None]:
         """The pictures of a run that names these variables, and what each shows; None for what the dataset is about."""
         further = {self.folder / f"{self.name}_{name}.png": name for name in variables[1:]}
         return {self.picture: variables[0] if variables else None, **further}
-
-    @property
-    def configuration(self) -> Path:
-        return self.folder / f"{self.name}.yaml"
-
-    @property
-    def checkpoint(self) -> Path:
-        return self.folder / f"{self.name}.checkpoint"
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -79,11 +66,6 @@ class RunFiles:
             path.unlink(missing_ok=True)
             os.close(handle)
 
-    @property
-    def earlier(self) -> Path:
-        """The dataset of a smaller run, kept here until that of the larger one takes its place."""
-        return self.checkpoint / "earlier.nc"
-
     def identity(self) -> Identity | None:
         """The identity of the dataset that is there; None if there is none.
 
@@ -96,19 +78,6 @@ class RunFiles:
             return None
         with netcdf.open_dataset(self.dataset, load=False) as dataset:
             return Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
-
-    def has_dataset(self, identity: Identity) -> bool:
-        """Tell whether the finished dataset of `identity` is there.
-
-        Raises
-        ------
-        StoreError
-            if the file is of another run, or not a dataset.
-        """
-        found = self.identity()
-        if found:
-            require_same(self.dataset, found, identity)
-        return bool(found)
 
     def keep_earlier(self) -> None:
         """Keep the dataset that is there while the run that enlarges it goes on."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 from sweep.grid import Array
 from sweep.results.store import Running
@@ -15,10 +15,7 @@ class Memory:
 
     def __init__(self) -> None:
         self._tiles: dict[int, dict[str, Array]] = {}
-
-    @property
-    def done(self) -> Collection[int]:
-        return self._tiles.keys()
+        self.done = self._tiles.keys()
 
     def save(self, tile: int, arrays: Mapping[str, Array]) -> None:
         self._tiles[tile] = dict(arrays)

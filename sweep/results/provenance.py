@@ -80,14 +80,10 @@ def this_cpu() -> str:
 
 def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] = ()) -> dict[str, Any]:
     """Attributes of a dataset: configuration, versions, types of CPU (by default this one's) and cost."""
-    identity = identify(config)
     return {
-        "config": identity.config,
-        "config_hash": identity.config_hash,
+        **vars(identify(config)),
         "measured": " ".join(config.measure),
         **({"pictured": " ".join(config.picture)} if config.picture else {}),
-        "source_hash": identity.source_hash,
-        "versions": identity.versions,
         **({"film_sha256": film.sha256, "film_instants": len(film.time)} if (film := config.film) else {}),
         **_brought(config),
         "integrator": _integrator_words(config),

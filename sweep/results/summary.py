@@ -9,7 +9,7 @@ import xarray as xr
 
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
-from sweep.results.dataset import EXISTS, REASONS, STATUSES
+from sweep.results.dataset import REASONS, STATUSES, Reason
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, TRAJECTORY, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
@@ -113,23 +113,22 @@ def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
 
 def _critical(dataset: xr.Dataset) -> Iterator[str]:
     """How many critical spins were found, and why the others were not."""
-    yield f"critical spins of {_count(dataset['critical_reason'], 'bodies')}"
+    yield f"critical spins of {_count(dataset['critical_reason'], 'bodies', 'no axis')}"
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
     for name in ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus"):
         source = "linear" if name.startswith("n_c1") else "simulated"
         codes, spins = dataset[f"{name}_reason"].values, dataset[f"{name}_{source}"].values
         counts = {words: int((codes == code).sum()) for code, words in REASONS.items()}
-        counts["found"] = counts.pop(REASONS[EXISTS])
+        counts["found"] = counts.pop(REASONS[Reason.EXISTS])
         ends = ", ".join(f"{count} {words.replace('_', ' ')}" for words, count in counts.items() if count)
         span = f"; {np.nanmin(spins):.4g} to {np.nanmax(spins):.4g}" if np.isfinite(spins).any() else ""
         yield f"  {name}: {ends}{span}"
 
 
-def _count(variable: xr.DataArray, of: str) -> str:
+def _count(variable: xr.DataArray, of: str, no_axis: str) -> str:
     """How many values there are, and along which axes."""
-    axes = " × ".join(f"{d} {n}" for d, n in variable.sizes.items())
-    return f"{variable.size} {of} ({axes or 'no axis'})"
+    return f"{variable.size} {of} ({' × '.join(f'{d} {n}' for d, n in variable.sizes.items()) or no_axis})"
 
 
 def _run(dataset: xr.Dataset) -> Iterator[str]:
@@ -138,30 +137,25 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         yield "no status: predictions, or a part of a run"
         return
     status = np.ravel(dataset["status"].values)
-    dims = " × ".join(f"{d} {n}" for d, n in dataset["status"].sizes.items()) or "one cell"
     ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if code in status)
-    yield f"{status.size} cells ({dims}): {ends}"
+    yield f"{_count(dataset['status'], 'cells', 'one cell')}: {ends}"
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
     if "simulated_share" in dataset.attrs:
         yield f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the others are inferred"
-    if "reversals" in dataset:
-        valid = np.isin(status, (SETTLED, TIME_LIMIT))
-        if valid.any():
-            yield _reversals(dataset, valid)
+    valid = np.isin(status, (SETTLED, TIME_LIMIT))
+    if "reversals" in dataset and valid.any():
+        yield _reversals(dataset, valid)
     if "probability" in dataset and dataset["probability"].dims == ("count",):
         yield f"probability: {', '.join(_probabilities(dataset))}"
     if "misfit" in dataset and np.isfinite(dataset["misfit"]).any():
         least = dataset["misfit"].isel(dataset["misfit"].argmin(...))
         where = ", ".join(f"{name} = {least[name].item():g}" for name in dataset["misfit"].dims)
         yield f"misfit: {least.item():.6g} at least, of {dataset.attrs.get('film_instants', '?')} instants, at {where}"
-    if "spin_error" in dataset:
-        error = np.ravel(dataset["spin_error"].values)
+    for name, words in (("spin", ", as estimated"), ("energy", "")):
+        error = dataset[f"{name}_error"].values if f"{name}_error" in dataset else np.empty(0)
         if np.isfinite(error).any():
-            yield f"spin error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}, as estimated"
-    if "energy_error" in dataset:
-        error = np.ravel(dataset["energy_error"].values)
-        yield f"energy error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}"
+            yield f"{name} error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}{words}"
     if "step_rule" in dataset:
         simulated = status != IMPOSSIBLE
         rule, step = (np.ravel(dataset[name].values)[simulated] for name in ("step_rule", "step"))

@@ -20,7 +20,7 @@ from sweep.config import Config, ConfigError
 from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.models.model import COUNT
-from sweep.results.dataset import described
+from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
 from sweep.studies.curve import Cell, Curve, Middle, Point
@@ -123,8 +123,7 @@ class Boundaries(Search):
         middles = [middle for curve in self.curves for middle in curve.middles.values()]
         head |= {"deviation": self.deviation, "middles_off": sum(not middle.confirmed for middle in middles)}
         title = f"{self.config.name}: boundaries ({self.config.model} model)"
-        own = {name: xr.Variable("point", columns[name].astype(spec.dtype), described(spec))
-               for name, spec in POINTS.items()}  # fmt: skip
+        own = variables(POINTS, ["point"], columns)
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})
         places = {name: xr.Variable("point", columns[name], self.config.described(name)) for name in self.config.axes}
         for name, axis in self.axes.items():

@@ -17,16 +17,7 @@ from sweep.models.theory.stability import SPIN_LIMIT
 from sweep.parameters import START
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
-from sweep.results.dataset import (
-    EXISTS,
-    FAILED,
-    NO_BODY,
-    NO_COUPLING,
-    NO_FRICTION,
-    NOT_FOUND,
-    REVERSES_AT_N_C1,
-    UNDECIDED,
-)
+from sweep.results.dataset import Reason
 from sweep.results.margins import Counts
 from sweep.results.store import Store
 from sweep.studies.kept import Task
@@ -112,29 +103,29 @@ class Spin:
             self.left = self.left[len(answers) :]
             self.reason = self._outwards(answers)
         if self.root and self.root.unknown:
-            self.reason = FAILED if any(each.failed for each in answers) else UNDECIDED
+            self.reason = Reason.FAILED if any(each.failed for each in answers) else Reason.UNDECIDED
         elif self.root and self.root.ended:
-            self.reason = EXISTS
+            self.reason = Reason.EXISTS
 
     def _outwards(self, answers: list[Answer]) -> int | None:
         """Go on until one reverses: then there is a bracket, or a reason why there is none."""
         for each in answers:
             if each.failed:
-                return FAILED
+                return Reason.FAILED
             self.passed.append(each)
             if each.distance > 0:
                 return self._bracketed()
         if self.left:
             return None
-        return UNDECIDED if np.isnan(self.passed[-1].distance) else NOT_FOUND
+        return Reason.UNDECIDED if np.isnan(self.passed[-1].distance) else Reason.NOT_FOUND
 
     def _bracketed(self) -> int | None:
         """Make a bracket of the last two places."""
         if len(self.passed) == 1:
-            return REVERSES_AT_N_C1
+            return Reason.REVERSES_AT_N_C1
         low, high = self.passed[-2:]
         if np.isnan(low.distance):
-            return UNDECIDED
+            return Reason.UNDECIDED
         values = {each.place: each.distance for each in (low, high)}
         smooth = {each.place: each.distance for each in self.passed if each.measured}
         self.root = Root(low.place, high.place, -np.log1p(-self.width), values, smooth)
@@ -154,7 +145,7 @@ class CriticalSpins(Search):
         self.spins = [
             Spin(body, (1.0, -1.0)[side], width, _way(abs(n_c1[body]), limit[body]))
             for side, n_c1 in enumerate(self.prediction.stability.n_c1)
-            for body in np.flatnonzero(self.first[side] == EXISTS).tolist()
+            for body in np.flatnonzero(self.first[side] == Reason.EXISTS).tolist()
         ]
         self._asked: list[tuple[Spin, list[float]]] = []
 
@@ -187,9 +178,9 @@ class CriticalSpins(Search):
         for spin in self.spins:
             at = (int(spin.sign < 0), spin.body)
             second[at] = spin.reason
-            if spin.reason == EXISTS and spin.root:
+            if spin.reason == Reason.EXISTS and spin.root:
                 inner[at], outer[at] = (spin.sign * np.exp(end) for end in (spin.root.low, spin.root.high))
-            elif spin.reason in (UNDECIDED, REVERSES_AT_N_C1):
+            elif spin.reason in (Reason.UNDECIDED, Reason.REVERSES_AT_N_C1):
                 outer[at] = spin.sign * np.exp(spin.reverses) if np.isfinite(spin.reverses) else np.nan
         arrays: dict[str, Array] = dict(dataset.predicted(self.prediction))
         arrays.pop("reversals_predicted", None)
@@ -198,7 +189,7 @@ class CriticalSpins(Search):
             arrays[f"n_c2_{side}_simulated_inner"], arrays[f"n_c2_{side}_simulated_outer"] = inner[half], outer[half]
             arrays[f"n_c1_{side}_reason"], arrays[f"n_c2_{side}_reason"] = self.first[half], second[half]
         four = np.concatenate([self.first, second])
-        arrays["critical_reason"] = four[(four != EXISTS).argmax(axis=0), np.arange(self.grid.size)]
+        arrays["critical_reason"] = four[(four != Reason.EXISTS).argmax(axis=0), np.arange(self.grid.size)]
         title = f"{self.config.name}: critical spins ({self.config.model} model)"
         return dataset.label(self.config, self.grid, arrays, {"title": title, **self.told()}).drop_vars("n0")
 
@@ -218,5 +209,5 @@ def _reasons_of_n_c1(config: Config, columns: Columns, prediction: Prediction) -
     never = np.isinf(linear)
     uncoupled = never & (np.isnan(formulas.n_c1[0]) if formulas else False)
     impossible = np.broadcast_to(config.equations.impossible(columns), linear.shape)
-    reasons = [NO_BODY, NO_FRICTION, NO_COUPLING, NOT_FOUND]
-    return np.select([impossible, unresisted, uncoupled, never], reasons, EXISTS)
+    reasons = [Reason.IMPOSSIBLE, Reason.NO_FRICTION, Reason.NO_COUPLING, Reason.NOT_FOUND]
+    return np.select([impossible, unresisted, uncoupled, never], reasons, Reason.EXISTS)

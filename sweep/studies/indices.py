@@ -14,7 +14,7 @@ from sweep.config import Config, ConfigError
 from sweep.config.distributions import chances
 from sweep.grid import Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
-from sweep.results.dataset import described
+from sweep.results.dataset import variables
 from sweep.studies.kept import Task
 from sweep.studies.search import Study, require_simulated
 from sweep.variables import Variable
@@ -77,10 +77,7 @@ class Indices(Study):
         found = with_intervals(values.reshape(len(names), len(parameters) + 2, -1), self.config.seed)
         attributes = {"title": f"{self.config.name}: Sobol indices", **self._attributes(self.grid.size, apart)}
         return xr.Dataset(
-            {
-                name: xr.Variable(("quantity", "parameter"), found[name], described(spec))
-                for name, spec in VARIABLES.items()
-            },
+            variables(VARIABLES, ("quantity", "parameter"), found),
             {"quantity": names, "parameter": parameters},
             attributes | {"trajectories": self.grid.size},
         )

@@ -18,6 +18,7 @@ from sweep.models.user.blame import blamed
 from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
+from sweep.results.identity import require_same
 from sweep.results.memory import Memory
 from sweep.results.provenance import identify
 from sweep.results.store import Store
@@ -56,7 +57,8 @@ def kept(
     with files.locked():
         if fresh:
             files.discard()
-        if files.has_dataset(identity):
+        if found := files.identity():
+            require_same(files.dataset, found, identity)
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
             files.picture.unlink(missing_ok=True)  # of a dataset that is gone

@@ -19,11 +19,10 @@ from sweep.config.values import numbers_of
 from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
-from sweep.engine.executor import UNTIL_ALL_STOP, nominal_seconds
+from sweep.engine.executor import UNTIL_ALL_STOP, Work, nominal_seconds
 from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
-from sweep.engine.work import Work
 from sweep.faults import fault_of, suggestion
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred

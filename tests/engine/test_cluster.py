@@ -225,7 +225,7 @@ def test_another_program_in_a_worker_is_refused(
     own = list(sources())
     own[changed[0]] = changed[1]
     with (
-        patched(client, "sweep.engine.cluster", "_own_sources", lambda: tuple(own)),
+        patched(client, "sweep.engine.cluster", "sources", lambda: tuple(own)),
         pytest.raises(StoreError, match=f"tcp://.*: the worker has {said}"),
     ):
         sweep.run(config, cluster=Cluster(client))

@@ -169,7 +169,7 @@ def counted(patch: pytest.MonkeyPatch) -> Counter[int]:
 
     def count(*arguments: Any, **options: Any) -> Iterator[Done]:
         for done in run_batch(*arguments, **options):
-            ran[done.tile] += 1
+            ran[done[0]] += 1
             yield done
 
     patch.setattr(local, "run_batch", count)

@@ -12,10 +12,12 @@ from support.runs import run_cells, same_numbers
 
 import sweep
 from sweep.engine import local, repeats
+from sweep.engine.executor import Work
+from sweep.engine.plan import plan
 from sweep.engine.reporter import Progress, Reporter
 from sweep.kernels import methods
 from sweep.kernels.method import FIXED, REPEAT
-from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, TIME_LIMIT, TOPPLED
+from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, SETTLED, TIME_LIMIT, TOPPLED
 
 THIN = {"a": 50.0, "b": 1.01, "c": 1.0, "delta": 0.5, "mu": 200.0, "n0": 0.05}
 """A body whose normal force rises to hundreds for a moment; with too long a step it seems to be a paradox."""
@@ -112,6 +114,29 @@ def test_one_run_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     found = run_cells([THIN], method="dopri5", t_end=1.0)
     assert int(found.status[0]) == TIME_LIMIT
     assert len(list(claims)) < 8  # more than one was made
+
+
+def test_a_failure_is_approached_beyond_where_the_cell_settled_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The slow equations may foresee a reversal of such a cell, so it goes on, and may fail then."""
+    cell = {"name": "late", "cases": {n: [v] for n, v in STANDARD.items()}, "integrator": {"method": "dopri5"}}
+    (part,), begun = plan(sweep.load_config(cell)).parts, []
+
+    def approach(model: Any, states: np.ndarray, constants: Any, stretch: np.ndarray) -> Any:  # noqa: ARG001
+        begun.append(states[:, 0])
+        return np.full(1, PARADOX), stretch
+
+    Work().run("first", part.kernel, part.images, settle=True)
+    assert part.status == SETTLED
+    table = part.kernel.table(part.images)
+    end, table["status"] = table["done"] + 1000, RUNNING
+    Work().run("on", part.kernel, part.images, most=end - 8)
+    before = part.kernel.model_states(part.images)[:, 0].copy()
+    table["status"] = RUNNING
+    Work().run("to the failure", part.kernel, part.images, most=end)
+    table["status"] = PARADOX
+    monkeypatch.setattr(repeats, "approach", approach)
+    repeats.decide_failures(part, Work(), "first")
+    np.testing.assert_array_equal(begun[0], before)
 
 
 def test_a_fixed_step_stays() -> None:

@@ -14,8 +14,8 @@ from support.runs import Stop, same_numbers
 
 import sweep
 from sweep.engine import executor, local
+from sweep.engine.executor import Work
 from sweep.engine.plan import plan
-from sweep.engine.work import Work
 from sweep.kernels.kernel import Kernel
 
 

@@ -12,9 +12,8 @@ from support.runs import in_sittings, same_numbers
 import sweep
 from sweep import ConfigError
 from sweep.engine.checks import verify
-from sweep.engine.executor import execute
+from sweep.engine.executor import Work, execute
 from sweep.engine.plan import plan
-from sweep.engine.work import Work
 from sweep.kernels import methods
 from sweep.models import MODELS
 
