@@ -16,6 +16,7 @@ from sweep.engine.executor import Work
 from sweep.engine.plan import Part
 from sweep.engine.winding import whole_blocks, wind_down
 from sweep.grid import Array
+from sweep.kernels.kernel import Kernel
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.model import MODES
@@ -56,15 +57,22 @@ def run(part: Part, work: Work, name: str, most: Array | float = np.inf) -> None
 def _until_settled(part: Part, work: Work, name: str, most: Array | float) -> None:
     """Run `part` to its ends, in place; parameters as of `Work.run`."""
     work.run(name, part.kernel, part.images, settle=part.settles, most=most)
-    if not part.settles or MODES not in part.kernel.model.offers:
+    if not part.settles:
         return
-    table = part.kernel.table(part.images)
-    early = np.flatnonzero(endings(table, table["status"] == SETTLED).reversals > 0)
+    early = too_early(part.kernel, part.images)
     if len(early):
         on = part.take(early)
         on.kernel.table(on.images)["status"] = RUNNING
         work.run(f"{name} unsettled", on.kernel, on.images, most=np.broadcast_to(most, len(part.cells))[early])
         part.images[early] = on.images
+
+
+def too_early(kernel: Kernel, images: Array) -> Array:
+    """Find the cells, by index, that have settled although it can be foreseen that their spin reverses once more."""
+    if MODES not in kernel.model.offers:
+        return np.empty(0, np.intp)
+    table = kernel.table(images)
+    return np.flatnonzero(endings(table, table["status"] == SETTLED).reversals > 0)
 
 
 def _late(part: Part) -> Array:
