@@ -151,7 +151,7 @@ name: map
 body: {a: 10.0, b: {start: 1.5, stop: 5, num: 11}, delta: 0.03}
 friction: {mu: {start: 20, stop: 80, num: 14}}
 start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
-integrator: {method: dopri5, t_end: 2500}
+integrator: {method: dopri5, t_end: 1000}
 refine: 2
 """
 
