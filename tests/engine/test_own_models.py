@@ -4,7 +4,6 @@ import os
 import shutil
 import signal
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -172,31 +171,20 @@ def test_the_process_that_compiles_gets_the_text_of_the_file(folder: Path) -> No
         assert process.wait() != 0
 
 
-@pytest.fixture(scope="module")
-def workers() -> Iterator[distributed.Client]:
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
-        ) as c,
-        distributed.Client(c) as client,
-    ):
-        yield client
-
-
-def test_workers_need_no_file(few: xr.Dataset, folder: Path, workers: distributed.Client) -> None:
+def test_workers_need_no_file(few: xr.Dataset, folder: Path, client: distributed.Client) -> None:
     """They get its text with the configuration."""
     config = load_config(folder / "pendulum.yaml", FEW)
     (folder / "pendulum.py").unlink()
-    same_numbers(sweep.run(config, cluster=Cluster(workers)), few)
+    same_numbers(sweep.run(config, cluster=Cluster(client)), few)
 
 
 LATE = 'if columns["torque"].max() > 1.1 and len(columns["torque"]) > 2:\n        raise ValueError("too much")\n    '
 
 
-def test_an_error_in_a_worker_names_its_line(folder: Path, workers: distributed.Client) -> None:
+def test_an_error_in_a_worker_names_its_line(folder: Path, client: distributed.Client) -> None:
     text = PENDULUM.replace("nothing = 0", f"{LATE}nothing = 0", 1)
     (folder / "pendulum.py").write_text(text, encoding="utf-8")
-    for cluster in (None, Cluster(workers)):
+    for cluster in (None, Cluster(client)):
         with pytest.raises(ConfigError, match=r"pendulum.py:\d+: ValueError: too much") as error:
             sweep.run(folder / "pendulum.yaml", cluster=cluster, **FEW)
         assert 'raise ValueError("too much")' in text.splitlines()[error.value.faults[0].line - 1]

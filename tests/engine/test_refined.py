@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import distributed
 import numpy as np
 import pytest
 import xarray as xr
@@ -17,7 +18,7 @@ from support.runs import in_sittings, same_numbers
 import sweep
 from sweep import ConfigError
 from sweep.engine import local
-from sweep.engine.cluster import connected
+from sweep.engine.cluster import Cluster
 from sweep.engine.local import Done
 from sweep.engine.refinement import UNKNOWN, missing, sources
 from sweep.results.dataset import STATUSES
@@ -253,9 +254,8 @@ def test_command_tells_the_share(file: Path, refined: xr.Dataset, tmp_path: Path
     assert invoke("plot", tmp_path / "out" / "map.nc", "--var", "inferred").exit_code == 0
 
 
-def test_in_other_processes(file: Path, refined: xr.Dataset) -> None:
-    with connected(1, None) as cluster:
-        same_numbers(sweep.run(file, cluster=cluster), refined)
+def test_in_other_processes(file: Path, refined: xr.Dataset, client: distributed.Client) -> None:
+    same_numbers(sweep.run(file, cluster=Cluster(client)), refined)
 
 
 @pytest.mark.parametrize(
