@@ -1,9 +1,5 @@
 """Runs of a user's model: killed and resumed, in other processes, and never from what another file has left."""
 
-import os
-import shutil
-import signal
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,10 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
-from support import ROOT, newton, nursery, own
+from support import newton, own
 from support.own import FADING, PENDULUM
 from support.runs import Stop, same_numbers
-from support.same import contents
 
 import sweep
 from sweep.config import ConfigError, load_config
@@ -24,7 +19,6 @@ from sweep.engine.cluster import Cluster
 from sweep.engine.plan import kernels
 from sweep.grid import Grid
 from sweep.kernels import build as builder
-from sweep.kernels.build import build
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models import MODELS
 from sweep.models.theory.stability import stable_ranges
@@ -80,42 +74,6 @@ def test_pictures_and_summaries_take_its_words(folder: Path) -> None:
     assert law["fading"].attrs == {"long_name": "slip velocity that halves friction", "units": "m s-1"}
     assert law["mu"].attrs == {"long_name": "coefficient of friction"}
     assert labels.words(law, "b") == "short semi-axis b"
-
-
-def strike(config: Path, out: Path, moment: str) -> bool:
-    """Start the command, and kill it at a moment; False if it ended before."""
-    process = nursery.start(["run", str(config), "--output", str(out)], out.parent / f"{out.name}.log")
-    images = out / "tippe_top.checkpoint" / "running.npz"
-    left = images.stat().st_mtime_ns if images.exists() else 0
-
-    def now() -> bool:
-        if moment == "tile":
-            return len(list(images.parent.glob("0*.npz"))) > 0
-        return images.exists() and images.stat().st_mtime_ns != left
-
-    while moment and process.is_alive() and not now():
-        time.sleep(2e-4)
-    if moment and process.is_alive():
-        os.kill(process.pid, signal.SIGKILL)
-    process.join(120)
-    killed = process.exitcode == -signal.SIGKILL
-    assert killed or process.exitcode == 0, process.log.read_text(encoding="utf-8")
-    process.close()
-    return killed
-
-
-def test_the_tippe_top_is_killed_and_goes_on_to_the_same_files(tmp_path: Path) -> None:
-    shutil.copy(ROOT / "configs" / "tippe_top.py", tmp_path)
-    config = tmp_path / "tippe_top.yaml"
-    few = "body: {eccentricity: [0.04, 0.1, 0.3]}\nstart: {n0: [2, 4, 6, 7]}\nintegrator: {t_end: 600}\n"
-    config.write_text(f"model: tippe_top.py\n{few}", encoding="utf-8")
-    build(kernels(load_config(config)))
-    assert not strike(config, tmp_path / "undisturbed", "")
-    killed = [strike(config, tmp_path / "out", moment) for moment in ("images", "images", "tile")]
-    assert sum(killed) >= 2
-    strike(config, tmp_path / "out", "")
-    assert contents(tmp_path / "out") == contents(tmp_path / "undisturbed")
-    assert xr.load_dataset(tmp_path / "out" / "tippe_top.nc")["reversals"].values.sum() > 0
 
 
 @pytest.mark.usefixtures("few")
