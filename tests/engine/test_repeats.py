@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT, STANDARD, Write, adaptive, columns, newton
+from support import ENDS, ROOT, STANDARD, Write, adaptive, columns, newton
 from support.kernels import threads
 from support.runs import run_cells, same_numbers
 
@@ -21,13 +21,6 @@ THIN = {"a": 50.0, "b": 1.01, "c": 1.0, "delta": 0.5, "mu": 200.0, "n0": 0.05}
 """A body whose normal force rises to hundreds for a moment; with too long a step it seems to be a paradox."""
 
 STIFF = STANDARD | {"mu": 1e5, "n0": 1.0}
-
-ENDS = {
-    TOPPLED: {"a": 8.36, "b": 1.73, "c": 1.54, "delta": 0.179, "mu": 178.0, "n0": 1.0, "x0": 0.573, "y0": 0.0569},
-    LIFT_OFF: {"a": 15.7, "b": 1.05, "c": 0.732, "delta": 0.171, "mu": 33.0, "n0": 1.0, "x0": -3.49, "y0": 0.576},
-    PARADOX: {"a": 13.5, "b": 2.92, "c": 1.13, "delta": -0.326, "mu": 173.0, "n0": -1.0, "x0": 0.643, "y0": 0.209},
-}
-"""Bodies and starts by how they end."""
 
 MISSES = {"b": 2.8, "mu": 100.0, "n0": 0.02}
 """The step of adams is twice too long for it."""

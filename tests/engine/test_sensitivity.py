@@ -2,14 +2,12 @@
 
 import numpy as np
 import xarray as xr
+from support import CHAOTIC
 from support.kernels import default_measures
 
 import sweep
 from sweep.kernels.status import SETTLED
 from sweep.plots import picture
-
-CHAOTIC = {"a": 39.7614, "b": 11.6247, "c": 1.19954, "delta": 0.020937, "mu": 240.612}
-CHAOTIC |= {"n0": -0.0490836, "x0": 8.26e-4, "y0": 2.26e-4}
 
 MEASURE = ["reversals", "margin", "sensitivity"]
 """The kernel is that of the configuration."""

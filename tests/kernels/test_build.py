@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from support import ROOT, Write
+from support import ENDS, ROOT, Write
 from support.kernels import kernel, threads
 from support.runs import run_cells
 
@@ -52,12 +52,10 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
 
 
 def test_what_only_failures_need_is_compiled_when_one_is_met(started: list[tuple[str, ...]]) -> None:
-    plain = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 33.0, "n0": 0.02, "x0": 0.01, "y0": 0.01}
-    lifts_off = {"a": 15.7, "b": 1.05, "c": 0.732, "delta": 0.171, "mu": 33.0, "n0": 1.0, "x0": -3.49, "y0": 0.576}
     piece = ("approach", "dopri5", "slip")
-    run_cells([plain], t_end=10.0)
+    run_cells([{}], t_end=10.0)
     assert piece not in started
-    assert run_cells([lifts_off], t_end=10.0).status == LIFT_OFF
+    assert run_cells([ENDS[LIFT_OFF]], t_end=10.0).status == LIFT_OFF
     assert piece in started
 
 
