@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from support import CHAOTIC, ROOT, STANDARD
 from support.kernels import default_measures
-from support.runs import run_cells, same_numbers
+from support.runs import lengthen, run_cells, same_numbers
 
 from sweep.engine import errors
-from sweep.kernels import methods
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.status import TIME_LIMIT
 
@@ -36,13 +35,6 @@ SPINS = np.array(
 cells = partial(run_cells, t_end=400.0, stop_when_settled=False)
 
 
-@pytest.fixture
-def long_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make the automatic steps of first runs four times as long as they should be."""
-    automatic = methods.automatic_step
-    monkeypatch.setattr(methods, "automatic_step", lambda *which: (4 * automatic(*which)[0], automatic(*which)[1]))
-
-
 @pytest.mark.parametrize(("method", "step"), [("dopri5", 0.01), ("adams", 0.05)])
 def test_estimates_are_near_true_errors(method: str, step: float) -> None:
     """The last keeps its spin in long steps of adams, but not the phase of its rattle: told fifty times too large."""
@@ -52,9 +44,9 @@ def test_estimates_are_near_true_errors(method: str, step: float) -> None:
     assert set(found.step_rule.values.tolist()) == {FIXED}
 
 
-@pytest.mark.usefixtures("long_steps")
 def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is measured."""
+    lengthen(monkeypatch, 4)
     for measure in (default_measures("slip"), ["reversals", "margin"]):
         repeated = cells([BODY], method="adams", measure=measure)
         assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8

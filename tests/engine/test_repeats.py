@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from support import ENDS, ROOT, STANDARD, Write, adaptive, columns, newton
 from support.kernels import threads
-from support.runs import run_cells, same_numbers
+from support.runs import lengthen, run_cells, same_numbers
 
 import sweep
 from sweep.engine import local, repeats
 from sweep.engine.reporter import Progress, Reporter
-from sweep.kernels import methods
 from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, TIME_LIMIT, TOPPLED
 
@@ -80,17 +79,6 @@ def test_without_a_second_look_both_would_be_paradoxes(monkeypatch: pytest.Monke
     monkeypatch.setattr(local, "decide_failures", lambda *_: None)
     found = run_cells([THIN, STIFF], method="adams", t_end=14.5)
     assert found.status.values.tolist() == [PARADOX, PARADOX]
-
-
-def lengthen(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
-    """Make the automatic steps of first runs longer than they should be."""
-    automatic = methods.automatic_step
-
-    def long_step(*which: Any) -> tuple[np.ndarray, np.ndarray]:
-        step, rule = automatic(*which)
-        return factor * step, rule
-
-    monkeypatch.setattr("sweep.engine.plan.methods.automatic_step", long_step)
 
 
 def test_one_run_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
