@@ -9,6 +9,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import distributed
 import numba
 import pytest
 import xarray as xr
@@ -73,6 +74,24 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     path = tmp_path_factory.mktemp("small") / "small.yaml"
     path.write_text(SMALL, encoding="utf-8")
     return sweep.run(path)
+
+
+@pytest.fixture(scope="session")
+def local() -> Iterator[distributed.LocalCluster]:
+    """Two worker processes, of one thread and of two."""
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
+    ) as cluster:
+        cluster.new_spec["options"]["nthreads"] = 2
+        cluster.scale(2)
+        yield cluster
+
+
+@pytest.fixture
+def client(local: distributed.LocalCluster) -> Iterator[distributed.Client]:
+    with distributed.Client(local) as client:
+        client.wait_for_workers(2)
+        yield client
 
 
 @pytest.fixture(scope="module")

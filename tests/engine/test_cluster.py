@@ -14,6 +14,7 @@ from typing import Any
 
 import dask
 import distributed
+import psutil
 import pytest
 import xarray as xr
 from support import ROOT
@@ -62,28 +63,9 @@ def by_threads(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     return contents(out)
 
 
-@pytest.fixture(scope="module")
-def local() -> Iterator[distributed.LocalCluster]:
-    """Two worker processes, of one thread and of two."""
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
-    ) as cluster:
-        cluster.new_spec["options"]["nthreads"] = 2
-        cluster.scale(2)
-        cluster.wait_for_workers(2)
-        yield cluster
-
-
-@pytest.fixture
-def client(local: distributed.LocalCluster) -> Iterator[distributed.Client]:
-    with distributed.Client(local) as client:
-        client.wait_for_workers(2)
-        yield client
-
-
 @contextmanager
-def patched(client: distributed.Client, module: str, name: str, value: Any, **which: Any) -> Iterator[None]:
-    """Another `module.name` in workers."""
+def patched(client: distributed.Client, module: str, name: str, value: Any) -> Iterator[None]:
+    """Another `module.name` in workers; those that are started anew meanwhile have their own."""
 
     def put() -> None:
         there = importlib.import_module(module)
@@ -92,11 +74,11 @@ def patched(client: distributed.Client, module: str, name: str, value: Any, **wh
 
     def put_back() -> None:
         there = importlib.import_module(module)
-        setattr(there, name, there.kept)
+        setattr(there, name, getattr(there, "kept", getattr(there, name)))
 
-    client.run(put, **which)
+    client.run(put)
     yield
-    client.run(put_back, **which)
+    client.run(put_back)
 
 
 def test_workers_of_a_scheduler_give_the_same_files(
@@ -231,19 +213,14 @@ def test_another_program_in_a_worker_is_refused(
         sweep.run(config, cluster=Cluster(client))
 
 
-def test_a_tile_that_kills_its_workers_is_reported(config: Path, client: distributed.Client, local: Any) -> None:
-    def die() -> None:
-        import sweep.engine.cluster
-
-        sweep.engine.cluster.run_batch = lambda *_: os._exit(1)
-
-    allowed, local.scheduler.allowed_failures = local.scheduler.allowed_failures, 0
-    try:
-        client.run(die)
+def test_a_tile_that_kills_its_workers_is_reported(
+    config: Path, client: distributed.Client, local: distributed.LocalCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(local.scheduler, "allowed_failures", 0)
+    with patched(client, "sweep.engine.cluster", "run_batch", lambda *_: os._exit(1)):
         with pytest.raises(StoreError, match="workers died computing it"):
             sweep.run(config, cluster=Cluster(client))
-    finally:
-        local.scheduler.allowed_failures = allowed
+        client.wait_for_workers(2)
 
 
 def command(config: Path, out: Path) -> list[str]:
@@ -269,19 +246,6 @@ def test_local_processes_give_the_same_files(config: Path, tmp_path: Path, by_th
     assert contents(tmp_path) == by_threads
 
 
-def in_session(leader: int) -> list[str]:
-    """Command lines of the processes of a session."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            state, *_, session = (folder / "stat").read_text().rpartition(")")[2].split()[:4]
-            if int(session) == leader and state != "Z":
-                found.append((folder / "cmdline").read_text().replace("\0", " "))
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-    return found
-
-
 @pytest.mark.campaign
 @pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "terminal"])
 def test_ctrl_c_ends_all_processes(
@@ -295,15 +259,14 @@ def test_ctrl_c_ends_all_processes(
             assert process.poll() is None
             time.sleep(0.05)
         time.sleep(1)
-        assert len(in_session(process.pid)) > 2
+        others = psutil.Process(process.pid).children(recursive=True)
+        assert len(others) > 1
         send(process.pid, signal.SIGINT)
         _, said = process.communicate(timeout=60)
         assert process.returncode == 130
     assert "the same command resumes the run" in said
     assert "Traceback" not in said
-    patience = time.monotonic() + 60
-    while left := in_session(process.pid):
-        assert time.monotonic() < patience, left
+    assert not psutil.wait_procs(others, timeout=60)[1]
     sweep.run(config, tmp_path, fresh=True)
     assert contents(tmp_path) == by_threads
 

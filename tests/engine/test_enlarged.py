@@ -49,7 +49,7 @@ MEASURED = "measure: [reversals, {reversal_times: 3}]\n"
 
 
 def test_a_run_grows_whose_measurement_has_a_setting(write: Write, tmp_path: Path) -> None:
-    first, more = (text.replace("{t_end", "{method: dopri5, t_end") + MEASURED for text in (ONE, MORE))
+    first, more = (text.replace("{t_end", "{method: adams, t_end") + MEASURED for text in (ONE, MORE))
     found, (note,) = grown(write, tmp_path / "out", first, more)
     assert note.startswith("12 of 24 cells are taken over")
     same_numbers(found, sweep.run(write(more)))

@@ -5,34 +5,25 @@ from functools import partial
 
 import numpy as np
 import pytest
-from support import ROOT, STANDARD
+from support import CHAOTIC, ROOT, STANDARD
 from support.kernels import default_measures
-from support.runs import run_cells, same_numbers
+from support.runs import lengthen, run_cells, same_numbers
 
 from sweep.engine import errors
-from sweep.kernels import methods
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.status import TIME_LIMIT
 
 BODY = {"b": 2.8, "mu": 100.0, "n0": 0.02}
 
-CHAOTIC = {"a": 39.7614, "b": 11.6247, "c": 1.19954, "delta": 0.020937, "mu": 240.612}
-CHAOTIC |= {"n0": -0.0490836, "x0": 8.26e-4, "y0": 2.26e-4}
 
 WIDE = [
-    {"a": 17.9935, "b": 7.78145, "c": 1.51196, "delta": -0.46953, "mu": 70.2, "n0": -0.04347, "x0": -1.28, "y0": 0.72},
-    {
-        "a": 8.29799,
-        "b": 1.63538,
-        "c": 1.479,
-        "delta": -0.3023,
-        "mu": 4.51968,
-        "n0": -0.158858,
-        "x0": 0.074,
-        "y0": -0.06,
-    },
-    {"a": 6.46, "b": 3.61, "c": 1.31, "delta": -0.0836, "mu": 45.0, "n0": -0.0555, "x0": -0.387, "y0": -0.104},
-    {"a": 3.31, "b": 2.49, "c": 1.38, "delta": 0.321, "mu": 0.306, "n0": -0.059, "x0": 0.277, "y0": 0.0655},
+    dict(zip(STANDARD, row, strict=True))
+    for row in [
+        (17.9935, 7.78145, 1.51196, -0.46953, 70.2, -0.04347, -1.28, 0.72),
+        (8.29799, 1.63538, 1.479, -0.3023, 4.51968, -0.158858, 0.074, -0.06),
+        (6.46, 3.61, 1.31, -0.0836, 45.0, -0.0555, -0.387, -0.104),
+        (3.31, 2.49, 1.38, 0.321, 0.306, -0.059, 0.277, 0.0655),
+    ]
 ]
 
 SPINS = np.array(
@@ -44,13 +35,6 @@ SPINS = np.array(
 cells = partial(run_cells, t_end=400.0, stop_when_settled=False)
 
 
-@pytest.fixture
-def long_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make the automatic steps of first runs four times as long as they should be."""
-    automatic = methods.automatic_step
-    monkeypatch.setattr(methods, "automatic_step", lambda *which: (4 * automatic(*which)[0], automatic(*which)[1]))
-
-
 @pytest.mark.parametrize(("method", "step"), [("dopri5", 0.01), ("adams", 0.05)])
 def test_estimates_are_near_true_errors(method: str, step: float) -> None:
     """The last keeps its spin in long steps of adams, but not the phase of its rattle: told fifty times too large."""
@@ -60,9 +44,9 @@ def test_estimates_are_near_true_errors(method: str, step: float) -> None:
     assert set(found.step_rule.values.tolist()) == {FIXED}
 
 
-@pytest.mark.usefixtures("long_steps")
 def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is measured."""
+    lengthen(monkeypatch, 4)
     for measure in (default_measures("slip"), ["reversals", "margin"]):
         repeated = cells([BODY], method="adams", measure=measure)
         assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import ROOT, SMALL, nursery
+from support.runs import same_numbers
 from support.same import contents, without_clock
 
 TEXT = SMALL + "verify: 0.3\n"
@@ -89,15 +90,8 @@ def undisturbed(first: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def values(first: Path) -> xr.Dataset:
+    """Its numbers, bit for bit in a file that is cut otherwise, for its tiles are of another size."""
     return xr.load_dataset(first / "small.nc")
-
-
-def same_values(path: Path, values: xr.Dataset) -> None:
-    """Every variable bit for bit; the file is cut otherwise, for its tiles are of another size."""
-    found = xr.load_dataset(path)
-    assert set(found.variables) == set(values.variables)
-    for name, variable in values.variables.items():
-        assert found[name].values.tobytes() == variable.values.tobytes(), name
 
 
 class Watch:
@@ -224,16 +218,26 @@ verify: 0.3
 """
 """Any body and any law of friction."""
 
+OWN = f"""\
+name: small
+model: {ROOT / "configs" / "tippe_top.py"}
+body: {{eccentricity: [0.04, 0.1, 0.3]}}
+start: {{n0: [2, 4, 6, 7]}}
+integrator: {{t_end: 200}}
+"""
+"""A model that a user brings."""
+
 
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
         (TEXT, SOME),
         (VARIANT, Counter(kernel=1, dataset=1)),
+        (OWN, Counter(kernel=1, tile=1)),
         pytest.param(TEXT, MANY, marks=pytest.mark.campaign),
         pytest.param(VARIANT, Counter(kernel=4, checkpoint=4, tile=4), marks=pytest.mark.campaign),
     ],
-    ids=["some", "some-variant", "many", "many-variant"],
+    ids=["some", "some-variant", "some-own", "many", "many-variant"],
 )
 def test_killed_at_any_moment(tmp_path: Path, text: str, wanted: Counter[str]) -> None:
     config = tmp_path / "small.yaml"
@@ -300,7 +304,7 @@ def test_killed_and_interrupted_from_the_shell(runs: Runs, values: xr.Dataset) -
     assert [path.name for path in runs.out.iterdir()] == ["small.checkpoint"]
     done = subprocess.run([*command, "--fresh", "--quiet"], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    same_values(runs.out / "small.nc", values)
+    same_numbers(xr.load_dataset(runs.out / "small.nc"), values)
 
 
 def refused(result: tuple[int, str], *words: str) -> None:
@@ -340,7 +344,7 @@ def test_a_full_disk_is_reported(runs: Runs, values: xr.Dataset) -> None:
         left = runs.out.parent / f"{runs.out.name}-{i}"
         assert not list(left.rglob(".*"))
         for path in left.glob("*.nc"):
-            same_values(path, values)
+            same_numbers(xr.load_dataset(path), values)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Sweeps in which some bodies cannot be: their cells have a status, cost nothing and harm no neighbour."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,9 +33,16 @@ integrator: {t_end: 300}
 GONE = np.array([[True, False, True], [False, False, True], [False, False, True]])
 
 
-@pytest.fixture
-def edge(write: Write) -> xr.Dataset:
-    return sweep.run(write(TEXT)).transpose("b", "offset", "n0", ...)
+def swept(*given: Any, **settings: Any) -> xr.Dataset:
+    """A run, its axes in the order of `GONE`."""
+    return sweep.run(*given, **settings).transpose("b", "offset", "n0", ...)
+
+
+@pytest.fixture(scope="module")
+def edge(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    path = tmp_path_factory.mktemp("edge") / "small.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return swept(path)
 
 
 def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> None:
@@ -56,7 +64,7 @@ def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> Non
 
 
 def test_neighbours_do_not_notice(edge: xr.Dataset, write: Write) -> None:
-    alone = sweep.run(write(TEXT), b=[3.0, 5.0], offset=[0.0, 0.3]).transpose("b", "offset", "n0", ...)
+    alone = swept(write(TEXT), b=[3.0, 5.0], offset=[0.0, 0.3])
     same_numbers(edge.sel(b=[3.0, 5.0], offset=[0.0, 0.3]), alone)
 
 
@@ -76,7 +84,7 @@ def test_tiles_of_impossible_bodies_and_a_resumed_run(
     with pytest.raises(KeyboardInterrupt):
         sweep.run(write(TEXT), tmp_path, reporter=Stop(3))
     reporter = Stop(10**6)
-    found = sweep.run(write(TEXT), tmp_path, reporter=reporter).transpose("b", "offset", "n0", ...)
+    found = swept(write(TEXT), tmp_path, reporter=reporter)
     same_numbers(found, edge)
     assert (reporter.seen[-1].done, reporter.seen[-1].failed) == (18, 0)
 
@@ -84,7 +92,7 @@ def test_tiles_of_impossible_bodies_and_a_resumed_run(
 def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_path: Path) -> None:
     sweep.run(write(TEXT), tmp_path, offset=[0.0, 0.3])
     reporter = Stop(10**6)
-    found = sweep.run(write(TEXT), tmp_path, reporter=reporter).transpose("b", "offset", "n0", ...)
+    found = swept(write(TEXT), tmp_path, reporter=reporter)
     same_numbers(found, edge)
     assert "12 of 18 cells are taken over" in reporter.notes[0]
     assert found.attrs["impossible"] == edge.attrs["impossible"]

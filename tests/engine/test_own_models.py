@@ -1,10 +1,5 @@
 """Runs of a user's model: killed and resumed, in other processes, and never from what another file has left."""
 
-import os
-import shutil
-import signal
-import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,10 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
-from support import ROOT, newton, nursery, own
+from support import newton, own
 from support.own import FADING, PENDULUM
 from support.runs import Stop, same_numbers
-from support.same import contents
 
 import sweep
 from sweep.config import ConfigError, load_config
@@ -25,7 +19,6 @@ from sweep.engine.cluster import Cluster
 from sweep.engine.plan import kernels
 from sweep.grid import Grid
 from sweep.kernels import build as builder
-from sweep.kernels.build import build
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models import MODELS
 from sweep.models.theory.stability import stable_ranges
@@ -83,42 +76,6 @@ def test_pictures_and_summaries_take_its_words(folder: Path) -> None:
     assert labels.words(law, "b") == "short semi-axis b"
 
 
-def strike(config: Path, out: Path, moment: str) -> bool:
-    """Start the command, and kill it at a moment; False if it ended before."""
-    process = nursery.start(["run", str(config), "--output", str(out)], out.parent / f"{out.name}.log")
-    images = out / "tippe_top.checkpoint" / "running.npz"
-    left = images.stat().st_mtime_ns if images.exists() else 0
-
-    def now() -> bool:
-        if moment == "tile":
-            return len(list(images.parent.glob("0*.npz"))) > 0
-        return images.exists() and images.stat().st_mtime_ns != left
-
-    while moment and process.is_alive() and not now():
-        time.sleep(2e-4)
-    if moment and process.is_alive():
-        os.kill(process.pid, signal.SIGKILL)
-    process.join(120)
-    killed = process.exitcode == -signal.SIGKILL
-    assert killed or process.exitcode == 0, process.log.read_text(encoding="utf-8")
-    process.close()
-    return killed
-
-
-def test_the_tippe_top_is_killed_and_goes_on_to_the_same_files(tmp_path: Path) -> None:
-    shutil.copy(ROOT / "configs" / "tippe_top.py", tmp_path)
-    config = tmp_path / "tippe_top.yaml"
-    few = "body: {eccentricity: [0.04, 0.1, 0.3]}\nstart: {n0: [2, 4, 6, 7]}\nintegrator: {t_end: 600}\n"
-    config.write_text(f"model: tippe_top.py\n{few}", encoding="utf-8")
-    build(kernels(load_config(config)))
-    assert not strike(config, tmp_path / "undisturbed", "")
-    killed = [strike(config, tmp_path / "out", moment) for moment in ("images", "images", "tile")]
-    assert sum(killed) >= 2
-    strike(config, tmp_path / "out", "")
-    assert contents(tmp_path / "out") == contents(tmp_path / "undisturbed")
-    assert xr.load_dataset(tmp_path / "out" / "tippe_top.nc")["reversals"].values.sum() > 0
-
-
 @pytest.mark.usefixtures("few")
 @pytest.mark.parametrize(
     "more", [{}, {"torque": [0.5, 1.0, 1.2, 1.4, 1.5]}, {"t_end": 70}], ids=["same", "axis", "longer"]
@@ -165,42 +122,39 @@ def test_kernels_depend_on_what_the_file_says_not_on_where_it_lies(folder: Path)
 def test_the_process_that_compiles_gets_the_text_of_the_file(folder: Path) -> None:
     config = load_config(folder / "pendulum.yaml")
     (folder / "pendulum.py").unlink()
-    origin, key = config.origin, config.equations.key
-    for piece in (("kernel", "dopri5", key, "reversals"), ("approach", "dopri5", key)):
-        with builder._start(piece, origin) as process:
-            assert process.wait() == 0
-    with builder._start(("approach", "dopri5", key), replace(origin, text="1 / 0")) as process:
+    piece = ("approach", "dopri5", config.equations.key)
+    with builder._start(piece, config.origin) as process:
+        assert process.wait() == 0
+    with builder._start(piece, replace(config.origin, text="1 / 0")) as process:
         assert process.wait() != 0
 
 
-@pytest.fixture(scope="module")
-def workers() -> Iterator[distributed.Client]:
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
-        ) as c,
-        distributed.Client(c) as client,
-    ):
-        yield client
-
-
-def test_workers_need_no_file(few: xr.Dataset, folder: Path, workers: distributed.Client) -> None:
+def test_workers_need_no_file(few: xr.Dataset, folder: Path, client: distributed.Client) -> None:
     """They get its text with the configuration."""
     config = load_config(folder / "pendulum.yaml", FEW)
     (folder / "pendulum.py").unlink()
-    same_numbers(sweep.run(config, cluster=Cluster(workers)), few)
+    same_numbers(sweep.run(config, cluster=Cluster(client)), few)
 
 
 LATE = 'if columns["torque"].max() > 1.1 and len(columns["torque"]) > 2:\n        raise ValueError("too much")\n    '
 
+ROLLING = PENDULUM.replace("(rate, turning, 2 / 3)", "(-angle * (1 + rate**2), 0.0, -phase)")
+ROLLING = ROLLING.replace("SPIN})", "SPIN, LINEAR}), upright=inline(lambda spin: (0.0, spin, 0.0))")
+ROLLING = ROLLING.replace("import COUNT", "import LINEAR, COUNT").replace("y[1], 0.0", "y[1], 0.5 * y[0] * y[0]")
+ROLLING = ROLLING.replace('columns["angle"], nothing,', 'columns["angle"], columns["torque"],')
+ROLLING = ROLLING.replace("nothing = 0", f"{LATE}nothing = 0", 1)
+"""A rattle that decays as exp(-2 t) in energy, below a spin that it could change by its root at most.
 
-def test_an_error_in_a_worker_names_its_line(folder: Path, workers: distributed.Client) -> None:
-    text = PENDULUM.replace("nothing = 0", f"{LATE}nothing = 0", 1)
-    (folder / "pendulum.py").write_text(text, encoding="utf-8")
-    for cluster in (None, Cluster(workers)):
+It fails late at high spins: one text for two tests, for each text takes a kernel of its own.
+"""
+
+
+def test_an_error_in_a_worker_names_its_line(folder: Path, client: distributed.Client) -> None:
+    (folder / "pendulum.py").write_text(ROLLING, encoding="utf-8")
+    for cluster in (None, Cluster(client)):
         with pytest.raises(ConfigError, match=r"pendulum.py:\d+: ValueError: too much") as error:
             sweep.run(folder / "pendulum.yaml", cluster=cluster, **FEW)
-        assert 'raise ValueError("too much")' in text.splitlines()[error.value.faults[0].line - 1]
+        assert 'raise ValueError("too much")' in ROLLING.splitlines()[error.value.faults[0].line - 1]
 
 
 @pytest.mark.parametrize(
@@ -253,12 +207,7 @@ def test_its_body_settles_as_one_of_ours_and_reverses_no_more(folder: Path) -> N
 
 
 def test_a_model_with_an_upright_spin_settles_by_the_linear_theory(folder: Path) -> None:
-    """A rattle that decays as exp(-2 t) in energy, below a spin that it could change by its root at most."""
-    text = PENDULUM.replace("(rate, turning, 2 / 3)", "(-angle * (1 + rate**2), 0.0, -phase)")
-    text = text.replace("SPIN})", "SPIN, LINEAR}), upright=inline(lambda spin: (0.0, spin, 0.0))")
-    text = text.replace("import COUNT", "import LINEAR, COUNT").replace("y[1], 0.0", "y[1], 0.5 * y[0] * y[0]")
-    text = text.replace('columns["angle"], nothing,', 'columns["angle"], columns["torque"],')
-    (folder / "pendulum.py").write_text(text, encoding="utf-8")
+    (folder / "pendulum.py").write_text(ROLLING, encoding="utf-8")
     ends = sweep.run(folder / "pendulum.yaml", torque=[0.0, 1e-4, 0.1, 0.5], damping=0.5, t_end=60)
     assert ends["status"].values.ravel().tolist() == [TIME_LIMIT, SETTLED, SETTLED, SETTLED]
     _, slow, middle, fast = ends["t_stop"].values.ravel()

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import distributed
 import numpy as np
 import pytest
 import xarray as xr
@@ -17,7 +18,7 @@ from support.runs import in_sittings, same_numbers
 import sweep
 from sweep import ConfigError
 from sweep.engine import local
-from sweep.engine.cluster import connected
+from sweep.engine.cluster import Cluster
 from sweep.engine.local import Done
 from sweep.engine.refinement import UNKNOWN, missing, sources
 from sweep.results.dataset import STATUSES
@@ -151,7 +152,7 @@ name: map
 body: {a: 10.0, b: {start: 1.5, stop: 5, num: 11}, delta: 0.03}
 friction: {mu: {start: 20, stop: 80, num: 14}}
 start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
-integrator: {method: dopri5, t_end: 2500}
+integrator: {method: dopri5, t_end: 1000}
 refine: 2
 """
 
@@ -253,28 +254,22 @@ def test_command_tells_the_share(file: Path, refined: xr.Dataset, tmp_path: Path
     assert invoke("plot", tmp_path / "out" / "map.nc", "--var", "inferred").exit_code == 0
 
 
-def test_in_other_processes(file: Path, refined: xr.Dataset) -> None:
-    with connected(1, None) as cluster:
-        same_numbers(sweep.run(file, cluster=cluster), refined)
+def test_in_other_processes(file: Path, refined: xr.Dataset, client: distributed.Client) -> None:
+    same_numbers(sweep.run(file, cluster=Cluster(client)), refined)
 
 
 @pytest.mark.parametrize(
     ("text", "place", "said"),
     [
-        (MAP.replace("refine: 2", "refine: -1"), "6:9: refine", "must be a whole number >= 0 and <= 24, not -1"),
-        (MAP.replace("refine: 2", "refine: 1.5"), "6:9: refine", "must be a whole number >= 0 and <= 24, not 1.5"),
-        (MAP.replace("refine: 2", "refine: 25"), "6:9: refine", "and <= 24, not 25"),
+        *((MAP.replace("refine: 2", f"refine: {n}"), "6:9: refine", f"must be a whole number >= 0 and <= 24, not {n}")
+          for n in (-1, 1.5, 25)),
         (MAP + "verify: 0.1\n", "7:1: verify", "cannot be combined with refine; set it to 0"),
         (MAP + "measure: [energy_error]\n", "7:1: measure", "must have reversals, on which refine depends"),
         (MAP + "model: analytic\n", "6:1: refine", "is a formula; set it to 0"),
-        (
-            MAP.replace("num: 11", "num: 5000").replace("num: 14", "num: 5000"),
-            "6:1: refine",
-            "keep to 16777216",
-        ),
+        (MAP.replace("num: 1", "num: 500"), "6:1: refine", "keep to 16777216"),
         ("cases: c.csv\nrefine: 1\n", "2:1: refine", "cannot be combined with cases, which have no neighbours"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_refined(text: str, place: str, said: str, write: Write, tmp_path: Path) -> None:
     (tmp_path / "c.csv").write_text("mu\n60\n", encoding="utf-8")
     with pytest.raises(ConfigError) as error:

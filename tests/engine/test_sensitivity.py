@@ -2,14 +2,15 @@
 
 import numpy as np
 import xarray as xr
+from support import CHAOTIC
 from support.kernels import default_measures
 
 import sweep
 from sweep.kernels.status import SETTLED
 from sweep.plots import picture
 
-CHAOTIC = {"a": 39.7614, "b": 11.6247, "c": 1.19954, "delta": 0.020937, "mu": 240.612}
-CHAOTIC |= {"n0": -0.0490836, "x0": 8.26e-4, "y0": 2.26e-4}
+MEASURE = ["reversals", "margin", "sensitivity"]
+"""The kernel is that of the configuration."""
 
 
 def run(**settings: object) -> xr.Dataset:
@@ -17,14 +18,14 @@ def run(**settings: object) -> xr.Dataset:
 
 
 def test_a_chaotic_cell_has_a_range_of_counts() -> None:
-    found = run(**CHAOTIC, t_end=10_000, measure=["reversals", "sensitivity"])
+    found = run(**CHAOTIC, t_end=10_000, measure=MEASURE)
     assert int(found.sensitive) == 1
     assert int(found.reversals_low) <= int(found.reversals) <= int(found.reversals_high)
     assert int(found.reversals_low) < int(found.reversals_high)
 
 
 def test_the_papers_counts_are_firm_and_unmarked() -> None:
-    found = run(b=[2.0, 2.5, 3.0, 4.0], mu=[60, 70, 80, 100], n0=0.05, t_end=9000, measure=["reversals", "sensitivity"])
+    found = run(b=[2.0, 2.5, 3.0, 4.0], mu=[60, 70, 80, 100], n0=0.05, t_end=9000, measure=MEASURE)
     assert not found.sensitive.any()
     xr.testing.assert_equal(found.reversals_low.drop_attrs(), found.reversals_high.drop_attrs())
 

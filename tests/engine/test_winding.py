@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support import columns
 
 import sweep
 from sweep.config import load_config
@@ -12,13 +13,10 @@ from sweep.kernels.status import RUNNING, SETTLED
 from sweep.models.stiff.precession import vertical_spin
 from sweep.models.stiff.slip import Constants, slow
 
-BODY = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 60.0, "n0": 0.05, "x0": 0.01, "y0": 0.01}
-
 
 def test_a_pause_between_blocks_changes_no_bit() -> None:
     """Within a block the history of adams would go on without the state."""
-    cells = {name: [value] for name, value in {**BODY, "b": 9.8}.items()}
-    (part,) = plan(load_config({"name": "round", "cases": cells, "integrator": {"method": "adams"}})).parts
+    (part,) = plan(load_config({"name": "round", "cases": columns(b=9.8), "integrator": {"method": "adams"}})).parts
     paused, kernel = part.take(np.arange(1)), part.kernel
     for steps in (100.0, 1000.0, 5000.0):
         table = kernel.table(paused.images)
@@ -33,20 +31,20 @@ def test_a_pause_between_blocks_changes_no_bit() -> None:
 
 def test_a_rolling_rattle_turns_the_vertical_spin_by_its_product_of_inertia_alone() -> None:
     """d (M·u)/dt = A12 (ω1² - ω2²) - (A11 - A22) ω1 ω2, to the third power of the rattle."""
-    columns = {name: np.full(3, value) for name, value in {**BODY, "b": 8.0, "delta": 0.3}.items()}
-    p, size = Constants.of(columns), 1e-4 * np.array([1.0, 0.5, 0.25])
+    body, size = columns(b=8.0, delta=[0.3] * 3), 1e-4 * np.array([1.0, 0.5, 0.25])
+    p = Constants.of(body)
     states = np.array([0.3 * size, -0.7 * size, 5.0 * size, 2.0 * size, np.zeros(3), 0.0 * size, 0.0 * size])
     later, _ = slow(*states, p)
     after = states.copy()
     after[:5] += 1e-6 * np.array(later)
     gain = (vertical_spin(after, p)[0] - vertical_spin(states, p)[0]) * p.I3 / 1e-6
-    w1, w2 = states[2] / (p.I1 + columns["c"] ** 2), states[3] / (p.I2 + columns["c"] ** 2)
+    w1, w2 = states[2] / (p.I1 + body["c"] ** 2), states[3] / (p.I2 + body["c"] ** 2)
     np.testing.assert_allclose(gain, p.A12 * (w1**2 - w2**2) - (p.A11 - p.A22) * w1 * w2, rtol=1e-3)
 
 
 def test_upright_spin_has_nothing_to_lose() -> None:
-    columns = {name: np.full(2, value) for name, value in BODY.items()}
-    p, spin = Constants.of(columns), np.array([0.05, -0.02])
+    spin = np.array([0.05, -0.02])
+    p = Constants.of(columns(n0=spin))
     states = np.zeros((7, 2))
     states[4] = -p.I3 * spin
     left, total = vertical_spin(states, p)

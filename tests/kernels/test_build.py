@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
 import pytest
-from support import ROOT, Write
+from support import ENDS, ROOT, Write
 from support.kernels import kernel, threads
 from support.runs import run_cells
 
@@ -51,12 +52,10 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
 
 
 def test_what_only_failures_need_is_compiled_when_one_is_met(started: list[tuple[str, ...]]) -> None:
-    plain = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 33.0, "n0": 0.02, "x0": 0.01, "y0": 0.01}
-    lifts_off = {"a": 15.7, "b": 1.05, "c": 0.732, "delta": 0.171, "mu": 33.0, "n0": 1.0, "x0": -3.49, "y0": 0.576}
     piece = ("approach", "dopri5", "slip")
-    run_cells([plain], t_end=10.0)
+    run_cells([{}], t_end=10.0)
     assert piece not in started
-    assert run_cells([lifts_off], t_end=10.0).status == LIFT_OFF
+    assert run_cells([ENDS[LIFT_OFF]], t_end=10.0).status == LIFT_OFF
     assert piece in started
 
 
@@ -112,20 +111,6 @@ def test_measurements_without_a_place_in_the_kernel_share_it() -> None:
         assert name("reversals", other) != alone
 
 
-def _alive(pid: int) -> bool:
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
-    except FileNotFoundError:
-        return False
-    return status != "Z"
-
-
-def _children(pid: int) -> list[int]:
-    listed = Path(f"/proc/{pid}/task/{pid}/children")
-    return list(map(int, listed.read_text(encoding="utf-8").split())) if listed.exists() else []
-
-
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="asks Linux for the children of a process")
 @pytest.mark.parametrize(("with_signal", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
 def test_processes_end_with_the_one_that_started_them(
     with_signal: signal.Signals, code: int, write: Write, tmp_path: Path
@@ -134,15 +119,14 @@ def test_processes_end_with_the_one_that_started_them(
     command = [sys.executable, "-m", "sweep", "run", write(AUTO), "--output", tmp_path / "out"]
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     with subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True) as process:
-        while not (children := _children(process.pid)):
+        while not (children := psutil.Process(process.pid).children()):
             assert process.poll() is None
             time.sleep(0.01)
         process.send_signal(with_signal)
         assert process.stderr
         told = process.stderr.read().splitlines()
         assert process.wait() == code
-    while any(map(_alive, children)):
-        time.sleep(0.01)
+    assert not psutil.wait_procs(children, timeout=60)[1]
     assert list((tmp_path / "cache").rglob("*.nbc")) == []  # they were ended, and have not come to their ends
     assert len(told) == (2 if with_signal == signal.SIGINT else 1), told
     assert told[0].startswith("compiling")

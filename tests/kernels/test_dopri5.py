@@ -60,8 +60,8 @@ def test_windows_are_averages_of_the_ripple_free_spin() -> None:
     """Count, time and mean against the same definition applied to a finely sampled trajectory."""
     t_end, body = 800.0, columns(mu=75.0)
     table = images(DOPRI, 0.01, t_end, mu=75.0)
-    tau, times = of(table, "period")[0], np.arange(0, t_end, 0.02)
-    y = adaptive.motion(body, times, rtol=1e-11, atol=1e-15)[:STATES]
+    tau, times = of(table, "period")[0], np.arange(0, t_end, 0.05)
+    y = adaptive.motion(body, times, rtol=1e-9, atol=1e-13)[:STATES]
     p = stiff_slip.Constants.of(body)
     u1, u2, M1, M2, *_ = stiff_slip.momentum(y, take(p, 0))
     (K11, K12), (K21, K22) = numerical_form(body)

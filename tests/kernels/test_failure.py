@@ -2,20 +2,13 @@
 
 import numpy as np
 import pytest
-from support import columns, newton
+from support import ENDS, columns, newton
 
 from sweep.kernels.failure import approach
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import Array, stack
-
-ENDS = {
-    LIFT_OFF: {"a": 18.6, "b": 1.7, "c": 0.66, "delta": 0.269, "mu": 3.85, "n0": 2.0, "x0": -4.47, "y0": 0.798},
-    PARADOX: {"a": 15.6, "b": 1.38, "c": 1.3, "delta": 0.15, "mu": 17.3, "n0": 1.0, "x0": 0.893, "y0": 0.236},
-    TOPPLED: {"a": 12.7, "b": 1.61, "c": 1.53, "delta": -0.0446, "mu": 0.237, "n0": -1.0, "x0": -3.29, "y0": -0.38},
-}
-"""Bodies and starts by how they end, all within t = 2.5."""
 
 
 def met(body: dict[str, np.ndarray], stretch: float) -> tuple[Array, Array]:

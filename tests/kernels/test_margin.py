@@ -23,11 +23,12 @@ def averaged(one: xr.Dataset) -> np.ndarray:
     return np.convolve(spin[np.isfinite(spin)], np.full(width, 1 / width), "valid")
 
 
-@pytest.mark.parametrize(("mu", "t_end"), [(66.0, 1e5), (71.0, 2e4), (84.0, 2e4)])
+@pytest.mark.parametrize(("mu", "t_end"), [(66.0, 5e4), (71.0, 2e4), (84.0, 2e4)])
 def test_margins_are_extremes_of_the_averaged_spin(mu: float, t_end: float) -> None:
     """The sweep leaves the first two before their nearest approach; the trajectories go on."""
     swept = sweep.run(SCENE, mu=mu)
-    spin = averaged(sweep.trajectory(SCENE, mu=mu, t_end=t_end, every=1.0).isel(trajectory=0))
+    one = sweep.trajectory(SCENE, mu=mu, t_end=t_end, every=2.0, estimate_errors=False)
+    spin = averaged(one.isel(trajectory=0))
     (changes,) = np.nonzero(spin[1:] * spin[:-1] < 0)
     assert len(changes) == int(swept.reversals)
     arc = np.abs(spin[changes[-1] + 1 :])

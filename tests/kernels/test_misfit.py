@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import distributed
 import numpy as np
 import pytest
 from support import Write, adaptive, columns
@@ -12,7 +13,7 @@ from support.runs import in_sittings, same_numbers
 
 import sweep
 from sweep.config import ConfigError
-from sweep.engine.cluster import connected
+from sweep.engine.cluster import Cluster
 from sweep.explorer.setup import usable
 from sweep.explorer.slices import Source
 from sweep.models.ladder import slip
@@ -87,7 +88,9 @@ def test_a_trajectory_is_followed_to_the_end_of_the_film(write: Write) -> None:
     assert ((found.t_stop >= 1000) & (found.t_stop < 20000)).all()
 
 
-def test_numbers_do_not_depend_on_threads_workers_or_interruptions(config: Path, tmp_path: Path) -> None:
+def test_numbers_do_not_depend_on_threads_workers_or_interruptions(
+    config: Path, tmp_path: Path, client: distributed.Client
+) -> None:
     with threads(1):
         alone = sweep.run(config)
     with threads(2):
@@ -95,8 +98,7 @@ def test_numbers_do_not_depend_on_threads_workers_or_interruptions(config: Path,
     again, interruptions, _ = in_sittings(1, config, tmp_path / "out")
     assert interruptions
     same_numbers(again, alone)
-    with connected(2, None) as cluster:
-        same_numbers(sweep.run(config, cluster=cluster), alone)
+    same_numbers(sweep.run(config, cluster=Cluster(client)), alone)
 
 
 def test_another_film_is_another_run(write: Write, config: Path, tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """The times of the first K reversals: the measurement that proves the layout, from the kernel to the file."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -22,10 +24,14 @@ EXPECTED = {60: [168.7, 720.1, 2379.9], 75: [167.3, 639.1, 1590.4], 100: [165.8,
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    path = tmp_path_factory.mktemp("times") / "times.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return sweep.run(path, path.parent / "out")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("times")
+
+
+@pytest.fixture(scope="module")
+def found(out: Path) -> xr.Dataset:
+    (out / "times.yaml").write_text(TEXT, encoding="utf-8")
+    return sweep.run(out / "times.yaml", out)
 
 
 @pytest.mark.parametrize("mu", EXPECTED)
@@ -46,15 +52,12 @@ def test_reversals_that_have_not_happened_have_no_time(write: Write) -> None:
     assert int(early.reversals.min()) == 1
 
 
-def test_the_dataset_has_a_dimension_for_them(found: xr.Dataset) -> None:
+def test_the_dataset_has_a_dimension_for_them(found: xr.Dataset, out: Path) -> None:
     times = found.reversal_times
     assert times.dims == ("mu", "reversal")
     assert list(times.reversal) == [1, 2, 3]
     assert times.attrs == {"long_name": "time of each spin reversal, in sqrt(c/g)"}
-
-
-def test_on_disk_and_in_memory_are_the_same(found: xr.Dataset, write: Write) -> None:
-    xr.testing.assert_identical(found.reversal_times, sweep.run(write(TEXT)).reversal_times)
+    xr.testing.assert_identical(times, xr.load_dataset(out / "times.nc").reversal_times)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from sweep.kernels.status import LIFT_OFF, PARADOX, TOPPLED
+
 ROOT = Path(__file__).parent.parent.parent
 
 Write = Callable[..., Path]
@@ -13,6 +15,16 @@ Write = Callable[..., Path]
 
 STANDARD = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 60.0, "n0": 0.05, "x0": 0.01, "y0": 0.01}
 """The standard case of Takano (2011)."""
+
+CHAOTIC = {"a": 39.7614, "b": 11.6247, "c": 1.19954, "delta": 0.020937, "mu": 240.612}
+CHAOTIC |= {"n0": -0.0490836, "x0": 8.26e-4, "y0": 2.26e-4}
+
+ENDS = {
+    TOPPLED: {"a": 8.36, "b": 1.73, "c": 1.54, "delta": 0.179, "mu": 178.0, "n0": 1.0, "x0": 0.573, "y0": 0.0569},
+    LIFT_OFF: {"a": 15.7, "b": 1.05, "c": 0.732, "delta": 0.171, "mu": 33.0, "n0": 1.0, "x0": -3.49, "y0": 0.576},
+    PARADOX: {"a": 13.5, "b": 2.92, "c": 1.13, "delta": -0.326, "mu": 173.0, "n0": -1.0, "x0": 0.643, "y0": 0.209},
+}
+"""Bodies and starts by how they end."""
 
 SMALL = """\
 name: small

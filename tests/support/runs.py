@@ -4,11 +4,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pytest
 import xarray as xr
 
 import sweep
 from support import STANDARD
 from sweep.engine.reporter import Progress, Reporter
+from sweep.kernels import methods
 
 
 class Stop(Reporter):
@@ -47,6 +50,17 @@ def in_sittings(chunks: int, config: Path, output: Path) -> tuple[xr.Dataset, in
             return result, interruptions, reporter if reporter.seen else last
         except KeyboardInterrupt:
             interruptions, last = interruptions + 1, reporter
+
+
+def lengthen(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+    """Make the automatic steps of first runs longer than they should be."""
+    automatic = methods.automatic_step
+
+    def long_step(*which: Any) -> tuple[np.ndarray, np.ndarray]:
+        step, rule = automatic(*which)
+        return factor * step, rule
+
+    monkeypatch.setattr(methods, "automatic_step", long_step)
 
 
 def same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:
