@@ -48,7 +48,8 @@ def test_a_strong_rattle_that_hardly_decays_does_not_let_a_cell_settle() -> None
     """It turns the spin by more than its energy at any one time would; counts by Taylor series at 1e-13."""
     rows = [(21.2915, 13.6769, 1.66529, 0.193173, 3.79616, -0.0487141, -1.44812, -1.94482),
             (42.6078, 34.6993, 1.14081, -0.123207, 1.13196, 0.0211796, 5.01597, -2.69675)]  # fmt: skip
-    found = run_cells([dict(zip(STANDARD, row, strict=True)) for row in rows], t_end=3000.0)
+    cells = [dict(zip(STANDARD, row, strict=True)) for row in rows]
+    found = run_cells(cells, t_end=3000.0)
     assert list(found.reversals) == [1, 3]
     assert list(found.decided) == [1, 1]
     paper = {"name": "one", "friction": {"mu": 60.0}}
