@@ -507,7 +507,8 @@ def test_the_body_turns_as_in_an_animation(clicked: Page) -> None:
         clicked.evaluate(f"{NAMED}('time').value = {times[frame] + 1e-6}")
         clicked.wait_for_timeout(300)
         scene.show(frame)
-        faces = np.array(body.surface._faces)
+        (surface,) = body.axes.collections
+        faces = np.array(surface._faces)
         x, y, depth = (
             v.reshape(faces.shape[:2]) for v in proj3d.proj_transform(*faces.reshape(-1, 3).T, body.axes.get_proj())
         )
