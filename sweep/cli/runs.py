@@ -23,8 +23,19 @@ if TYPE_CHECKING:
     from sweep.results.folder import RunFiles
 
 
-WORKERS = click.option("--workers", type=click.IntRange(1, 4096), help="Run in this many processes of one thread each.")
-SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
+def _either(context: click.Context, parameter: click.Parameter, value: Any) -> Any:  # noqa: ARG001
+    """Refuse workers of two kinds, before code of a user runs."""
+    if value and any(context.params.get(name) for name in ("workers", "scheduler")):
+        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
+    return value
+
+
+WORKERS = click.option(
+    "--workers", type=click.IntRange(1, 4096), callback=_either, help="Run in this many processes of one thread each."
+)
+SCHEDULER = click.option(
+    "--scheduler", metavar="ADDRESS", callback=_either, help="Run on the workers of this dask scheduler."
+)
 
 
 def _parameter_help() -> str:
@@ -263,8 +274,6 @@ def _written(
     dry_run: bool, output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
 ) -> xr.Dataset | None:  # fmt: skip
     """Carry out `work`, show its progress, and say what it found and wrote; of a dry run, only the estimate."""
-    if workers and scheduler:
-        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
     if dry_run:
         click.echo(estimate())
         return None
