@@ -77,8 +77,14 @@ class Whole:
 
     def _gather(self) -> tuple[dict[str, Array], list[Apart]]:
         """Arrays over all simulated cells (or bodies), and what the tiles hold apart from them."""
-        apart = [apart_from(arrays) for _, arrays in self._finished()]
-        return dataset.assemble(Grid.of(self.simulated()), self._finished()), apart
+        apart: list[Apart] = []
+
+        def read() -> Iterator[tuple[Tile, dict[str, Array]]]:
+            for tile, arrays in self._finished():
+                apart.append(apart_from(arrays))
+                yield tile, arrays
+
+        return dataset.assemble(Grid.of(self.simulated()), read()), apart
 
     def _finished(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
         """Read the tiles one after another, with what each holds."""
