@@ -171,7 +171,8 @@ def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
 
 def _of_samples(dataset: xr.Dataset, one: xr.Dataset) -> str:
     """What the samples of one cell have in common and not with all others, and how many there are."""
-    own = [name for name in _varying(dataset) if name not in _varying(one)]
+    here = _varying(one)
+    own = [name for name in _varying(dataset) if name not in here]
     told = [labels.measured(dataset, name, float(one[name][0])) for name in own]
     return ", ".join([*told, f"median of {one.sizes['trajectory']} samples"])
 
@@ -250,7 +251,8 @@ def label(dataset: xr.Dataset, i: int) -> str:
 
 def constants_apart(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with the parameters that all trajectories share as scalar coordinates."""
-    names = [name for name in parameters(dataset) if name not in _varying(dataset)]
+    varying = _varying(dataset)
+    names = [name for name in parameters(dataset) if name not in varying]
     shared = {name: ((), np.ravel(dataset[name])[0], dataset[name].attrs) for name in names}
     return dataset.drop_vars(names).assign_coords(shared)
 
