@@ -2,10 +2,6 @@
 
 Where the rattle is small, the slow equations tell what is still to come.  Where it rolls round and round, as in nearly
 round bodies, how it winds down is measured.
-
-The kernel lets a cell settle by a bound on what the energy of its rattle can do to the spin (`sweep.kernels.lanes`).
-The bound fails where a strong rattle hardly decays, and turns the spin all the while: of 2800 wide cells 3 settled and
-reversed later.  The slow equations tell of these, so such a cell goes on.
 """
 
 from __future__ import annotations
@@ -16,7 +12,6 @@ from sweep.engine.executor import Work
 from sweep.engine.plan import Part
 from sweep.engine.winding import whole_blocks, wind_down
 from sweep.grid import Array
-from sweep.kernels.kernel import Kernel
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.model import MODES
@@ -39,7 +34,7 @@ def run(part: Part, work: Work, name: str, most: Array | float = np.inf) -> None
     """
     patience, table = part.config.integrator.patience, part.kernel.table(part.images)
     first = most if patience is None else np.minimum(most, whole_blocks(patience / table["step"]))
-    _until_settled(part, work, name, first)
+    work.run(name, part.kernel, part.images, settle=part.settles, most=first)
     on = settle(part) if part.settles else np.zeros(len(part.cells), bool)
     if patience is None or not part.settles:
         return
@@ -49,30 +44,10 @@ def run(part: Part, work: Work, name: str, most: Array | float = np.inf) -> None
     if len(rows):
         later = part.take(rows)
         later.kernel.table(later.images)["status"] = RUNNING
-        _until_settled(later, work, f"{name} later", np.broadcast_to(most, len(part.cells))[rows])
+        limit = np.broadcast_to(most, len(part.cells))[rows]
+        work.run(f"{name} later", later.kernel, later.images, settle=later.settles, most=limit)
         settle(later)
         part.images[rows] = later.images
-
-
-def _until_settled(part: Part, work: Work, name: str, most: Array | float) -> None:
-    """Run `part` to its ends, in place; parameters as of `Work.run`."""
-    work.run(name, part.kernel, part.images, settle=part.settles, most=most)
-    if not part.settles:
-        return
-    early = too_early(part.kernel, part.images)
-    if len(early):
-        on = part.take(early)
-        on.kernel.table(on.images)["status"] = RUNNING
-        work.run(f"{name} unsettled", on.kernel, on.images, most=np.broadcast_to(most, len(part.cells))[early])
-        part.images[early] = on.images
-
-
-def too_early(kernel: Kernel, images: Array) -> Array:
-    """Find the cells, by index, that have settled although it can be foreseen that their spin reverses once more."""
-    if MODES not in kernel.model.offers:
-        return np.empty(0, np.intp)
-    table = kernel.table(images)
-    return np.flatnonzero(endings(table, table["status"] == SETTLED).reversals > 0)
 
 
 def _late(part: Part) -> Array:

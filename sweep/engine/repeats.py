@@ -153,9 +153,9 @@ def _meet(part: Part, work: Work, name: str) -> Met:
     if late.any():
         again = ahead.take(late).start()
         work.run(name, again.kernel, again.images, settle=again.settles, most=goal[late])
-        # What failed later has gone on from where it settled (`sweep.engine.final`).
+        # What failed later has gone on from where it settled.
         again.kernel.table(again.images)["status"][again.status == SETTLED] = RUNNING
-        work.run(f"{name} unsettled", again.kernel, again.images, most=goal[late])
+        work.run(f"{name} on", again.kernel, again.images, most=goal[late])
         states[:, late] = part.kernel.model_states(again.images)
     constants = model.constants.of(ahead.columns)
     stretch = end + _BEYOND * step - begin

@@ -271,7 +271,7 @@ def _run(
     longest = kernel.table(images)["goal"].max() / BLOCK
     blocks = max(_BLOCKS, int(np.ceil(longest * len(images) / _MARKS)))
     executor.execute(kernel, images, stop_when_settled=stop_when_settled, after_chunk=mark, chunk_blocks=blocks)
-    kernel.table(images)["status"][final.too_early(kernel, images)] = RUNNING
+    kernel.table(images)["status"][executor.too_early(kernel, images)] = RUNNING
     executor.execute(kernel, images, stop_when_settled=False, after_chunk=mark, chunk_blocks=blocks)
     return marks
 
@@ -281,7 +281,7 @@ def _judge(kernel: Kernel, images: Array) -> None:
     looked, at_end = images.copy(), np.flatnonzero(kernel.table(images)["status"] == TIME_LIMIT)
     kernel.table(looked)["status"][at_end] = RUNNING
     kernel.advance(looked, at_end, 1, True)
-    kernel.table(looked)["status"][final.too_early(kernel, looked)] = TIME_LIMIT
+    kernel.table(looked)["status"][executor.too_early(kernel, looked)] = TIME_LIMIT
     kernel.table(images)["status"] = kernel.table(looked)["status"]
 
 
