@@ -223,8 +223,8 @@ class _Top(Strict):
     seed: Whole = Field(default=0, ge=0, lt=2**32, description="seed of the samples; the same gives the same")
     refine: Whole = Field(
         default=0, ge=0, le=MAX_CELLS_IN_MEMORY.bit_length() - 1,
-        description="the largest patches, whose inside is inferred from their sides, have 2^refine cells a side; 0 "
-        "simulates every cell",
+        description="of each range every 2^refine-th value is simulated first, and then what lies near changes of the "
+        "count; 0 simulates every cell",
     )  # fmt: skip
     max_failed_fraction: float = Field(
         default=0.01, ge=0, le=1, description="share of failed cells beyond which the command exits with 3"

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from math import prod
 
 import numpy as np
 import xarray as xr
 
 from sweep.config import Config
-from sweep.engine import refinement
+from sweep.engine.refinement import UNKNOWN, Nodes, Outcomes, search
 from sweep.engine.whole import Some
 from sweep.grid import Array, Tile
 from sweep.kernels.status import IMPOSSIBLE
 from sweep.prediction import formulas
 from sweep.results import dataset
+from sweep.results.margins import Counts
 from sweep.results.store import Store
-
-_STATUSES = max(dataset.STATUSES) + 1
 
 _TILE = 1 << 18
 """Cells for which the formulas are evaluated at a time."""
@@ -25,29 +25,48 @@ _TILE = 1 << 18
 class Refined(Some):
     """The nodes asked for so far, with tiles of their own for each pass.
 
-    The outcomes of a pass alone decide what the next one asks for, so a resumed run builds the same tiles.
+    The results of a pass alone decide what the next one asks for, so a resumed run builds the same tiles.
     """
 
     def __init__(self, config: Config, store: Store) -> None:
         super().__init__(config, store)
-        self._outcome = np.full(self.grid.shape, refinement.UNKNOWN, np.int32)
-        self._impossible = self._impossible_nodes()
-        self._outcome.ravel()[self._impossible] = IMPOSSIBLE
+        size = self.grid.size
+        self._outcomes = Outcomes(np.zeros(size, np.int32), np.full(size, UNKNOWN, np.int8))
+        self._outcomes.status[self._impossible_nodes()] = IMPOSSIBLE
+        self._margins = {name: np.full(size, np.nan) for name in ("margin_more", "margin_fewer")}
         self._learned = 0
-        """Tiles whose outcomes are known."""
-        specs, patch = (config.parameters[name].spec for name in self.grid.axes), 2**config.refine
-        self._refined = [i for i, spec in enumerate(specs) if isinstance(spec, dict) and self.grid.shape[i] > patch]
+        """Tiles whose results are known."""
+        specs, patch = (config.parameters[name].spec for name in self.grid.axes), 2 ** (config.refine + 1)
+        refined = [i for i, spec in enumerate(specs) if isinstance(spec, dict) and self.grid.shape[i] > patch]
         """Indices of the axes that are ranges and longer than a patch."""
+        self._shape = tuple(self.grid.shape[i] for i in refined)
+        nodes = np.moveaxis(np.arange(size).reshape(self.grid.shape), refined, range(-len(refined), 0))
+        self._maps = nodes.reshape(-1, prod(self._shape) if refined else size)
+        """Indices of the nodes of each map, one for each value of the other axes."""
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
-        """Add the nodes to simulate next, judging by the outcomes of all tiles so far.  False if there are none.
+        """Add the nodes to simulate next, judging by the results of all tiles so far.  False if there are none.
 
         `tile_size` as for `Whole.grow`.
         """
         for i in range(self._learned, len(self.tiles)):
-            self._outcome.ravel()[self.cells[self.tiles[i]]] = _outcome(self.store.load(i))
+            found, cells = self.store.load(i), self.cells[self.tiles[i]]
+            known = {"reversals": self._outcomes.reversals, "status": self._outcomes.status, **self._margins}
+            for name in known.keys() & found.keys():
+                known[name][cells] = found[name]
         self._learned = len(self.tiles)
-        return self._add(refinement.missing(self._outcome, self._refined, self.config.refine), tile_size)
+        return self._add(np.sort(np.concatenate([nodes for nodes, _ in self._searched()])), tile_size)
+
+    def _searched(self) -> Iterator[tuple[Nodes, Outcomes]]:
+        """For each map, the nodes to simulate next, and all outcomes as far as they are known."""
+        for nodes in self._maps:
+            known = Outcomes(*(each[nodes] for each in self._outcomes))
+            if not self._shape:
+                yield nodes[known.status == UNKNOWN], known
+                continue
+            counts = Counts.of({**known._asdict(), **{name: each[nodes] for name, each in self._margins.items()}})
+            new, told = search(self._shape, known, counts, self.config.refine)
+            yield nodes[new], told
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all nodes, in memory."""
@@ -61,13 +80,12 @@ class Refined(Some):
         # No flag says "not simulated", so flags that cannot be inferred are left out.
         others = {n for n in found.keys() - arrays.keys() if n in dataset.VARIABLES and not dataset.VARIABLES[n].flags}
         self._place(self.cells, {name: found[name] for name in others - {"reversals"}}, arrays)
-        source = refinement.sources(self._outcome, self._refined, self.config.refine).ravel()
+        told = [outcomes for _, outcomes in self._searched()]
         for name in ("reversals", "status"):
-            simulated = np.empty(self.grid.size, found[name].dtype)
-            simulated[self.cells] = found[name]
-            simulated[self._impossible] = IMPOSSIBLE if name == "status" else 0
-            arrays[name] = simulated[source]
-        arrays["inferred"] = self._outcome == refinement.UNKNOWN
+            arrays[name] = np.empty(self.grid.size, found[name].dtype)
+            for nodes, outcomes in zip(self._maps, told, strict=True):
+                arrays[name][nodes] = getattr(outcomes, name)
+        arrays["inferred"] = self._outcomes.status == UNKNOWN
         return arrays
 
     def _impossible_nodes(self) -> Array:
@@ -79,8 +97,3 @@ class Refined(Some):
     def _formulas(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
         for tile in self.grid.tiles(_TILE):
             yield tile, dataset.predicted(formulas(self.config.tier, self.grid.part(tile)))
-
-
-def _outcome(found: Mapping[str, Array]) -> Array:
-    """Number of reversals and status of each cell, as one number."""
-    return found["reversals"].astype(np.int32) * _STATUSES + found["status"].astype(np.int32)

@@ -65,25 +65,26 @@ class Counts:
             widths[k] = np.median(width[all_known & (count == k)])
         return np.concatenate([[0.0], np.cumsum(widths)])
 
-    @property
+    @cached_property
     def _count(self) -> Array:
         return np.where(self.known, self.reversals, 0).astype(int)
 
-    def distance(self, level: Any) -> Array:
-        """How far in spin each cell is from where `level` reversals begin: negative where it counts fewer.
+    def distance(self, level: Any, cells: Any = ...) -> Array:
+        """How far in spin `cells` (all of them, if not given) are from where `level` reversals begin: negative where
+        they count fewer.
 
         One level for all, or one for each.
         NaN where that is not known.  For a cell whose count is farther away than by one, it is a guess: as if each
         count between took as much spin as in other cells.
         """
-        count, below = self._count, self._below
+        count, below = self._count[cells], self._below
         of_level = np.interp(level, np.arange(below.size), below)
         found = np.where(
             count >= level,
-            self.fewer + (below[count] - of_level),
-            -(self.more + (of_level - below[np.minimum(count + 1, level)])),
+            self.fewer[cells] + (below[count] - of_level),
+            -(self.more[cells] + (of_level - below[np.minimum(count + 1, level)])),
         )
-        return np.where(self.known, found, np.nan)
+        return np.where(self.known[cells], found, np.nan)
 
     def borders(self, level: Any) -> Array:
         """Tell whether the distance from where `level` reversals begin is the measured one, not a guess."""

@@ -1,7 +1,7 @@
 """Refined runs: which nodes are simulated, what is inferred of the others, and the run around it."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,22 +20,37 @@ from sweep import ConfigError
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.local import Done
-from sweep.engine.refinement import UNKNOWN, missing, sources
+from sweep.engine.refinement import UNKNOWN, Outcomes, search
+from sweep.kernels.status import SETTLED
 from sweep.results.dataset import STATUSES
+from sweep.results.margins import Counts
 
 
-def refine(full: np.ndarray, depth: int, refined: tuple[int, ...] | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """What a search that can look nodes up in `full` infers, and which it has looked up."""
-    axes = tuple(range(full.ndim)) if refined is None else refined
-    outcome = np.full(full.shape, UNKNOWN, np.int32)
-    while len(nodes := missing(outcome, axes, depth)):
+def refine(
+    full: np.ndarray, depth: int, margins: Callable[[int], np.ndarray] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a search that can look nodes up in `full` infers, and which it has looked up.
+
+    `margins` gives the distances of all nodes from where a count begins; without it margins are not known.
+    """
+    size, reversals = full.size, full.ravel()
+    known = Outcomes(np.zeros(size, np.int32), np.full(size, UNKNOWN))
+    more, fewer = np.full((2, size), np.nan)
+    for count in np.unique(reversals).tolist() if margins else []:
+        here = reversals == count
+        more[here], fewer[here] = -margins(count + 1).ravel()[here], margins(count).ravel()[here]
+    while True:
+        simulated = known.status != UNKNOWN
+        own = [np.where(simulated, each, np.nan) for each in (more, fewer)]
+        nodes, told = search(full.shape, known, Counts(known.reversals.astype(float), *own, simulated), depth)
+        if not len(nodes):
+            break
         assert (np.diff(nodes) > 0).all()
-        assert (outcome.ravel()[nodes] == UNKNOWN).all()  # nothing twice
-        outcome.ravel()[nodes] = full.ravel()[nodes]
-    simulated, source = outcome != UNKNOWN, sources(outcome, axes, depth)
-    assert simulated.ravel()[source].all()
-    assert (source[simulated] == np.flatnonzero(simulated)).all()
-    return full.ravel()[source], simulated
+        assert (known.status[nodes] == UNKNOWN).all()  # nothing twice
+        known.reversals[nodes], known.status[nodes] = reversals[nodes], SETTLED
+    assert (told.status == SETTLED).all()
+    assert (told.reversals[simulated] == reversals[simulated]).all()
+    return told.reversals.reshape(full.shape), simulated.reshape(full.shape)
 
 
 def lattice(shape: tuple[int, ...]) -> np.ndarray:
@@ -45,9 +60,9 @@ def lattice(shape: tuple[int, ...]) -> np.ndarray:
 
 @st.composite
 def maps(draw: Any, axes: int, most: int) -> tuple[tuple[int, ...], int, np.ndarray]:
-    """Shape, depth and a place on the map; each axis has a block at least."""
+    """Shape, depth and a place on the map; each axis has a patch at least."""
     depth = draw(st.integers(1, 3))
-    shape = tuple(draw(st.integers(2**depth + 1, most)) for _ in range(axes))
+    shape = tuple(draw(st.integers(2 ** (depth + 1) + 1, most)) for _ in range(axes))
     return shape, depth, np.array([draw(st.floats(0, n - 1)) for n in shape])
 
 
@@ -56,12 +71,14 @@ directions = st.floats(-1, 1).filter(lambda x: abs(x) > 1e-3)
 
 @settings(max_examples=60)
 @pytest.mark.parametrize(("axes", "most"), [(2, 60), (3, 17)])
-@given(st.data(), st.lists(directions, min_size=3, max_size=3))
-def test_half_spaces(axes: int, most: int, data: Any, normal: list[float]) -> None:
+@given(st.data(), st.lists(directions, min_size=3, max_size=3), st.booleans())
+def test_half_spaces(axes: int, most: int, data: Any, normal: list[float], margins: bool) -> None:
     shape, depth, through = data.draw(maps(axes, most))
     away = lattice(shape) - np.expand_dims(through, tuple(range(1, axes + 1)))
-    full = (np.tensordot(normal[:axes], away, 1) > 0).astype(np.int32)
-    np.testing.assert_array_equal(refine(full, depth)[0], full)
+    distance = np.tensordot(normal[:axes], away, 1)
+    full = (distance > 0).astype(np.int32)
+    of_level = (lambda level: distance - 1000.0 * (level - 1)) if margins else None
+    np.testing.assert_array_equal(refine(full, depth, of_level)[0], full)
 
 
 @settings(max_examples=60)
@@ -78,25 +95,25 @@ def test_balls_wider_than_the_largest_patches(axes: int, most: int, off: float, 
 
 @given(st.integers(1, 4), st.lists(st.integers(1, 40), min_size=1, max_size=5))
 def test_stretches_longer_than_the_largest_patches(depth: int, lengths: list[int]) -> None:
-    full = np.repeat(np.arange(len(lengths)), [2**depth + n for n in lengths])
+    full = np.repeat(np.arange(len(lengths)), [2 ** (depth + 1) + n for n in lengths])
     inferred, simulated = refine(full, depth)
     np.testing.assert_array_equal(inferred, full)
-    # Each change is found by halving: a node a level.
-    assert simulated.sum() <= len(full) / 2**depth + 2 + (len(lengths) - 1) * (2 * depth + 1)
+    # Around each change a patch is halved, and both of its halves where the change is beside their common node.
+    assert simulated.sum() <= len(full) / 2**depth + 4 + (len(lengths) - 1) * (4 * depth + 2)
 
 
-@settings(max_examples=30)
-@given(maps(3, 20), st.floats(0.1, 2))
-def test_each_value_of_an_unrefined_axis_is_a_map_of_its_own(
-    case: tuple[tuple[int, ...], int, np.ndarray], slope: float
+@settings(max_examples=60)
+@given(st.tuples(st.floats(8, 56), st.floats(8, 56)), st.floats(1, 6), st.booleans())
+def test_islands_between_the_nodes_are_found_by_their_margins(
+    centre: tuple[float, float], radius: float, margins: bool
 ) -> None:
-    shape, depth, through = case
-    x, y, z = lattice(shape) - through[:, None, None, None]
-    full = (x + slope * z > 3 * np.sin(7 * y)).astype(np.int32)
-    inferred, simulated = refine(full, depth, (0, 2))
-    np.testing.assert_array_equal(inferred, full)
-    for i in range(shape[1]):
-        np.testing.assert_array_equal(refine(full[:, i], depth)[1], simulated[:, i])
+    x, y = lattice((65, 65))
+    high = radius**2 - (x - centre[0]) ** 2 - (y - centre[1]) ** 2
+    full = (high > 0).astype(np.int32)
+    inferred, simulated = refine(full, 3, (lambda level: high - 1e6 * (level - 1)) if margins else None)
+    met = full[::8, ::8].any()
+    assert ((inferred == full).all()) == (margins or met)
+    assert simulated.mean() < 0.3
 
 
 @given(maps(2, 60), st.integers(1, 4))
@@ -112,8 +129,8 @@ def test_where_all_nodes_differ_all_are_simulated(case: tuple[tuple[int, ...], i
 
 
 def test_one_outcome_is_known_from_the_coarse_nodes() -> None:
-    _, simulated = refine(np.zeros((70, 33, 2), np.int32), 4, (0, 1))
-    assert simulated.sum() == 6 * 3 * 2  # 0, 16 … 64, 69 × 0, 16, 32 × both
+    _, simulated = refine(np.zeros((70, 33), np.int32), 4)
+    assert simulated.sum() == 8 * 3  # 0, 16 … 64, 37, 53, 69 × 0, 16, 32
     assert simulated[::16, ::16].all()
     assert simulated[-1, ::16].all()
 
@@ -138,13 +155,21 @@ def test_lines_one_cell_wide_are_followed(depth: int, slope: float, upright: boo
     np.testing.assert_array_equal(refine(full, depth)[0], full)
 
 
-@pytest.mark.parametrize(("slope", "most"), [(0, 870), (0.37, 1135), (1, 1442)])
-def test_lines_cost_little(slope: float, most: int) -> None:
-    """Along a line of the map, and nothing ahead of an answer that makes it needless: then it would be twice that."""
+@pytest.mark.parametrize("slope", [0, 0.37, 1])
+def test_with_margins_a_line_costs_the_nodes_on_its_sides(slope: float) -> None:
     x, y = lattice((257, 257))
-    inferred, simulated = refine((x - 101 + slope * (y - 128) > 0.05).astype(np.int32), 4)
-    assert simulated.sum() <= most
-    assert 0 < inferred.mean() < 1
+    distance = x - 101 + slope * (y - 128) - 0.05
+    full = (distance > 0).astype(np.int32)
+    inferred, simulated = refine(full, 4, lambda level: distance - 1000 * (level - 1))
+    np.testing.assert_array_equal(inferred, full)
+    beside = np.zeros(full.shape, bool)
+    for axis in (0, 1):
+        changes = np.diff(full, axis=axis) != 0
+        beside |= np.pad(changes, [(int(i == axis), 0) for i in (0, 1)])
+        beside |= np.pad(changes, [(0, int(i == axis)) for i in (0, 1)])
+    beside[::16, ::16] = True
+    np.testing.assert_array_equal(simulated, beside)
+    assert refine(full, 4)[1].sum() > 2 * beside.sum()  # without them
 
 
 MAP = """\
