@@ -155,6 +155,26 @@ def test_lines_one_cell_wide_are_followed(depth: int, slope: float, upright: boo
     np.testing.assert_array_equal(refine(full, depth)[0], full)
 
 
+def test_a_strip_beside_another_is_found() -> None:
+    """No first node meets the second; a patch that the first one contradicts is looked at more closely."""
+    columns = np.arange(17, 60)
+    at = 16 + np.round(0.3 * (columns - 16)).astype(int)
+    full = np.zeros((65, 65), np.int32)
+    full[16, 16] = full[at, columns] = full[at[1:], columns[:-1]] = 1
+    full[at[20:] + 3, columns[20:]] = full[at[21:] + 3, columns[20:-1]] = 2
+    np.testing.assert_array_equal(refine(full, 4)[0], full)
+
+
+def test_a_boundary_that_waves_costs_little_more_than_the_nodes_on_its_sides() -> None:
+    """What parabolas cannot follow is simulated at once: to correct it later takes 1263 nodes."""
+    x, y = lattice((257, 257))
+    distance = 8 * np.sin(x / 9) - (y - 128.3)
+    full = (distance > 0).astype(np.int32)
+    inferred, simulated = refine(full, 4, lambda level: distance - 1000 * (level - 1))
+    np.testing.assert_array_equal(inferred, full)
+    assert simulated.sum() < 1150
+
+
 @pytest.mark.parametrize("slope", [0, 0.37, 1])
 def test_with_margins_a_line_costs_the_nodes_on_its_sides(slope: float) -> None:
     x, y = lattice((257, 257))
