@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from numba.np.ufunc import parallel
+
 from sweep.cli import main
 from sweep.engine import executor, local
 from sweep.engine import run as engine_run
@@ -52,8 +54,10 @@ def command(
     ----------
     unprivileged : bound by the permissions of files even as root
     """
-    # A lock that numba makes would outlive a killed process, were it not of this method.
+    # The lock around numba's threads is the fork server's, and whoever is killed while it has it would stop all others.
+    # One of this method also ends with its process.
     multiprocessing.set_start_method("fork", force=True)
+    parallel._set_init_process_lock()
     with log.open("wb") as stream:
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
