@@ -46,6 +46,7 @@ def failures(group: Callable[[], list[Any]]) -> list[str]:
     return [row.what for row in group() if not row.holds]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("group", sorted(set(GROUPS.values()), key=lambda g: g.__name__), ids=lambda g: g.__name__)
 def test_the_models_agree_with_each_other(group: Callable[[], list[Any]]) -> None:
     assert failures(group) == []

@@ -112,7 +112,8 @@ def _by_margins(counts: Counts, nodes: Nodes, size: int, axes: int) -> tuple[Arr
     known = np.isfinite(counts.more[nodes]).all(axis=1)
     count = np.repeat(np.where(known, np.maximum(low - 1.0, 0.0), np.nan)[:, None], len(weights), axis=1)
     unsure = np.zeros(count.shape, bool)
-    for level in range(max(low.min(initial=0), 1), high.max(initial=0) + 2):
+    levels = range(max(low[known].min(), 1), high[known].max() + 2) if known.any() else range(0)
+    for level in levels:
         rows = np.flatnonzero(known & (low <= level) & (level <= high + 1))
         distance = counts.distance(level, nodes[rows])
         inside = distance @ weights.T

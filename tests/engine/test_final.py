@@ -68,6 +68,7 @@ def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, write: Write) -> 
     same_numbers(found, run)
 
 
+@pytest.mark.campaign
 def test_a_run_that_settles_at_its_first_look_is_decided() -> None:
     """Its companion, in longer steps, closes a single window before the same time."""
     found = sweep.run(ROOT / "configs" / "kane_levinson_viscous.yaml", mu=5.0, n0=0.5, method="adams")

@@ -62,6 +62,7 @@ def test_its_dataset_tells_the_file_its_hash_and_its_parameters(few: xr.Dataset,
     assert few.attrs["title"] == "pendulum: reversals (pendulum.py model)"
 
 
+@pytest.mark.campaign
 def test_pictures_and_summaries_take_its_words(folder: Path) -> None:
     (folder / "pendulum.py").write_text(
         PENDULUM.replace("damping", "mu").replace("drive", "friction"), encoding="utf-8"
@@ -177,6 +178,7 @@ def test_what_does_not_compile_is_told_with_its_line(folder: Path, file: str, ol
     assert fault.message.startswith(message)
 
 
+@pytest.mark.campaign
 def test_a_law_of_ones_own_moves_the_body_as_newton_says(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fading(x: float, p: dict[str, float]) -> float:
         return p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2)

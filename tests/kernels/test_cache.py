@@ -46,6 +46,7 @@ def process(copy: Path, *measures: str) -> list[tuple[str, float]]:
     return [(line.split()[0], pytest.approx(float(line.split()[1]), rel=1e-13)) for line in done.stdout.splitlines()]
 
 
+@pytest.mark.campaign
 def test_kernels_are_found_again_kept_apart_and_compiled_anew_after_an_edit(copy: Path) -> None:
     ((how, nothing),) = process(copy, "")
     assert how == "compiled"

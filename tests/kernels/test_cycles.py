@@ -1,10 +1,12 @@
 """The regularity of reversals, against their times."""
 
 import numpy as np
+import pytest
 
 import sweep
 
 
+@pytest.mark.campaign
 def test_cycles_are_those_of_the_reversal_times() -> None:
     scene = {
         "model": "noslip",

@@ -109,6 +109,7 @@ def _with_tangent() -> Any:
     return extended
 
 
+@pytest.mark.campaign
 def test_the_exponent_is_that_of_the_variational_equations() -> None:
     """Over the very same stretch, from the same direction, on regular and on chaotic motion."""
     body = columns(a=3.0, b=2.0, delta=[0.03, 0.3, 0.5], n0=[0.5, 0.5, 0.3])
@@ -127,6 +128,7 @@ def test_the_exponent_is_that_of_the_variational_equations() -> None:
         assert found[i] == pytest.approx(np.diff(solution.y[-1])[0] / np.diff(times)[0], abs=1e-8)
 
 
+@pytest.mark.campaign
 def test_integrable_motion_has_none_within_the_bound_of_its_length(write: Write) -> None:
     """Without friction the averaged equations have two integrals of three variables: neighbours part like the time.
 

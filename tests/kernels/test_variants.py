@@ -62,6 +62,7 @@ def against_newton(
     return model, columns, start
 
 
+@pytest.mark.campaign
 def test_slipping_and_its_energy_against_an_independent_integrator(tmp_path: Path) -> None:
     result = run(tmp_path, SLIPPING)
     model, *_ = against_newton(tmp_path, result, (0, 3), "coulomb-tanh")
@@ -146,6 +147,7 @@ def test_bodies_that_need_no_variant_are_bit_for_bit_as_they_were(tmp_path: Path
     xr.testing.assert_identical(*(run(tmp_path, text).drop_attrs(deep=False) for text in (plain, named)))
 
 
+@pytest.mark.campaign
 def test_a_body_with_the_mass_at_the_centre_is_the_papers(tmp_path: Path) -> None:
     """The general equations give the paper's trajectories, by another kernel.
 

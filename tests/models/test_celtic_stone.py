@@ -75,6 +75,7 @@ def set_off(p: dict[str, float]) -> np.ndarray:
     return y
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("more", [{}, CYCLE, {"I1": 5.0, "delta": -0.2, "E": 500.0}], ids=["still", "cycle", "other"])
 def test_it_moves_by_the_equations_of_borisov_and_mamaev_and_the_plane_has_to_pull(more: dict[str, float]) -> None:
     stone = STONE | more
@@ -90,6 +91,7 @@ def test_it_moves_by_the_equations_of_borisov_and_mamaev_and_the_plane_has_to_pu
     assert more or min(forces) < -0.5 * G
 
 
+@pytest.mark.campaign
 def test_a_stable_cycle_becomes_chaotic_beyond_its_period_doubling() -> None:
     """Its Floquet multipliers, computed apart from this, make it stable from 742 to 747.7 and a saddle at 752."""
     energies = [*np.linspace(743, 746, 8), *np.linspace(751.5, 752.5, 8)]

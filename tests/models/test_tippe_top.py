@@ -41,6 +41,7 @@ def at_start(p: dict[str, float]) -> np.ndarray:
     return np.concatenate([turned.ravel(), p["n0"] * turned[:, 2], np.zeros(3)])
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "more", [{"tilt": 1.0}, {"eccentricity": 0.2, "ratio": 1.4, "C": 0.35, "mu": 1.0, "n0": 5.0, "tilt": 0.4}]
 )

@@ -149,6 +149,7 @@ def test_margins_of_a_grid_draw_the_curves_without_a_search(found: xr.Dataset) -
     assert not drawn.lines(grid.drop_vars("margin_more"), *axes)
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("short_chunks")
 def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> None:
     done, sittings = None, 0

@@ -195,6 +195,7 @@ def test_friction_that_hardly_slips_is_known_by_its_slope_alone(write: Write) ->
 UPRIGHT: dict[str, Any] = {"x0": 0.0, "y0": 0.0, "mu": 0.3, "speed": 0.5}
 
 
+@pytest.mark.campaign
 def test_a_couple_is_known_in_units_of_the_inertia_that_it_slows_down(write: Write) -> None:
     """The spin of a body that does not rattle falls as exp(-sigma t / Izz), by hand."""
     times = np.arange(0, 2, 1 / 60)

@@ -56,6 +56,7 @@ def test_a_film_is_attributed_to_its_law(dry: xr.Dataset) -> None:
     assert "law: coulomb" in found.attrs["config"]
 
 
+@pytest.mark.campaign
 def test_laws_that_cannot_be_told_apart_are_said(write: Write) -> None:
     """A slip far below its speed: dry friction is viscous, with one parameter more."""
     config = write(VISCOUS)

@@ -71,7 +71,11 @@ def strike(process: Any, now: Callable[[], bool], with_signal: int) -> bool:
     return True
 
 
-@pytest.mark.parametrize("with_signal", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize(
+    "with_signal",
+    [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.campaign)],
+    ids=["interrupted", "killed"],
+)
 @pytest.mark.parametrize(
     "wanted", [range(1, 6, 2), pytest.param(range(12), marks=pytest.mark.campaign)], ids=["some", "many"]
 )
