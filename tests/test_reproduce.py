@@ -53,6 +53,7 @@ def test_the_models_agree_with_each_other(group: Callable[[], list[Any]]) -> Non
 
 
 # One coefficient of each kind: shape, inertia and friction, or frequency, coupling and friction.
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("name", "index"),
     [("slip", 0), ("slip", 4), ("slip", 9), ("slip", 10), ("noslip", 1), ("noslip", 5), ("effective", 2),

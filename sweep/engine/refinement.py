@@ -49,6 +49,7 @@ class Outcomes(NamedTuple):
     """`UNKNOWN` where not known."""
 
     def differ(self, these: Any, others: Any) -> Array:
+        """Tell where the outcomes of these nodes are not those of the others."""
         found: Array = (self.status[these] != self.status[others]) | (self.reversals[these] != self.reversals[others])
         return found
 

@@ -196,6 +196,7 @@ def test_a_law_of_ones_own_moves_the_body_as_newton_says(folder: Path, monkeypat
     np.testing.assert_allclose(one["slip_1"], y[5], rtol=0, atol=1e-9)
 
 
+@pytest.mark.campaign
 def test_its_body_settles_as_one_of_ours_and_reverses_no_more(folder: Path) -> None:
     """The page's law of friction, where the couple alone would stop it after minutes."""
     asked = {"fading": [0.1, 1.0], "omega3": [-5.0, -1.0, 0.5, 5.0], "t_end": 120}

@@ -140,6 +140,7 @@ def test_integrable_motion_has_none_within_the_bound_of_its_length(write: Write)
         assert (np.abs(found.lyapunov) < (np.log(2) + np.log(20)) / (t_end / 2)).all()
 
 
+@pytest.mark.campaign
 def test_a_mode_that_has_decayed_is_not_filled_in_by_round_off() -> None:
     """Half the difference of two trajectories 1e-8 apart is noise then: its growth gave 0.009 here."""
     found = exponents(kernel("dopri5", "noslip", ["lyapunov"]), columns(n0=0.0325, delta=0.288), 0.009, 4000.0)

@@ -52,6 +52,7 @@ def config(write: Write) -> Path:
     return write(TEXT)
 
 
+@pytest.mark.campaign
 def test_it_is_that_of_the_trajectories(config: Path) -> None:
     found = sweep.run(config)
     seen = sweep.trajectory(config, every=0.5, mu=[40, 60, 80], n0=[0.03, 0.05])

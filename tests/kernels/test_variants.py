@@ -117,7 +117,11 @@ SLIPPING_NATURALLY = NATURAL | {
 """Scenes of the kernels that other tests of this file run, in the paper's units."""
 
 
-@pytest.mark.parametrize("scene", [ROLLING_NATURALLY, SLIPPING_NATURALLY], ids=["noslip", "slip"])
+@pytest.mark.parametrize(
+    "scene",
+    [ROLLING_NATURALLY, pytest.param(SLIPPING_NATURALLY, marks=pytest.mark.campaign)],
+    ids=["noslip", "slip"],
+)
 def test_units_make_no_difference(scene: dict[str, Any]) -> None:
     """Units that are powers of two change no bit but the exponents: no number of the code has a hidden unit.
 

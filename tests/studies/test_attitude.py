@@ -35,7 +35,7 @@ ROLLING = {**PAPERS, "model": "noslip", "friction": {}}
     [
         (PAPERS, "viscous", 10.0),
         pytest.param(ROLLING, None, 40.0, marks=pytest.mark.campaign),
-        (STONE, "viscous", 1.0),
+        pytest.param(STONE, "viscous", 1.0, marks=pytest.mark.campaign),
         pytest.param(BOWL, "viscous", 1.0, marks=pytest.mark.campaign),
     ],
     ids=["slip", "noslip", "general", "paraboloid"],

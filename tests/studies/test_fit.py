@@ -123,7 +123,9 @@ def test_a_heading_tells_the_same(write: Write, seen: tuple[np.ndarray, ...]) ->
     assert found.seen.attrs["units"] == "radian"
 
 
-@pytest.mark.parametrize("what", get_args(Seen))
+@pytest.mark.parametrize(
+    "what", [pytest.param(each, marks=[pytest.mark.campaign] * (each == "gyroscope")) for each in get_args(Seen)]
+)
 def test_a_film_of_the_true_body_is_reproduced(write: Write, what: Seen) -> None:
     """By another derivation and integrator, with delay, bias and a sensor that leans."""
     cell = Grid.of(config := sweep.load_config(write(STONE), {"mu": 0.3, "speed": 0.5, **ROCKED})).columns()
