@@ -41,32 +41,38 @@ class Refined(Some):
         """Indices of the axes that are ranges and longer than a patch."""
         self._shape = tuple(self.grid.shape[i] for i in refined)
         nodes = np.moveaxis(np.arange(size).reshape(self.grid.shape), refined, range(-len(refined), 0))
-        self._maps = nodes.reshape(-1, prod(self._shape) if refined else size)
+        self._maps: Nodes = nodes.reshape(-1, prod(self._shape) if refined else size)
         """Indices of the nodes of each map, one for each value of the other axes."""
+        self._open = [*range(len(self._maps))]
+        """Maps that are not complete."""
+        self._told: dict[int, Outcomes] = {}
+        """What is known of each map, simulated or inferred."""
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
         """Add the nodes to simulate next, judging by the results of all tiles so far.  False if there are none.
 
         `tile_size` as for `Whole.grow`.
         """
+        known = {**self._outcomes._asdict(), **self._margins}
         for i in range(self._learned, len(self.tiles)):
             found, cells = self.store.load(i), self.cells[self.tiles[i]]
-            known = {"reversals": self._outcomes.reversals, "status": self._outcomes.status, **self._margins}
             for name in known.keys() & found.keys():
                 known[name][cells] = found[name]
         self._learned = len(self.tiles)
-        return self._add(np.sort(np.concatenate([nodes for nodes, _ in self._searched()])), tile_size)
+        asked = {i: self._searched(i) for i in self._open}
+        self._open = [i for i, nodes in asked.items() if len(nodes)]
+        return self._add(np.sort(np.concatenate([*asked.values()])), tile_size)
 
-    def _searched(self) -> Iterator[tuple[Nodes, Outcomes]]:
-        """For each map, the nodes to simulate next, and all outcomes as far as they are known."""
-        for nodes in self._maps:
-            known = Outcomes(*(each[nodes] for each in self._outcomes))
-            if not self._shape:
-                yield nodes[known.status == UNKNOWN], known
-                continue
+    def _searched(self, i: int) -> Nodes:
+        """The nodes of a map to simulate next; keep what is known of all its nodes."""
+        nodes: Nodes = self._maps[i]
+        known = Outcomes(*(each[nodes] for each in self._outcomes))
+        if self._shape:
             counts = Counts.of({**known._asdict(), **{name: each[nodes] for name, each in self._margins.items()}})
-            new, told = search(self._shape, known, counts, self.config.refine)
-            yield nodes[new], told
+            new, self._told[i] = search(self._shape, known, counts, self.config.refine)
+        else:
+            new, self._told[i] = np.flatnonzero(known.status == UNKNOWN), known
+        return nodes[new]
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all nodes, in memory."""
@@ -80,11 +86,10 @@ class Refined(Some):
         # No flag says "not simulated", so flags that cannot be inferred are left out.
         others = {n for n in found.keys() - arrays.keys() if n in dataset.VARIABLES and not dataset.VARIABLES[n].flags}
         self._place(self.cells, {name: found[name] for name in others - {"reversals"}}, arrays)
-        told = [outcomes for _, outcomes in self._searched()]
-        for name in ("reversals", "status"):
+        for name in Outcomes._fields:
             arrays[name] = np.empty(self.grid.size, found[name].dtype)
-            for nodes, outcomes in zip(self._maps, told, strict=True):
-                arrays[name][nodes] = getattr(outcomes, name)
+            for i, told in self._told.items():
+                arrays[name][self._maps[i]] = getattr(told, name)
         arrays["inferred"] = self._outcomes.status == UNKNOWN
         return arrays
 

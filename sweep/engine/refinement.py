@@ -76,18 +76,17 @@ def search(shape: tuple[int, ...], simulated: Outcomes, counts: Counts, depth: i
         wanted.append(nodes[~ready].ravel())
         if size == 2:
             break
-        patches = _infer(told, known, counts, patches[ready], size, shape)
+        patches = _infer(told, known, counts, nodes[ready], size, shape)
         size //= 2
     new = np.unique(np.concatenate(wanted))
     new = new[~known[new]]
     return (new if len(new) else np.flatnonzero(_beside_changes(told, shape) & ~known)), told
 
 
-def _infer(told: Outcomes, known: Array, counts: Counts, patches: Nodes, size: int, shape: tuple[int, ...]) -> Nodes:
-    """Infer nodes of patches whose corners, middles of sides ... are known, in place; give the parts that are left."""
-    nodes = patches[:, None] + _offsets(shape, [0, size // 2, size])
-    inside = patches[:, None] + _offsets(shape, range(size + 1))
-    first = patches[:, None]
+def _infer(told: Outcomes, known: Array, counts: Counts, nodes: Nodes, size: int, shape: tuple[int, ...]) -> Nodes:
+    """Infer what lies between the known `nodes` of patches, one patch a row, in place; give the parts that are left."""
+    first = nodes[:, :1]
+    inside = first + _offsets(shape, range(size + 1))
     count, left = _by_margins(counts, nodes, size, len(shape))
     alone = np.isnan(count[:, 0]) | (told.status[nodes] != told.status[first]).any(axis=1)
     count[alone] = told.reversals[first][alone]
@@ -97,7 +96,7 @@ def _infer(told: Outcomes, known: Array, counts: Counts, patches: Nodes, size: i
     left = np.where(here, contradicted, left)
     new = ~here & ~left
     told.reversals[inside[new]], told.status[inside[new]] = count[new], status[new]
-    return _parts(patches, left, size, shape)
+    return _parts(nodes[:, 0], left, size, shape)
 
 
 def _by_margins(counts: Counts, nodes: Nodes, size: int, axes: int) -> tuple[Array, Array]:

@@ -257,6 +257,13 @@ def test_simulated_cells_are_those_of_the_full_run(refined: xr.Dataset, full: xr
         assert "long_name" in refined[name].attrs
 
 
+def test_each_value_of_an_unrefined_axis_is_a_map_of_its_own(file: Path, refined: xr.Dataset) -> None:
+    for n0 in (0.02, 0.05):
+        alone, together = sweep.run(file, n0=n0), refined.sel(n0=n0)
+        for name in ("inferred", "reversals", "status", "margin_more"):
+            np.testing.assert_array_equal(alone[name], together[name].transpose(*alone[name].dims))
+
+
 def test_failures_are_outcomes_too(write: Write) -> None:
     text = MAP.replace("[0.02, 0.05]", "{start: 0.05, stop: 3, num: 40}").replace("x0: 0.01", "x0: 1")
     settings = {"mu": 20.0, "b": 3.0, "t_end": 5.0}
