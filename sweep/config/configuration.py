@@ -61,6 +61,8 @@ class Config:
     picture: tuple[str, ...] = ()
     """Variables to be drawn, as `sweep.plots.quantities.field` takes them; empty for what was measured first."""
     verify: float = 0.0
+    repeats: bool = True
+    """Whether cells whose error is above the tolerance are run again, in shorter steps."""
     refine: int = 0
     cases: dict[str, tuple[float, ...]] | None = None
     """Columns of the table of cases, if there is one, or of the samples."""

@@ -104,8 +104,9 @@ class Errors:
 def keep_tolerance(job: Plan, work: Work) -> Errors:
     """Find the error of each cell of `job`, whose runs have all ended, and repeat cells above the tolerance, in place.
 
-    A step that the configuration fixes stays.  Otherwise it is made shorter, `ROUNDS` times at most, until the error is
-    below `AIM` times what the tolerance allows.  A cell whose error stays above the tolerance is `MISSED`.
+    A step that the configuration fixes stays, and so does that of a search.  Otherwise it is made shorter, `ROUNDS`
+    times at most, until the error is below `AIM` times what the tolerance allows.  A cell whose error stays above the
+    tolerance is `MISSED`.
 
     While `work` goes on, the cells whose error is not known yet are `RUNNING`.
     """
@@ -160,7 +161,7 @@ def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None
         hopeless = (shorter > SHORTEST) | (errors.spin > most)
         hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
         long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
-        again = (large | by_chance) & ~hopeless & ~long & (round_ < ROUNDS) & (not part.fixed)
+        again = (large | by_chance) & ~hopeless & ~long & (round_ < ROUNDS) & (not part.fixed) & part.config.repeats
         missed = (errors.told > limit) & (not part.fixed)
         done = now.take(~again)
         part.put(rows[~again], done, np.where(missed, MISSED, rules)[~again])

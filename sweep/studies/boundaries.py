@@ -79,23 +79,16 @@ class Boundaries(Search):
         return {name: np.array([row[name] for row in rows]) for name in self.config.axes}
 
     def _search(self) -> Iterator[list[Asked]]:
-        """Follow the curves, narrow all brackets, and simulate their ends once more with their errors."""
+        """Follow the curves, and narrow all brackets, with the errors of their ends."""
         self.tolerance, self.estimates = self.sharp(self.deviation), False
         yield from iter(self._followed, [])
-        self.tolerance = self.sharp(self.width)
-        for curve in self.curves:
-            for point in curve.points:
-                point.narrow(self.width)
+        self.tolerance, self.estimates = self.sharp(self.width), self.config.integrator.estimate_errors
+        points = [(curve, point) for curve in self.curves for point in curve.points]
+        for _, point in points:
+            point.narrow(self.width)
+        wide = [(*each, end) for each in points if each[1].found for end in (each[1].root.low, each[1].root.high)]
+        yield [*wide, *self._wanted()]
         yield from iter(self._wanted, [])
-        if self.config.integrator.estimate_errors:
-            self.estimates = True
-            yield [
-                (curve, point, end)
-                for curve in self.curves
-                for point in curve.points
-                if point.found
-                for end in (point.root.low, point.root.high)
-            ]
 
     def _followed(self) -> list[Asked]:
         for curve in self.curves:

@@ -9,8 +9,8 @@ from sweep.results.memory import Memory
 from sweep.studies import SPIN_WIDTH, boundaries, critical
 from sweep.studies.search import measuring
 
-_A_POINT = 10
-"""Simulations that narrow a bracket of a boundary to the usual width and look at its ends once more, as a rule."""
+_A_POINT = 8
+"""Simulations that narrow a bracket of a boundary to the usual width, as a rule."""
 
 _A_SPIN = 4
 """Simulations that narrow the bracket of a critical spin to the usual width, as a rule."""

@@ -33,12 +33,13 @@ _FINER = 1e-4
 def measuring(config: Config) -> Config:
     """`config` with what a search needs to know of a cell; margins are those of cells that settle.
 
+    Next to a boundary many cells are above the tolerance however short the steps are, so none is repeated.
     What else a run measures unasked stays, so that both have one kernel, which takes longer to compile than a search.
     """
     usual = default(config.equations)
     measure = tuple(spec for spec in usual if spec in _NEEDED or spec in config.measure)
     integrator = config.integrator.model_copy(update={"stop_when_settled": True})
-    return replace(config, measure=measure, verify=0.0, refine=0, integrator=integrator)
+    return replace(config, measure=measure, verify=0.0, repeats=False, refine=0, integrator=integrator)
 
 
 def require_certain(config: Config) -> None:
@@ -76,11 +77,7 @@ class Search(Study):
         self.tolerance = config.integrator.tolerance
         """That of the cells that were asked for last."""
         self.estimates = config.integrator.estimate_errors
-        """Whether their errors are estimated.
-
-        While brackets are narrowed they are not: next to a boundary many are above the tolerance however short the
-        steps are, and would be run again and again.
-        """
+        """Whether their errors are estimated."""
         self.apart: list[Apart] = []
         """What the tiles that the search has learned from hold apart from their cells."""
 

@@ -1,6 +1,7 @@
 """The estimated errors of spins, beside true ones, and the repeats that they cause."""
 
 import csv
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,6 +10,7 @@ from support import CHAOTIC, ROOT, STANDARD
 from support.kernels import default_measures
 from support.runs import lengthen, run_cells, same_numbers
 
+import sweep
 from sweep.engine import errors
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.status import TIME_LIMIT
@@ -52,8 +54,10 @@ def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None
         assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8
         assert float(repeated.spin_error[0]) < 1e-8
         assert int(repeated.step_rule[0]) == REPEAT
-    monkeypatch.setattr(errors, "ROUNDS", 0)
-    once = cells([BODY], method="adams")
+    settings = {"method": "adams", "t_end": 400.0, "stop_when_settled": False}
+    once = sweep.run(
+        replace(sweep.load_config({"cases": {n: [v] for n, v in (STANDARD | BODY).items()}}, settings), repeats=False)
+    )
     assert abs(float(once.spin_final[0]) - SPINS[0]) > 1e-7
     assert float(once.spin_error[0]) > 1e-7
     assert int(once.step_rule[0]) == MISSED

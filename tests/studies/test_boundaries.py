@@ -17,11 +17,15 @@ from support.runs import Stop, same_numbers
 import sweep
 from sweep.axis import Axis
 from sweep.grid import Array
+from sweep.kernels.status import SETTLED
 from sweep.plots import levels as drawn
 from sweep.plots import picture
 from sweep.results.margins import FOUND, OPEN, Counts, smoothed
+from sweep.results.memory import Memory
+from sweep.studies.boundaries import Boundaries
 from sweep.studies.curve import Cell, Curve, Point
 from sweep.studies.roots import Root
+from sweep.studies.search import measuring
 
 AXES: dict[str, Any] = {"mu": [60.0, 72.0, 84.0], "b": [3.0, 4.0]}
 SCENE = {
@@ -106,6 +110,45 @@ def test_distances_are_of_the_level_asked_for() -> None:
     np.testing.assert_allclose(counts.distance(4), [-0.1 - 0.55, np.nan, 0.5 + 0.55])
     np.testing.assert_allclose(counts.distance([6, 7, 7]), [-0.1 - 2 * 0.55 - 0.7, np.nan, -0.2])
     assert list(counts.levels()) == [3, 4, 5]
+
+
+def test_a_spin_that_comes_no_nearer_to_zero_tells_no_distance_from_the_next_count() -> None:
+    """Cells of a line that count four, from where five begins (b = 7.7) to where three begins (b = 8)."""
+    cells = sweep.run(SCENE, mu=121.74, b=np.linspace(7.5, 7.98, 33), progress=False).squeeze()
+    counts = Counts.of({name: cells[name].values for name in drawn.NEEDED})
+    begins = float(cells.b[cells.reversals == 5].max())
+    four = np.flatnonzero(cells.reversals == 4)
+    flat = four[~counts.borders(5)[four]]
+    assert len(flat) < len(four) - 5
+    assert counts.borders(4)[four].all()
+    distance, first = counts.distance(5), cells.b.values[0]
+    expected = first + distance[0] / (distance[0] - distance[flat]) * (cells.b.values[flat] - first)
+    assert len(expected) > 3
+    np.testing.assert_allclose(expected, begins, atol=0.03)  # 0.13 to 0.25 off if margins were distances
+
+
+@pytest.mark.parametrize("width", [1e-6, 0.1])
+def test_both_ends_of_each_bracket_are_simulated_with_their_errors(width: float) -> None:
+    """With simulations that a formula replaces: one reversal begins where mu = 70 + b."""
+
+    class Formula(Memory):
+        def load(self, tile: int) -> dict[str, Array]:
+            cells = search.rounds[tile]
+            distance = cells["mu"] - 70 - cells["b"]
+            more, fewer = np.where(distance > 0, np.nan, -distance), np.where(distance > 0, distance, np.nan)
+            found = {"status": np.full(len(more), SETTLED), "reversals": (distance > 0) * 1.0}
+            return found | {"margin_more": more, "margin_fewer": fewer, "seconds": np.array(0.0), "cpu": np.array("x")}
+
+    config = measuring(sweep.load_config(SCENE, AXES))
+    search = Boundaries(config, Formula(), ("b", "mu"), width, 0.01)
+    sure: set[tuple[float, float]] = set()
+    while search.grow(lambda _: 1000):
+        if search.estimates:
+            sure |= set(zip(search.rounds[-1]["b"].tolist(), search.rounds[-1]["mu"].tolist(), strict=True))
+    points = [point for curve in search.curves for point in curve.points]
+    assert len(points) == 2
+    for point in points:
+        assert {(p["b"], p["mu"]) for p in map(point.parameters, (point.root.low, point.root.high))} <= sure
 
 
 @pytest.mark.parametrize("closed", [False, True])
