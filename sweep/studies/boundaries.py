@@ -80,7 +80,7 @@ class Boundaries(Search):
 
     def _search(self) -> Iterator[list[Asked]]:
         """Follow the curves, and narrow all brackets, with the errors of their ends."""
-        self.tolerance, self.estimates = self.sharp(self.deviation), False
+        self.tolerance = self.sharp(self.deviation)
         yield from iter(self._followed, [])
         self.tolerance, self.estimates = self.sharp(self.width), self.config.integrator.estimate_errors
         points = [(curve, point) for curve in self.curves for point in curve.points]
@@ -100,10 +100,10 @@ class Boundaries(Search):
 
     def learn(self, found: Mapping[str, Array]) -> None:
         counts = Counts.of(found)
-        sure = found.get("decided", counts.known)
         if len(self.rounds) == 1:
-            self.curves = list(self._curves(counts, sure))
+            self.curves = list(self._curves(counts))
             return
+        sure = found.get("decided", counts.known)
         levels = np.array([curve.level for curve, *_ in self._asked])
         cells = map(Cell, counts.distance(levels), counts.reversals, sure, counts.borders(levels))
         for (_, each, place), cell in zip(self._asked, cells, strict=True):
@@ -137,20 +137,19 @@ class Boundaries(Search):
         ]
         return {name: np.array([row[name] for row in rows]) for name in (*POINTS, "bracket", *self.config.axes)}
 
-    def _curves(self, found: Counts, decided: Array) -> Iterator[Curve]:
+    def _curves(self, found: Counts) -> Iterator[Curve]:
         """The curves of which the cells of the grid tell."""
         names, (x, y) = list(self.config.axes), self.across
         others = [name for name in names if name not in self.across]
         order = [names.index(name) for name in (*others, y, x)]
-        tables = [np.transpose(each.reshape(self.grid.shape), order) for each in (*vars(found).values(), decided)]
+        tables = [np.transpose(each.reshape(self.grid.shape), order) for each in vars(found).values()]
         for at in product(*(range(len(self.config.axes[name])) for name in others)):
             cell = {name: self.config.axes[name][i] for name, i in zip(others, at, strict=True)}
-            *here, sure = (_sorted(each[at], self.config.axes[y], self.config.axes[x]) for each in tables)
-            counts = Counts(*here)
-            rows, columns = (Axis(name, np.arange(length)) for name, length in zip((y, x), sure.shape, strict=True))
+            counts = Counts(*(_sorted(each[at], self.config.axes[y], self.config.axes[x]) for each in tables))
+            rows, columns = (Axis(name, np.arange(len(self.config.axes[name]))) for name in (y, x))
             for level in counts.levels():
                 distance = counts.distance(level)
-                known = distance, counts.reversals, sure, counts.borders(level)
+                known = distance, counts.reversals, counts.known, counts.borders(level)
                 for xs, ys in contours(_levelled(distance), columns, rows):
                     places = list(zip(xs.tolist(), ys.tolist(), strict=True))
                     closed = places[0] == places[-1]

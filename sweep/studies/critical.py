@@ -153,7 +153,7 @@ class CriticalSpins(Search):
         spins = [spin for spin in self.spins if spin.reason is None]
         outwards = [spin for spin in spins if not spin.root]
         if not outwards:
-            self.tolerance, self.estimates = self.sharp(self.width), False
+            self.tolerance = self.sharp(self.width)
         self._asked = [(spin, spin.wanted()) for spin in outwards or spins]
         body = np.array([spin.body for spin, places in self._asked for _ in places], int)
         n0 = np.array([spin.sign * np.exp(place) for spin, places in self._asked for place in places])

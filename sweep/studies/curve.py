@@ -37,6 +37,7 @@ class Cell(NamedTuple):
     """From the boundary, in spin; NaN where there is no count."""
     reversals: int
     decided: bool
+    """Whether the count is certain, or its error is not known."""
     measured: bool
     """Whether the distance is the measured one, not a guess."""
 

@@ -76,7 +76,7 @@ class Search(Study):
         """The parameters that vary, of the cells of each round."""
         self.tolerance = config.integrator.tolerance
         """That of the cells that were asked for last."""
-        self.estimates = config.integrator.estimate_errors
+        self.estimates = False
         """Whether their errors are estimated."""
         self.apart: list[Apart] = []
         """What the tiles that the search has learned from hold apart from their cells."""
