@@ -1,4 +1,4 @@
-"""Sphinx: `python -m sphinx -W --keep-going -b html docs build/docs` (README, "Go on").
+"""Sphinx: `python -m sphinx -j auto -W --keep-going -b html docs build/docs` (README, "Go on").
 
 Nothing here needs a network: MathJax lies in _static, and no inventory of another project is loaded.
 """

@@ -28,7 +28,20 @@ TYPESET = "window.MathJax?.startup?.promise.then(() => null, String)"
 @pytest.fixture(scope="module")
 def pages() -> list[Path]:
     """Every page, built by the command of the README; what has not changed since the last build is not made again."""
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", "docs", "build/docs"]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-j",
+        "auto",
+        "-W",
+        "--keep-going",
+        "-q",
+        "-b",
+        "html",
+        "docs",
+        "build/docs",
+    ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return sorted(BUILD.rglob("*.html"))
