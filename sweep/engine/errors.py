@@ -6,8 +6,11 @@ larger by a power of the ratio of the steps, so the difference of the two spins 
 where it amplifies errors without bound, the difference is large, and no shorter step helps.  Where the companion counts
 other reversals than the run, so might another start or another computer.
 
-Two runs can end at the same spin by chance, however wrong both are.  Then their rattles differ, so an error is told as
-at least a small share of that of the rattle: of the spin whose energy is that of the difference of their states.
+Two runs can end at the same spin by chance, however wrong both are.  Then their rattles differ: where the spin whose
+energy is that of the difference of their states is large, the cell is repeated.  But the rattles agree too where the
+motion has amplified all errors along one direction.  So the error is told as at least a small share of what is to be
+expected: of the geometric mean of the tolerance, by which the step was chosen, and of what the energy balance tells.
+For `adams` that mean tells the error to a factor of seven, whatever the motion.
 
 Of the other ways to an error, local estimates (the embedded formula, predictor less corrector) and the energy balance
 know nothing of what the motion does to an error; the balance misses it by a factor of 10 to 30.  A tangent costs twice
@@ -54,8 +57,9 @@ APART = 0.1
 """The same for the difference of the two spins relative to their size: they have nothing in common any more."""
 
 OF_RATTLE = 1 / 20
-"""Least share of the error of the rattle that the error of the spin is taken to be.  With a tenth, fewer errors are
-told ten times too small (0.8 % for 1.2 % of wide cells), but one in twenty is ten times too large."""
+"""Share of the error of the rattle beyond which spins are taken to agree by chance.  With a sixtieth, one of 300 wide
+cells was off by five times the tolerance unawares.  Where nothing else is to be expected, an error is told as at least
+that much."""
 
 _MILD = 2.0
 
@@ -77,8 +81,10 @@ class Errors:
 
     spin: Array
     """Error of the spin at the end by the spin of the companion; NaN for runs that failed, infinite if that did."""
+    rattle: Array
+    """Error of the rattle, as that of the spin with its energy; NaN where there is no companion."""
     least: Array
-    """What it is at least, by the error of the rattle; NaN where there is no companion."""
+    """What the error of the spin is told to be at least; NaN where there is no companion."""
     reversals: Array
     """The companions' counts; NaN where there is none."""
     apart: Array
@@ -156,7 +162,7 @@ def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None
         errors, limit = compare(now, other), allowed(now)
         shorter = np.fmax((errors.spin / (AIM * limit)) ** (1 / _ORDER), 1.0)
         large = errors.spin > AIM * limit
-        by_chance = ~large & (errors.least > AIM * limit)
+        by_chance = ~large & (OF_RATTLE * errors.rattle > AIM * limit)
         shorter = np.where(np.isinf(errors.spin) | by_chance, METHODS[part.method].companion, shorter)
         hopeless = (shorter > SHORTEST) | (errors.spin > most)
         hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
@@ -207,9 +213,17 @@ def compare(part: Part, companion: Part) -> Errors:
     if "margin" in kernel.measure:
         margins = np.stack([np.abs(table[name] - other[name]) for name in EXTREMES]) / larger
     margins[:, failed] = np.nan
-    least = np.where(failed, np.nan, OF_RATTLE * rattle / larger)
     spin = np.where(failed, np.inf, difference / larger)
-    return Errors(spin, least, np.where(failed, np.nan, counts), apart, *margins)
+    rattle = np.where(failed, np.nan, rattle / larger)
+    return Errors(spin, rattle, _least(part, rattle), np.where(failed, np.nan, counts), apart, *margins)
+
+
+def _least(part: Part, rattle: Array) -> Array:
+    """What the errors of the cells of `part` are at least, shape (cells,), if that of the rattle is `rattle`."""
+    share, balance = METHODS[part.method].least_error, imbalance(part)
+    known = np.isfinite(balance + rattle) & (share > 0) & (not part.fixed)
+    expected = np.sqrt(np.where(known, balance, 0.0) * allowed(part))
+    return np.where(known, share * expected, OF_RATTLE * rattle)
 
 
 def _ratio(part: Part) -> Array:

@@ -72,6 +72,9 @@ class Method:
     """Ratio of the steps of the run that tells a cell's error to its own (`sweep.engine.errors`)."""
     error_order: int = 5
     """The power of the step with which that error is taken to grow."""
+    least_error: float = 0.0
+    """Least share that it is of the geometric mean of what the tolerance allows and what the energy balance tells; 0 if
+    it has nothing to do with it."""
     foresight: float = 0.0
     """Number of steps ahead of the time limit from which on it may decide by what is left.  A trajectory that has
     ended before does not depend on the limit."""

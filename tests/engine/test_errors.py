@@ -37,13 +37,15 @@ SPINS = np.array(
 cells = partial(run_cells, t_end=400.0, stop_when_settled=False)
 
 
-@pytest.mark.parametrize(("method", "step"), [("dopri5", 0.01), ("adams", 0.05)])
-def test_estimates_are_near_true_errors(method: str, step: float) -> None:
-    """The last keeps its spin in long steps of adams, but not the phase of its rattle: told fifty times too large."""
-    found = cells([BODY, *WIDE], method=method, step=step)
-    ratio = found.spin_error.values / np.abs(found.spin_final.values - SPINS)
-    assert np.all((ratio > 0.1) & (ratio < [20, 20, 20, 20, 60])), ratio
-    assert set(found.step_rule.values.tolist()) == {FIXED}
+@pytest.mark.parametrize(
+    ("method", "steps"), [("dopri5", [0.008, 0.01, 0.012]), ("adams", [0.04, 0.045, 0.05, 0.055, 0.06])]
+)
+def test_estimates_are_near_true_errors(method: str, steps: list[float]) -> None:
+    """In several steps, because in any one of them a spin may be right by chance."""
+    runs = [cells([BODY, *WIDE], method=method, step=step) for step in steps]
+    ratio = np.array([run.spin_error.values / np.abs(run.spin_final.values - SPINS) for run in runs])
+    assert np.all((ratio > 0.1) & (np.median(ratio, axis=0) < 20)), ratio
+    assert {rule for run in runs for rule in run.step_rule.values.tolist()} == {FIXED}
 
 
 def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,15 +66,32 @@ def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_spins_alike_by_chance_are_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Here run and companion are both off by 7e-5, and their spins differ by 1e-7."""
-    body = {"a": 10.3419, "b": 1.03272, "c": 0.75863, "delta": 0.201271}
-    start = {"mu": 31.895, "n0": 0.123607, "x0": 0.683495, "y0": 0.00321463}
-    true = -0.006283033589318104  # Taylor series at 1e-16: `scripts/reference_wide.py`.
-    found = cells([body | start], method="adams", tolerance=1e-6)
-    assert abs(float(found.spin_final[0]) - true) < 1e-6
+    """Here run and companion are both off by 5e-8, and their spins differ by 5e-9."""
+    body = {"a": 13.0154, "b": 2.63841, "c": 1.3931, "delta": 0.438128}
+    start = {"mu": 1063.93, "n0": 0.169982, "x0": 0.681233, "y0": -0.0524919}
+    true = 0.049114303389740155  # Taylor series at 1e-16: `scripts/reference_wide.py`.
+    found = cells([body | start], method="adams")
+    assert abs(float(found.spin_final[0]) - true) < 1e-8
     assert int(found.step_rule[0]) == REPEAT
     monkeypatch.setattr(errors, "OF_RATTLE", 0.0)
-    assert abs(float(cells([body | start], method="adams", tolerance=1e-6).spin_final[0]) - true) > 1e-5
+    assert abs(float(cells([body | start], method="adams").spin_final[0]) - true) > 3e-8
+
+
+def test_an_error_is_not_far_below_what_is_to_be_expected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Here run and companion end at the same spin, and their rattles agree as well."""
+    bodies = [
+        dict(zip(STANDARD, row, strict=True))
+        for row in [
+            (4.72275, 2.97528, 1.58431, 0.474342, 0.15999, 0.00628562, -0.315556, -0.250348),
+            (20.3576, 4.38664, 1.45305, 0.385207, 0.628137, 0.00519158, -0.64222, -0.0138771),
+        ]
+    ]
+    true = [0.006310717940808602, 0.005507758011798786]  # dopri5 at a tolerance of 1e-12; adams is within 6e-13 of it
+    found = cells(bodies, method="adams", tolerance=1e-6)
+    error = np.abs(found.spin_final.values - true)
+    assert np.all((error > 1e-9) & (found.spin_error.values > error / 2) & (found.spin_error.values < 2 * error))
+    monkeypatch.setattr(errors, "METHODS", {"adams": replace(errors.METHODS["adams"], least_error=0.0)})
+    assert np.all(cells(bodies, method="adams", tolerance=1e-6).spin_error.values < error / 10)
 
 
 def test_what_nobody_asked_for_is_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,4 +131,4 @@ def test_wide_cells_keep_the_tolerance_or_say_so(tolerance: float) -> None:
     assert np.all(error[silent] <= 3 * tolerance)
     ratio = (told / error)[sharp & (error > 1e-3 * tolerance) & np.isfinite(told)]
     assert 1 / 3 < np.median(ratio) < 3
-    assert np.mean(ratio < 0.1) < 0.04
+    assert np.mean(ratio < 0.1) < 0.01

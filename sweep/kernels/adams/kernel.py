@@ -260,7 +260,8 @@ METHOD = Method(
     step_cost=0.64,
     start_up_cost=650.0,
     compile_seconds=14.0,
-    companion=1.35,
+    companion=1.2,
     error_order=4,
+    least_error=0.03,
     foresight=stretches.WORTHWHILE,
 )
