@@ -45,5 +45,5 @@ def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path,
 
     with Terminal():
         failed = report(output, click.echo)
-    click.echo(f"\nwrote {output / files}; {len(failed)} {rows} do not hold")
+    click.echo(f"\nwrote {output / files}; {rows} that do not hold: {len(failed) or 'none'}")
     sys.exit(ROWS_FAILED if failed else DONE)
