@@ -83,12 +83,16 @@ class Boundaries(Search):
         self.tolerance = self.sharp(self.deviation)
         yield from iter(self._followed, [])
         self.tolerance, self.estimates = self.sharp(self.width), self.config.integrator.estimate_errors
-        points = [(curve, point) for curve in self.curves for point in curve.points]
-        for _, point in points:
+        points = [(curve, point, set(point.cells)) for curve in self.curves for point in curve.points]
+        for _, point, _ in points:
             point.narrow(self.width)
-        wide = [(*each, end) for each in points if each[1].found for end in (each[1].root.low, each[1].root.high)]
-        yield [*wide, *self._wanted()]
         yield from iter(self._wanted, [])
+        yield [
+            (curve, point, end)
+            for curve, point, before in points
+            for end in (point.root.low, point.root.high)
+            if end in before and point.found
+        ]
 
     def _followed(self) -> list[Asked]:
         for curve in self.curves:

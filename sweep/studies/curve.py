@@ -73,12 +73,13 @@ class Point(Line):
         values = {place: cell.distance for place, cell in cells.items()}
         smooth = {place: values[place] for place, cell in cells.items() if cell.measured}
         width = min(deviation / 2, _COARSE) * float(np.ptp(along.straight(along.values)))
-        return cls(along, cell, cells, Root(min(ends), max(ends), width, values, smooth))
+        return cls(along, cell, cells, Root(min(ends), max(ends), width, values, smooth, roughly=True))
 
     def narrow(self, width: float) -> None:
         """Set the final width of the bracket, relative to the parameter."""
-        size = np.abs(self.along.bent(np.array([self.root.low, self.root.high])))
-        self.root.width = width * (1.0 if self.along.spacing == "log" else float(size.min() or size.max()))
+        root = self.root
+        size = np.abs(self.along.bent(np.array([root.expected, root.low, root.high])))
+        root.roughly, root.width = False, width * (1.0 if self.along.spacing == "log" else float(size[0] or size.max()))
 
     @property
     def found(self) -> bool:

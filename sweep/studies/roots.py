@@ -1,9 +1,9 @@
 """Narrows brackets around the roots of functions that simulations evaluate, for many roots at once.
 
 What counts is only the sign.  The value proposes where to look next: near a root it is smooth, so that interpolation
-through the nearest values finds it within a few evaluations (inverse interpolation; Brent 1973, chapter 4).  The next
-two places are just below and above the proposed one, as far apart as the proposals differ, so that both ends of a
-bracket close in.  Where that fails, the bracket is cut into equal parts.
+through the nearest values finds it within a few evaluations (inverse interpolation; Brent 1973, chapter 4).  Once the
+proposals hardly differ, or have been followed a few times, the next two places are just below and above the proposed
+one, so that both ends of the bracket close in.  Where that fails, the bracket is cut into equal parts.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ _HALF = 0.45
 # How far on each side of a proposed root the next places are, in units of its uncertainty; and the factor by which they
 # are farther in each round after the root was on neither side.
 _BESIDE, _FARTHER = 2.0, 10.0
+
+# The most proposals that are followed one by one.  With pairs from the start it takes one evaluation more.
+_ALONE = 3
 
 # Equal parts into which a bracket is cut where no value tells better.
 _PARTS = 4
@@ -38,17 +41,21 @@ class Root:
     """What is known: the function by place."""
     smooth: dict[float, float]
     """Of these, the values that belong to the one smooth function that passes through the root."""
+    roughly: bool = False
+    """It may end where the values tell the root within the width, without a bracket as narrow."""
     blank: list[float] = field(default_factory=list)
     """The places at which it has no value."""
     _pair: list[float] = field(default_factory=list)
     """The places proposed last around a root; empty if the bracket was cut."""
+    _alone: int = 0
+    """Places proposed one by one since the last pair."""
     _missed: int = 0
     """Rounds since the root was last between these."""
 
     @property
     def ended(self) -> bool:
         rounding = 4 * float(np.spacing(max(abs(self.low), abs(self.high))))
-        return self.unknown or self.high - self.low <= max(self.width, rounding)
+        return self.unknown or self.high - self.low <= max(self.width, rounding) or self._known
 
     @property
     def unknown(self) -> bool:
@@ -65,9 +72,15 @@ class Root:
         inside = not self._pair or (self._pair[0] <= self.low and self.high <= self._pair[-1])
         self._missed = 0 if inside else self._missed + 1
         root, off = self._proposed()
-        off = max(_BESIDE * _FARTHER**self._missed * off, _HALF * self.width)
+        off, aside = _BESIDE * _FARTHER**self._missed * off, _HALF * self.width
+        sure = self.low < root < self.high and _PARTS * max(off, aside) < self.high - self.low
+        if sure and not self._missed and off > aside and self._alone < _ALONE:
+            self._pair, self._alone = [], self._alone + 1
+            # It may stay an end of the bracket, and is not to be so near the root that its sign is in doubt.
+            return [root + aside if self.high - root > root - self.low else root - aside]
+        off, self._alone = max(off, aside), 0
         self._pair = [place for place in (root - off, root + off) if self.low < place < self.high]
-        if self.low < root < self.high and _PARTS * off < self.high - self.low:
+        if sure:
             return self._pair
         self._pair = []
         return [self.low + (self.high - self.low) * part / _PARTS for part in range(1, _PARTS)]
@@ -86,6 +99,14 @@ class Root:
             self.low = place
         else:
             self.high = place
+
+    @property
+    def _known(self) -> bool:
+        """True if the values tell the root within the width, and that is enough."""
+        if not self.roughly or len(self.smooth) < 3:
+            return False
+        root, off = self._proposed()
+        return self.low <= root <= self.high and _BESIDE * off <= _HALF * self.width
 
     def _proposed(self) -> tuple[float, float]:
         """Where the root is, as far as the values tell, and how uncertain that is."""

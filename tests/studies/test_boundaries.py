@@ -56,8 +56,8 @@ def test_a_smooth_root_takes_few_evaluations(at: float, steep: float, bent: floa
 
     root, calls = narrowed(function, 0.0, 1.0, 1e-6)
     assert root.low <= at <= root.high <= root.low + 1e-6
-    assert calls <= 24
-    assert steep > 2 or abs(bent) > 0.5 or calls <= 9
+    assert calls <= 20
+    assert steep > 2 or abs(bent) > 0.5 or calls <= 6
 
 
 @given(st.floats(0.01, 0.99))
@@ -65,6 +65,14 @@ def test_a_step_is_bracketed_too(at: float) -> None:
     root, calls = narrowed(lambda x: 1.0 if x > at else -1.0, 0.0, 1.0, 1e-6)
     assert root.low <= at <= root.high <= root.low + 1e-6
     assert calls <= 60
+
+
+def test_a_bracket_is_narrow_beside_its_place_not_beside_the_ends_of_an_edge() -> None:
+    axis = Axis("mu", np.array([0.0, 10.0]))
+    cells = {0.0: Cell(-4.0, 0, True, True), 10.0: Cell(6.0, 1, True, True)}
+    point = Point.between(axis, {}, cells, (0.0, 10.0), 0.01)
+    point.narrow(1e-6)
+    assert np.isclose(point.root.width, 4e-6)
 
 
 def test_a_place_without_a_value_ends_the_search() -> None:
