@@ -5,6 +5,7 @@ python -m pytest -m browser -n0 tests/test_pages.py
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -28,20 +29,7 @@ TYPESET = "window.MathJax?.startup?.promise.then(() => null, String)"
 @pytest.fixture(scope="module")
 def pages() -> list[Path]:
     """Every page, built by the command of the README; what has not changed since the last build is not made again."""
-    command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-j",
-        "auto",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-b",
-        "html",
-        "docs",
-        "build/docs",
-    ]
+    command = [sys.executable, *shlex.split("-m sphinx -j auto -W --keep-going -q -b html docs build/docs")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return sorted(BUILD.rglob("*.html"))

@@ -73,8 +73,8 @@ class Method:
     error_order: int = 5
     """The power of the step with which that error is taken to grow."""
     least_error: float = 0.0
-    """Least share that it is of the geometric mean of what the tolerance allows and what the energy balance tells; 0 if
-    it has nothing to do with it."""
+    """That error is told as at least this share of the geometric mean of what the tolerance allows and what the energy
+    balance tells; 0 if that mean tells nothing of it."""
     foresight: float = 0.0
     """Number of steps ahead of the time limit from which on it may decide by what is left.  A trajectory that has
     ended before does not depend on the limit."""

@@ -9,6 +9,7 @@ one, so that both ends of the bracket close in.  Where that fails, the bracket i
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import prod
 
 import numpy as np
 
@@ -73,17 +74,17 @@ class Root:
         self._missed = 0 if inside else self._missed + 1
         root, off = self._proposed()
         off, aside = _BESIDE * _FARTHER**self._missed * off, _HALF * self.width
-        sure = self.low < root < self.high and _PARTS * max(off, aside) < self.high - self.low
-        if sure and not self._missed and off > aside and self._alone < _ALONE:
-            self._pair, self._alone = [], self._alone + 1
+        far, self._pair = max(off, aside), []
+        if not self.low < root < self.high or _PARTS * far >= self.high - self.low:
+            self._alone = 0
+            return [self.low + (self.high - self.low) * part / _PARTS for part in range(1, _PARTS)]
+        if off > aside and not self._missed and self._alone < _ALONE:
+            self._alone += 1
             # It may stay an end of the bracket, and is not to be so near the root that its sign is in doubt.
             return [root + aside if self.high - root > root - self.low else root - aside]
-        off, self._alone = max(off, aside), 0
-        self._pair = [place for place in (root - off, root + off) if self.low < place < self.high]
-        if sure:
-            return self._pair
-        self._pair = []
-        return [self.low + (self.high - self.low) * part / _PARTS for part in range(1, _PARTS)]
+        self._alone = 0
+        self._pair = [place for place in (root - far, root + far) if self.low < place < self.high]
+        return self._pair
 
     def learn(self, place: float, value: float, *, smooth: bool) -> None:
         """Take in the value at a place; NaN where there is none."""
@@ -128,5 +129,5 @@ def _inverse(known: list[tuple[float, float]]) -> float:
     """The place at which the polynomial place(value) has the value zero."""
     found = 0.0
     for i, (place, value) in enumerate(known):
-        found += place * float(np.prod([other / (other - value) for j, (_, other) in enumerate(known) if j != i]))
+        found += place * prod(other / (other - value) for j, (_, other) in enumerate(known) if j != i)
     return found
