@@ -23,7 +23,6 @@ from sweep.engine import local
 from sweep.engine.cluster import Cluster
 from sweep.engine.local import Done
 from sweep.engine.run import tile_size
-from sweep.grid import Grid
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.provenance import identify
 
@@ -44,7 +43,7 @@ def replace_work(arrays: dict[str, Any]) -> None:
 
 def main(workers: int = 8) -> None:
     config = load_config(CONFIG, {"verify": 0, "t_end": 20, "mu": list(range(1, 1 + CELLS)), "b": 3, "n0": 0.05})
-    grid = Grid.of(config)
+    grid = config.grid
     tiles = grid.tiles(CELLS)
     ((_, real),) = local.run_batch(config, tiles, [0])
     print(f"bytes a cell on the way: {len(pickle.dumps(real)) / grid.size:.0f}")

@@ -21,7 +21,6 @@ from scipy.integrate import solve_ivp
 from short_steps import bodies
 
 import sweep
-from sweep.grid import Grid
 from sweep.kernels.measures.misfit import Film
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
@@ -38,7 +37,7 @@ FREE = ("mu", "omega3", "roll", "pitch")
 
 def spins(config: sweep.Config, law: str, times: np.ndarray) -> np.ndarray | None:
     """The spins of the one body of `config`, or None if it lifts off or topples."""
-    columns, model = Grid.of(config).columns(), config.equations
+    columns, model = config.grid.columns(), config.equations
     p = {name: float(value[0]) for name, value in columns.items()}
     start = np.array(model.start(columns))[:, 0]
     # DOP853 took three times as many evaluations for most bodies, and minutes for stiff ones.

@@ -17,7 +17,6 @@ import numpy as np
 import sweep
 from sweep.engine import executor
 from sweep.engine.plan import kernel_of
-from sweep.grid import Grid
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import FAILURES
 from sweep.results.dataset import measured
@@ -32,7 +31,7 @@ MILLION, BATCH, STEP = 1_000_000, 100_000, 0.01
 def by_chance(millions: int) -> tuple[np.ndarray, int]:
     """How many of the starts reverse so often or more, from once on, and how many did not fail; by the kernel alone."""
     config = sweep.load_config({**SCENE, "start": {"n0": 0.3, "x0": 0.2, "y0": 0.1}})
-    kernel, one = kernel_of(PLAIN, config), Grid.of(config).columns()
+    kernel, one = kernel_of(PLAIN, config), config.grid.columns()
     random, beyond, valid, began = np.random.default_rng(1), np.zeros(8, np.int64), 0, time.perf_counter()
     for number in range(millions * MILLION // BATCH):
         columns = {name: np.full(BATCH, value[0]) for name, value in one.items()} | {

@@ -25,7 +25,6 @@ import numpy as np
 
 from sweep.config import load_config
 from sweep.engine.plan import Choice, choose
-from sweep.grid import Grid
 from sweep.kernels.build import build
 from sweep.kernels.measures import MEASURES
 
@@ -45,7 +44,7 @@ def works(files: list[str]) -> dict[str, Work]:
     configs += [("adams", load_config(STANDARD, {"measure": [], "method": "adams"}))]
     configs += [(Path(file).stem, load_config(file)) for file in files]
     for name, config in configs:
-        for choice in choose(config, Grid.of(config).sample(64)):
+        for choice in choose(config, config.grid.sample(64)):
             found[f"{name}, {choice.method}"] = choice, config.integrator.t_end
     return found
 

@@ -22,7 +22,6 @@ import sweep
 from sweep.config import Config
 from sweep.engine import executor
 from sweep.engine.plan import kernel_of
-from sweep.grid import Grid
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -79,7 +78,7 @@ def with_law(name: str, seed: int = 7) -> xr.Dataset:
 
 def compared(config: Config, cells: int = 0) -> xr.Dataset:
     """The dataset of a configuration, or of some cells of it, with the errors that shorter steps tell."""
-    grid = Grid.of(config)
+    grid = config.grid
     rows = np.sort(np.random.default_rng(0).permutation(grid.size)[: cells or None])
     columns = grid.take(rows).columns()
     if cells:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import product
 from math import prod
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +17,6 @@ Array = NDArray[Any]
 
 Tile = tuple[slice, ...]
 """A part of a grid: a range of each of its dimensions."""
-
-
-class Sweepable(Protocol):
-    """What a grid is made from, such as a `sweep.config.Config`."""
-
-    @property
-    def parameters(self) -> Mapping[str, Any]: ...
-    @property
-    def cases(self) -> Mapping[str, tuple[float, ...]] | None: ...
-    @property
-    def row(self) -> str: ...
 
 
 CASE, SAMPLE = "case", "sample"
@@ -41,34 +30,19 @@ class Grid:
     axes: dict[str, Array]
     """Values by axis."""
     constants: dict[str, float]
-    table: dict[str, Array] | None = None
+    table: dict[str, Array] = field(default_factory=dict)
     """Columns of the table by parameter, each of shape (rows,)."""
     row: str = CASE
     """Name of the dimension along the rows of the table."""
 
-    @classmethod
-    def of(cls, config: Sweepable) -> Grid:
-        """The grid of all cells of a configuration."""
-        values = config.parameters
-        return cls(
-            axes={name: np.array(v.numbers) for name, v in values.items() if v.is_axis},
-            constants={n: v.numbers[0] for n, v in values.items() if not v.is_axis and n not in (config.cases or ())},
-            table=None if config.cases is None else {k: np.array(v) for k, v in config.cases.items()},
-            row=config.row,
-        )
-
-    @property
-    def rows(self) -> int | None:
-        """The length of the table, if there is one."""
-        return None if self.table is None else len(next(iter(self.table.values())))
-
     @property
     def dims(self) -> tuple[str, ...]:
-        return (*self.axes, *([] if self.table is None else [self.row]))
+        return (*self.axes, *([self.row] if self.table else []))
 
     @property
     def shape(self) -> tuple[int, ...]:
-        return (*map(len, self.axes.values()), *([] if self.rows is None else [self.rows]))
+        rows = {len(column) for column in self.table.values()}  # all are of one length
+        return (*map(len, self.axes.values()), *rows)
 
     @property
     def size(self) -> int:
@@ -84,13 +58,13 @@ class Grid:
     def _at(self, places: Sequence[Any]) -> dict[str, Array]:
         """Values of what varies, at these indices along each dimension."""
         found = {name: values[at] for (name, values), at in zip(self.axes.items(), places, strict=False)}
-        return found | {name: values[places[-1]] for name, values in (self.table or {}).items()}
+        return found | {name: values[places[-1]] for name, values in self.table.items()}
 
-    def _over(self, places: Sequence[Any]) -> Grid:
-        """The grid over these places along each dimension."""
+    def part(self, places: Sequence[Any]) -> Grid:
+        """The grid over these places along each dimension, such as a tile."""
         found = self._at(places)
-        table = None if self.table is None else {name: found[name] for name in self.table}
-        return replace(self, axes={name: found[name] for name in self.axes}, table=table)
+        axes, table = ({name: found[name] for name in names} for names in (self.axes, self.table))
+        return replace(self, axes=axes, table=table)
 
     def tiles(self, cells: int) -> list[Tile]:
         """Tiles of about `cells` cells that cover the grid; each is contiguous in C order."""
@@ -107,10 +81,6 @@ class Grid:
             for corner in product(*ranges)
         ]
 
-    def part(self, tile: Tile) -> Grid:
-        """The grid of the cells of a tile."""
-        return self._over(tile)
-
     def take(self, cells: Array) -> Grid:
         """The cells with these indices, as a list of cases."""
         if not self.shape:
@@ -123,7 +93,7 @@ class Grid:
             return self
         each = max(2, int(cells ** (1 / sum(n > 1 for n in self.shape))))
         places = [np.unique(np.linspace(0, n - 1, min(each, n)).round().astype(int)) for n in self.shape]
-        return self._over(places)
+        return self.part(places)
 
     def first_cell(self, tile: Tile) -> int:
         """Index of the first cell of a tile, in the C order of the grid."""
@@ -133,8 +103,8 @@ class Grid:
         """The grid of the bodies, without the start parameters.  Every case is a body of its own."""
         fixed = {name: float(values[0]) for name, values in self._at([slice(1)] * len(self.shape)).items()}
         kept = {name: values for name, values in self.axes.items() if name not in START}
-        table = self.table if self.table and (self.row == CASE or set(self.table) - START) else None
-        constants = self.constants | {name: fixed[name] for name in fixed if name not in {**kept, **(table or {})}}
+        table = self.table if self.row == CASE or set(self.table) - START else {}
+        constants = self.constants | {name: fixed[name] for name in fixed if name not in {**kept, **table}}
         return replace(self, axes=kept, constants=constants, table=table)
 
     def bodies(self) -> tuple[Grid, Array]:

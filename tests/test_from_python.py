@@ -15,7 +15,9 @@ from support import Write
 from support.runs import same_numbers
 
 import sweep
+from sweep.axis import Axis
 from sweep.config import ConfigError, load_config
+from sweep.plots.fine import critical_spins
 
 TEXT = "name: quick\nmodel: averaged\nbody: {b: [2, 3]}\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
 SAID = {
@@ -251,6 +253,27 @@ def test_a_dataset_does_what_the_package_does_with_it(tmp_path: Path) -> None:
     opened = sweep.open(tmp_path / "quick.nc")
     xr.testing.assert_equal(opened.sweep.trajectory(mu=60, b=3), sweep.trajectory(SAID, mu=60, b=3))
     xr.testing.assert_equal(opened.sweep.trajectory(t_end=20), sweep.trajectory(SAID, mu=40, b=2, t_end=20))
+
+
+@pytest.mark.parametrize("name", ["cells.csv", "a name with spaces so long that YAML folds it, onto one more line.csv"])
+def test_a_dataset_needs_no_other_file_for_its_trajectories(tmp_path: Path, name: str) -> None:
+    """The first of its cases stands in for the table."""
+    (tmp_path / name).write_text("mu,n0\n60,0.05\n70,0.06\n", encoding="utf-8")
+    config = tmp_path / "table.yaml"
+    config.write_text(f"model: averaged\ncases: {name}\nintegrator: {{t_end: 20}}\n", encoding="utf-8")
+    dataset = sweep.run(config)
+    (tmp_path / name).unlink()
+    expected = sweep.trajectory({"model": "averaged", "friction": {"mu": 60}, "integrator": {"t_end": 20}}, n0=0.06)
+    xr.testing.assert_allclose(dataset.sweep.trajectory(n0=0.06), expected)
+
+
+@pytest.mark.parametrize("text", ["configs/mu.yaml", "5", "[1]", "a: ["])
+def test_what_a_dataset_tells_has_to_be_a_configuration(text: str) -> None:
+    dataset = sweep.predict(SAID)
+    dataset.attrs["config"] = text
+    with pytest.raises(ConfigError, match="config"):
+        dataset.sweep.trajectory()
+    assert not critical_spins(dataset, Axis("mu", dataset.mu.values), Axis("b", dataset.b.values))
 
 
 def test_a_dataset_does_not_run_the_code_of_another(tmp_path: Path) -> None:

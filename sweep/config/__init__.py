@@ -22,7 +22,6 @@ from sweep.config.messages import describe
 from sweep.config.schema import Integrator
 from sweep.config.values import MAX_AXIS, Values
 from sweep.faults import ConfigError, Fault
-from sweep.grid import Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
@@ -116,7 +115,7 @@ def _source(config: ConfigLike) -> document.Document:
     values = config.document()
     known: dict[tuple[str, str], Any] = {("film", config.film_file): config.film}
     known["model", config.model] = config.origin
-    if config.cases is not None and not config.samples:
+    if config.cases and not config.samples:
         values["cases"] = config.cases_file or "cases"
         known["cases", values["cases"]] = config.cases
     return document.Document("", values, known=known)
@@ -133,20 +132,20 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     """Fill in defaults, order the axes, and check that everything fits together."""
     known = loading.table(origin)
     given = _given(values, source, known)
-    columns = None
+    columns: cases.Columns = {}
     if values.cases is not None:  # it may be ""
         columns = source.once("cases", values.cases, lambda: cases.read(source, values.cases, known))
     seen = film_in(values.measure or ())
-    physics = _physics(values, origin, frozenset((*given, *(columns or ()))))
+    physics = _physics(values, origin, frozenset((*given, *columns)))
     _refuse(source, cross_checks.of_physics(values, physics, origin))
     model = model_of(values.model, origin, physics)
     uncertain = {n: v.distribution for n, v in given.items() if v.distribution and n in model.parameters}
     samples = values.samples or (_samples(values.until) if uncertain else None)
     if samples and uncertain and values.cases is None:
         columns = drawn(uncertain, samples, values.seed)
-    parameters = _parameters(model, given, columns or {}, known, physics)
+    parameters = _parameters(model, given, columns, known, physics)
     rattleback = not origin or loading.law(origin) is not None
-    numbers = {name: value.numbers for name, value in parameters.items()} | (columns or {})
+    numbers = {name: value.numbers for name, value in parameters.items()} | columns
     config = Config(
         name=values.name,
         model=values.model,
@@ -169,7 +168,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         origin=origin,
     )
     if values.verify is None and config.integrator.method == methods.AUTO and not config.refine:
-        config = replace(config, verify=schema.VERIFIED if Grid.of(config).size * schema.VERIFIED >= 1 else 0.0)
+        config = replace(config, verify=schema.VERIFIED if config.grid.size * schema.VERIFIED >= 1 else 0.0)
     object.__setattr__(config, "source", source)
     _refuse(source, cross_checks.of_values(config, given))
     user_models.try_out(config)

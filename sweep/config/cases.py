@@ -57,8 +57,8 @@ def _of_csv(source: Document, name: str) -> _Table:
     except csv.Error as error:
         reason = f"{brief(str(path))}: not a readable CSV file: {error}"
         raise ConfigError([source.fault(("cases",), reason)]) from None
-    (_, header), *rows = lines or [(1, [])]
-    misshapen = list(_misshapen(str(path), header, rows))
+    (top, header), *rows = lines or [(1, [])]
+    misshapen = list(_misshapen(str(path), top, header, rows))
     rows = [(line, row) for line, row in rows if len(row) == len(header)]
     if not 0 < len(rows) <= MAX_AXIS:
         raise ConfigError(misshapen)
@@ -66,13 +66,13 @@ def _of_csv(source: Document, name: str) -> _Table:
 
     def place(at: faults.Path, words: str) -> Fault:
         name, *row = at
-        line = rows[int(row[0])][0] if row else 1
+        line = rows[int(row[0])][0] if row else top
         return Fault(str(path), line, header.index(str(name)) + 1, (name,), words)
 
     return {name: [row[i] for row in cells] for i, name in enumerate(header)}, place, misshapen
 
 
-def _misshapen(file: str, header: list[str], rows: list[tuple[int, list[str]]]) -> Iterator[Fault]:
+def _misshapen(file: str, top: int, header: list[str], rows: list[tuple[int, list[str]]]) -> Iterator[Fault]:
     if not header:
         yield Fault(file, None, None, (), "empty; its first line has to name the columns, such as mu,n0")
     elif not 0 < len(rows) <= MAX_AXIS:
@@ -80,10 +80,10 @@ def _misshapen(file: str, header: list[str], rows: list[tuple[int, list[str]]]) 
     first: dict[str, int] = {}
     for column, name in enumerate(header, start=1):
         if first.setdefault(name, column) != column:
-            yield Fault(file, 1, column, (name,), "a second column of this name; remove one of the two")
+            yield Fault(file, top, column, (name,), "a second column of this name; remove one of the two")
     for line, row in rows:
         if len(row) != len(header):
-            yield Fault(file, line, None, (), f"{len(row)} values, but {len(header)} columns in line 1")
+            yield Fault(file, line, None, (), f"{len(row)} values, but {len(header)} columns in line {top}")
 
 
 def _of_parquet(source: Document, name: str) -> _Table:

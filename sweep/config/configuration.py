@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Any
 
+import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.compat import StringIO
 
@@ -17,7 +18,7 @@ from sweep.config.document import Document
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
 from sweep.faults import Fault, Path
-from sweep.grid import CASE, SAMPLE
+from sweep.grid import CASE, SAMPLE, Grid
 from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.models import TIERS
 from sweep.models.general import laws
@@ -42,7 +43,7 @@ def film_in(measure: Iterable[str]) -> str:
 def model_of(name: str, origin: Origin | None, physics: Physics) -> Tier:
     """The model of this name, a variant of it for what the paper's does not know, or the one that a user brings."""
     if origin:
-        return loading.find(origin, physics.units, physics.names, physics.surface.name)
+        return loading.find(origin, physics)
     return physics.variant(name) if physics.beyond and name in BASES else TIERS[name]
 
 
@@ -64,7 +65,7 @@ class Config:
     repeats: bool = True
     """Whether cells whose error is above the tolerance are run again, in shorter steps."""
     refine: int = 0
-    cases: dict[str, tuple[float, ...]] | None = None
+    cases: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Columns of the table of cases, if there is one, or of the samples."""
     cases_file: str | None = None
     samples: int | None = None
@@ -117,16 +118,23 @@ class Config:
         if not self.samples:
             return self
         medians = {name: Values.one(known.median) for name, known in self.distributions.items()}
-        return replace(self, parameters=self.parameters | medians, cases=None, samples=None, until=None)
+        return replace(self, parameters=self.parameters | medians, cases={}, samples=None, until=None)
 
     @property
     def axes(self) -> dict[str, tuple[float, ...]]:
         return {name: v.numbers for name, v in self.parameters.items() if v.is_axis}
 
     @property
+    def grid(self) -> Grid:
+        """All its cells."""
+        single = {name: v.numbers[0] for name, v in self.parameters.items() if not v.is_axis and name not in self.cases}
+        axes, table = ({name: np.array(v) for name, v in each.items()} for each in (self.axes, self.cases))
+        return Grid(axes, single, table, self.row)
+
+    @property
     def tier(self) -> Tier:
         """The model that runs it."""
-        names = frozenset((*self.parameters, *(self.cases or ())))
+        names = frozenset((*self.parameters, *self.cases))
         law = self.own_law or laws.LAWS[self.law]
         return model_of(self.model, self.origin, Physics(self.units, law, SURFACES[self.surface], names))
 
@@ -221,5 +229,5 @@ class Config:
         for key in ("name", "max_failed_fraction", "picture", "cases", *(["model"] if self.origin else [])):
             decisive.pop(key, None)
         seen = [self.film.sha256] if self.film else []
-        text = json.dumps([decisive, list(self.axes), self.cases, *seen], sort_keys=True)
+        text = json.dumps([decisive, list(self.axes), self.cases or None, *seen], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]

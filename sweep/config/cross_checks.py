@@ -15,7 +15,7 @@ from sweep.config.configuration import Config
 from sweep.config.schema import MAX_CELLS_IN_MEMORY
 from sweep.config.values import Values
 from sweep.faults import Path, either
-from sweep.grid import BODY, Array, Grid, distinct
+from sweep.grid import BODY, Array, distinct
 from sweep.kernels import measures, methods
 from sweep.kernels.differentiate import undifferentiable
 from sweep.kernels.measures import misfit
@@ -61,7 +61,7 @@ def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
 
 def of_all_cells(config: Config) -> Iterator[Misfit]:
     """Check all cells together; each check relies on those before it."""
-    cells = Grid.of(config).size
+    cells = config.grid.size
     if cells > MAX_CELLS:
         yield (), f"{cells} cells are too many; keep to {MAX_CELLS}"
     for name, way_out in (("refine", ", or set it to 0"), ("samples", " in all")):
@@ -77,7 +77,7 @@ def of_all_cells(config: Config) -> Iterator[Misfit]:
 
 
 def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
-    model, columns = config.tier, config.cases or {}
+    model, columns = config.tier, config.cases
     for name, value in given.items():
         path = config.table[name].place
         # A number that the model does not use may stay, so that one file serves every model.
@@ -94,7 +94,7 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
         if name in model.positive and 0.0 in value.numbers:
             yield path, f"must be > 0 for the {model.name} model, not 0"
     for name in ("samples", "until"):
-        if getattr(config, name) and not columns:
+        if getattr(config, name) and not config.distributions:
             yield (name,), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
     if config.until and "reversals" not in config.measure:
         yield ("measure",), "must have reversals, on which until depends; add them, or leave out until"
@@ -124,7 +124,7 @@ def _of_integrator(config: Config) -> Iterator[Misfit]:
 def _of_refinement(config: Config) -> Iterator[Misfit]:
     if not config.simulated:
         yield ("refine",), f"needs a simulation, but the {config.model} model is a formula; set it to 0"
-    if config.cases is not None:
+    if config.cases:
         yield ("refine",), f"cannot be combined with {config.row}s, which have no neighbours; set it to 0"
     if config.verify:
         yield ("verify",), "cannot be combined with refine; set it to 0"
@@ -164,7 +164,7 @@ def _unusable_step(config: Config) -> str:
         names = BODY if config.of_rattlebacks else model.parameters
         longest = min(
             float(methods.longest_step(model, columns)[~model.impossible(columns)].min(initial=np.inf))
-            for columns in distinct(Grid.of(config), names)
+            for columns in distinct(config.grid, names)
         )
     too_long = f"must be auto or at most {longest:.3g}, a quarter of the rattle's period, not {step:g}"
     return "" if step <= longest else too_long
@@ -178,7 +178,7 @@ Reason = tuple[str, int, dict[str, float]]
 
 def impossible(config: Config) -> str:
     """Say what is wrong with the first body if none can be or can stand; "" if any can."""
-    return unfit(config) if sum(cells for _, cells, _ in _reasons(config)) == Grid.of(config).size else ""
+    return unfit(config) if sum(cells for _, cells, _ in _reasons(config)) == config.grid.size else ""
 
 
 def unfit(config: Config) -> str:
@@ -188,7 +188,7 @@ def unfit(config: Config) -> str:
 
 def described_impossible(config: Config) -> dict[str, str]:
     """Return the attribute of a dataset that says how many cells have the status `impossible`, and why."""
-    varying = [name for name in _SHAPE if name in {*config.axes, *(config.cases or ())}]
+    varying = [name for name in _SHAPE if name in {*config.axes, *config.cases}]
     found = [
         f"{cells} cells, {words.partition(';')[0]}, the first at {_at(first, varying)}"
         for words, cells, first in _reasons(config)
@@ -199,9 +199,9 @@ def described_impossible(config: Config) -> dict[str, str]:
 def misplaced(config: Config) -> str:
     """Say what is wrong with the first cell whose start point lies off the body; "" if no cell's does."""
     surface = SURFACES[config.surface]
-    if not config.of_rattlebacks or "x0" not in {*config.parameters, *(config.cases or ())}:
+    if not config.of_rattlebacks or "x0" not in {*config.parameters, *config.cases}:
         return ""
-    for columns in distinct(Grid.of(config), (*BODY, "x0", "y0")):
+    for columns in distinct(config.grid, (*BODY, "x0", "y0")):
         with np.errstate(over="ignore"):  # infinity lies off the body as well
             cells = np.flatnonzero(surface.off(columns, *starts.point(columns)))
         if len(cells):
@@ -220,9 +220,9 @@ def _at(values: Mapping[str, float], names: Iterable[str]) -> str:
 
 def _reasons(config: Config) -> list[Reason]:
     """Collect the reasons why bodies cannot be or cannot stand; a cell counts for the first that is true of it."""
-    if not config.of_rattlebacks or not {"offset", *INERTIA} & {*config.parameters, *(config.cases or ())}:
+    if not config.of_rattlebacks or not {"offset", *INERTIA} & {*config.parameters, *config.cases}:
         return []
-    grid, surface = Grid.of(config), SURFACES[config.surface]
+    grid, surface = config.grid, SURFACES[config.surface]
     counts, first, seen = Counter[str](), dict[str, dict[str, float]](), 0
     for columns in distinct(grid, BODY):
         left = np.ones(len(columns["a"]), bool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import get_args
 
@@ -20,12 +21,12 @@ _ANGLES = {"rad": 1.0, "": 1.0, "deg": np.pi / 180, "°": np.pi / 180}
 _TIMES = {"s": 1.0, "": 1.0, "ms": 1e-3, "min": 60.0}
 
 # What trackers and phones (phyphox) call their columns, without the unit in parentheses.
-_NAMES = {
+_NAMES: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "time": (_TIMES, ("time", "t")),
     "spin": (_SPINS, ("spin", "n", "angular velocity")),
     "gyroscope": (_SPINS, ("gyroscope z", "gyro z", "omega z", "wz")),
     "heading": (_ANGLES, ("heading", "angle", "theta")),
-    "error": (_SPINS | _ANGLES, ("error", "sigma", "uncertainty")),
+    "error": ({}, ("error", "sigma", "uncertainty")),  # in a unit of what is seen
 }
 
 
@@ -40,13 +41,22 @@ def read(path: str | Path) -> Film:
     """
     path = Path(path)
     header, rows = _rows(path)
-    found = _columns(path, header)
+    found = _columns(header)
     what = next((each for each in get_args(Seen) if each in found), None)
     if "time" not in found or not what:
         names = either(f"'{name}'" for name in ("spin (rad/s)", "gyroscope z (rad/s)", "heading (deg)"))
         raise _fault(path, 1, f"needs a column 'time (s)' and one {names}; it has {brief(', '.join(header))}")
-    time, value = (rows[:, place] * factor for place, factor in (found["time"], found[what]))
-    error = rows[:, found["error"][0]] * found[what][1] if "error" in found else None
+
+    def column(name: str, units: Mapping[str, float]) -> Array:
+        place, unit = found[name]
+        if unit not in units:
+            known = either(sorted(filter(None, units)))
+            raise _fault(path, 1, f"{name} is in '{brief(unit, 20)}'; its unit must be {known}")
+        return np.asarray(rows[:, place] * units[unit])
+
+    units = _NAMES[what][0]
+    time, value = column("time", _TIMES), column(what, units)
+    error = column("error", units | {"": units[found[what][1]]}) if "error" in found else None
     whole = np.isfinite(time) & np.isfinite(value)
     back = np.flatnonzero(np.diff(time[whole]) < 0)
     if len(back):
@@ -70,25 +80,24 @@ def _rows(path: Path) -> tuple[list[str], Array]:
         with path.open(encoding="utf-8-sig") as stream:
             first = stream.readline()
         mark = max(",;\t", key=first.count)
-        table = pandas.read_csv(path, sep=mark, encoding="utf-8-sig", dtype=str, keep_default_na=False)
+        table = pandas.read_csv(
+            path, sep=mark, encoding="utf-8-sig", dtype=str, keep_default_na=False, skip_blank_lines=False
+        )
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is no table of numbers"
         raise _fault(path, None, f"cannot be read: {reason}") from None
     return list(map(str.strip, table)), table.apply(pandas.to_numeric, errors="coerce").to_numpy(float)
 
 
-def _columns(path: Path, header: list[str]) -> dict[str, tuple[int, float]]:
-    """The place of each known column, and what its numbers are multiplied by."""
-    found: dict[str, tuple[int, float]] = {}
+def _columns(header: list[str]) -> dict[str, tuple[int, str]]:
+    """The place and the unit of each known column."""
+    found: dict[str, tuple[int, str]] = {}
     for place, written in enumerate(header):
         name, _, unit = (part.strip() for part in re.sub(r"[)\]]\s*$", "", written).replace("[", "(").partition("("))
         plain = re.sub(r"[_\s]+", " ", name).lower()
-        for what, (units, names) in _NAMES.items():
-            if plain in names and what not in found:
-                if unit not in units:
-                    known = either(sorted(filter(None, units)))
-                    raise _fault(path, 1, f"{what} is in '{brief(unit, 20)}'; its unit must be {known}")
-                found[what] = place, units[unit]
+        for what, (_, names) in _NAMES.items():
+            if plain in names:
+                found.setdefault(what, (place, unit))
     return found
 
 

@@ -11,12 +11,22 @@ import numpy as np
 
 from sweep.config.configuration import Config
 from sweep.config.document import Document
-from sweep.faults import ConfigError, brief, either
+from sweep.config.schema import SETTINGS
+from sweep.faults import ConfigError, brief, either, fault_of
+from sweep.grid import CASE, SAMPLE
 from sweep.models import TIERS
 from sweep.models.origin import Origin
 from sweep.models.user import loading, trial
 
 SUFFIX = ".py"
+
+TAKEN = frozenset({path.rpartition(".")[2] for path in SETTINGS}) | {
+    "integrator", CASE, SAMPLE, "trajectory", "time",
+    *("config", "output", "fresh", "rerun", "progress", "reporter", "cluster", "every", "film", "free", "laws"),
+    *("x", "y", "width", "deviation", "show", "beside", "palette", "spacing", "low", "high", "cell"),
+}  # fmt: skip
+"""Names that mean something else: in a configuration, as a dimension, as an argument, or in an address of the explorer.
+A user's parameter cannot have them."""
 
 
 def named(source: Document, announce: Callable[[str], None] | None) -> Origin | None:
@@ -49,7 +59,10 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         words = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
         raise ConfigError([source.fault(("model_sha256",), words)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
-    loading.load(origin)
+    for p in loading.load(origin).own_parameters:
+        if wrong := [word for word in (p.name, p.section) if word in TAKEN]:
+            words = f"parameter {p.path}: {wrong[0]!r} means something else in a configuration; rename it"
+            raise fault_of(words, file=origin.place)
     return origin
 
 
@@ -57,5 +70,5 @@ def try_out(config: Config) -> None:
     """Call the functions of a user's model for the first and the last cell; `ConfigError` if they do not work."""
     if config.origin:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
-        ends |= {name: np.array([column[0], column[-1]]) for name, column in (config.cases or {}).items()}
+        ends |= {name: np.array([column[0], column[-1]]) for name, column in config.cases.items()}
         trial.try_out(config.equations, ends, config.own_law)

@@ -19,7 +19,7 @@ from sweep.engine import final
 from sweep.engine.errors import Errors
 from sweep.engine.executor import Work
 from sweep.engine.plan import Part, Plan, kernel_of, steps_of
-from sweep.grid import Array, Grid
+from sweep.grid import Array
 from sweep.kernels.measures.sensitivity import SHORTER, Sensitivity
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -52,7 +52,7 @@ def verify(config: Config, cells: Array, first: Mapping[str, Array], work: Work)
     -------
     By name: the indices of the cells that were run again, their results, and how these differ from the first.
     """
-    grid = Grid.of(config)
+    grid = config.grid
     sound = np.isin(first["status"], (SETTLED, TIME_LIMIT))
     rows = np.flatnonzero(np.isin(cells, draw(grid.size, config.verify)) & sound)
     if not len(rows):

@@ -85,7 +85,7 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     )
     if rerun:
         changed = {key for key in changed if not key.startswith("integrator.")}
-    grown = _match(Grid.of(config), _grid(there))
+    grown = _match(config.grid, _grid(there))
     same_cells = len(grown) == there["status"].size
     if changed or less or config.refine or (grown >= 0).sum() < there["status"].size or (rerun and not same_cells):
         return found.difference(wanted)
@@ -94,7 +94,7 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
 
 def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
     """The cells of `config` whose results, bit for bit, are those in the dataset `there`; all but some to `rerun`."""
-    cells = _match(Grid.of(config), _grid(there))
+    cells = _match(config.grid, _grid(there))
     status = there["status"].values.ravel()
     if rerun:
         return Earlier(there, np.where(np.isin(status, RERUN[rerun])[cells], -1, cells), rerun)
@@ -103,9 +103,7 @@ def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
         return Earlier(there, np.full(len(cells), -1))
     if old["integrator"]["t_end"] != config.integrator.t_end:
         taken = np.flatnonzero(cells >= 0)
-        depends = _depends_on_limit(
-            config, Grid.of(config).take(taken), there, cells[taken], old["integrator"]["t_end"]
-        )
+        depends = _depends_on_limit(config, config.grid.take(taken), there, cells[taken], old["integrator"]["t_end"])
         cells[taken[depends]] = -1
     return Earlier(there, cells)
 

@@ -11,7 +11,7 @@ from sweep.config import Config
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import BATCH
 from sweep.engine.plan import Choice, choose, kernels
-from sweep.grid import Array, Grid
+from sweep.grid import Array
 from sweep.kernels.build import compile_seconds, missing
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
 from sweep.models import MODELS
@@ -32,7 +32,7 @@ _GENERAL = 1.4
 
 def estimate(config: Config) -> str:
     """Cells, steps, memory and time of a run, a line each."""
-    grid = Grid.of(config)
+    grid = config.grid
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one cell"
     cells = f"cells:  {grid.size} ({axes})" + (", not all of them simulated" if config.refine else "")
     if not config.simulated:

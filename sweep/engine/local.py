@@ -52,7 +52,7 @@ def run_batch(
     after_chunk : called with the number of the batch's cells that are done, a fraction where a cell is run more than
         once, and how many of them have failed
     """
-    grid, cpu = Grid.of(config), np.array(this_cpu())
+    grid, cpu = config.grid, np.array(this_cpu())
     if not config.simulated:
         for i in batch:
             point()

@@ -142,7 +142,7 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
 
     What these cells need and no cache holds is compiled first; `also` as of `sweep.kernels.build.build`.
     """
-    grids = grids or (Grid.of(config),)
+    grids = grids or (config.grid,)
     chosen = choose(config, *grids)
     build(kernels(config, chosen), *also)
     return fill(config, grids, chosen)

@@ -24,7 +24,7 @@ from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.sampled import Sampled
 from sweep.engine.whole import Whole
-from sweep.grid import Grid, Tile
+from sweep.grid import Tile
 from sweep.interrupt import deferred, point
 from sweep.kernels.methods import METHODS
 from sweep.models.user.blame import blamed
@@ -82,7 +82,7 @@ def run(
             _compute(config, store, reporter, cluster, earlier).save(files.dataset)
         files.discard_checkpoint()
         point()
-        result = open_dataset(files.dataset, load=Grid.of(config).size <= LARGE)
+        result = open_dataset(files.dataset, load=config.grid.size <= LARGE)
         _draw(config.picture, result, files, reporter)
     return result
 
@@ -141,7 +141,7 @@ def carry_out(result: Whole, store: Store, reporter: Reporter, cluster: Cluster 
 
 def _kept(result: Whole, store: Store, running: Running | None) -> str:
     """Find what an earlier run left."""
-    grid = Grid.of(result.simulated())
+    grid = result.simulated().grid
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
     started = sum(len(table) for name, table in running.tables.items() if name in METHODS) if running else 0
     more = f", {started} under way" if running else ""
@@ -150,7 +150,7 @@ def _kept(result: Whole, store: Store, running: Running | None) -> str:
 
 def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count, cluster: Cluster | None) -> None:
     """Run the tiles that `store` does not have yet."""
-    grid = Grid.of(config)
+    grid = config.grid
     todo = [i for i in range(len(tiles)) if i not in store.done]
     count.expect(grid.size, sum(grid.part(tiles[i]).size for i in todo))
     here = (

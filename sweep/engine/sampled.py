@@ -9,7 +9,7 @@ import xarray as xr
 
 from sweep.config import Config
 from sweep.engine.enlarged import Earlier, Enlarged
-from sweep.grid import SAMPLE, Grid
+from sweep.grid import SAMPLE
 from sweep.results.dataset import with_probabilities
 from sweep.results.store import Store
 
@@ -22,7 +22,7 @@ class Sampled(Enlarged):
 
     def __init__(self, config: Config, store: Store, earlier: Earlier | None) -> None:
         self._most = config.samples or 1
-        super().__init__(config, store, earlier or Earlier(xr.Dataset(), np.full(Grid.of(config).size, -1)))
+        super().__init__(config, store, earlier or Earlier(xr.Dataset(), np.full(config.grid.size, -1)))
         known = (self.earlier.cells >= 0).reshape(-1, self._most).all(axis=0)
         self._rows = int(np.argmin(known)) if not known.all() else self._most
         """Samples of all rounds; at first those that the earlier run has."""

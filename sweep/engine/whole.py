@@ -12,7 +12,7 @@ import xarray as xr
 
 from sweep.config import Config
 from sweep.config.cross_checks import described_impossible
-from sweep.grid import Array, Grid, Tile
+from sweep.grid import Array, Tile
 from sweep.results import dataset, netcdf
 from sweep.results.provenance import provenance
 from sweep.results.store import Store
@@ -26,7 +26,7 @@ class Whole:
 
     def __init__(self, config: Config, store: Store) -> None:
         self.config, self.store = config, store
-        self.grid = Grid.of(config)
+        self.grid = config.grid
         self.tiles: list[Tile] = []
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
@@ -84,7 +84,7 @@ class Whole:
                 apart.append(apart_from(arrays))
                 yield tile, arrays
 
-        return dataset.assemble(Grid.of(self.simulated()), read()), apart
+        return dataset.assemble(self.simulated().grid, read()), apart
 
     def _finished(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
         """Read the tiles one after another, with what each holds."""
@@ -118,7 +118,7 @@ class Some(Whole):
         """The configuration whose cases are the simulated cells, which `tiles` cover."""
         table = self.grid.take(self.cells)
         constants = {name: self.config.parameters[name] for name in table.constants}
-        cases = {name: tuple(values.tolist()) for name, values in (table.table or {}).items()}
+        cases = {name: tuple(values.tolist()) for name, values in table.table.items()}
         return replace(self.config, refine=0, verify=0.0, parameters=constants, cases=cases, samples=None, until=None)
 
     def save(self, path: Path) -> None:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import re
-import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from sweep.config import Config, ConfigError, Fault, load_config
+from sweep.config import Config, ConfigError, Fault
 from sweep.config.user_models import SUFFIX
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell
 from sweep.faults import brief
 from sweep.models.user.loading import entry_point
+from sweep.results.accessor import configuration
 
 Announce = Callable[[str], None]
 
@@ -72,21 +70,12 @@ def _named(source: Source, model: str) -> dict[str, str]:
 
 
 def _configuration(source: Source, named: dict[str, str], announce: Announce | None) -> Config:
-    """The configuration in the dataset, without a film; a table of cases, another file too, gives way to the first.
+    """The configuration in the dataset, as far as trajectories need it.
 
     It may come from anybody, so that a model in it that is a file or an entry point is refused, not run, unless the
     user has named it.
     """
-    text, overrides = str(source.dataset.attrs.get("config", "")), dict[str, Any](named)
-    text = re.sub(r"^- {misfit:.*(\n +.*)*", "", text, flags=re.MULTILINE)
-    if "case" in source.dims:
-        text = re.sub("^cases:.*", "", text, flags=re.MULTILINE)
-        coordinates = [str(n) for n, c in source.dataset.coords.items() if n != "case"]
-        overrides |= source.parameters_at(tuple(coordinates), {"case": 0})
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "explore.yaml")
-        path.write_text(text, encoding="utf-8")
-        config = load_config(path, overrides, argument=lambda _: "--model", announce=announce)
+    config = configuration(source.dataset, named, announce)
     if not config.simulated:
         raise ConfigError([])
     names = config.tier.parameters

@@ -53,8 +53,8 @@ def _between(axis: Axis, number: int, config: Config, *, whole: bool) -> Iterato
 @lru_cache(maxsize=8)
 def _config(text: str) -> Config | None:
     try:
-        return configuration(text)
-    except (ConfigError, ValueError):
+        return configuration(xr.Dataset(attrs={"config": text}))
+    except ConfigError:
         return None
 
 

@@ -5,13 +5,17 @@ Registered with the first dataset.  It calls what `import sweep` offers, by name
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
 import xarray as xr
-from ruamel.yaml import YAML
 
 from sweep.config import Config, load_config
+from sweep.config.document import parse_value
+from sweep.faults import fault_of
+from sweep.grid import CASE
+from sweep.kernels.measures.misfit import Misfit
 
 
 @xr.register_dataset_accessor("sweep")  # type: ignore[no-untyped-call]
@@ -42,9 +46,29 @@ class Accessor:
         """
         if "config" not in self._dataset.attrs:
             raise ValueError("the dataset tells no configuration; call sweep.trajectory with one")
-        return import_module("sweep").trajectory(configuration(self._dataset.attrs["config"]), **values)
+        return import_module("sweep").trajectory(configuration(self._dataset), **values)
 
 
-def configuration(text: str) -> Config:
-    """The configuration that a dataset tells in `config`; `ConfigError` if its model is code of a user."""
-    return load_config(YAML(typ="safe", pure=True).load(text) or {}, announce=None)
+def configuration(
+    dataset: xr.Dataset, model: Mapping[str, str] | None = None, announce: Callable[[str], None] | None = None
+) -> Config:
+    """The configuration that a dataset tells, without a film; a table of cases gives way to the first of them.
+
+    Parameters
+    ----------
+    model : the keys by which the user names their model, if it is to run
+    announce : told in words that code of a user is about to run; None if such a model is to be refused
+
+    Raises
+    ------
+    ConfigError
+        if it cannot be run.
+    """
+    values = parse_value(str(dataset.attrs.get("config", "")), "config")
+    if not isinstance(values, dict):
+        raise fault_of("a configuration is a mapping of keys to values", "config")
+    values.pop("cases", None)
+    if isinstance(measure := values.get("measure"), list):
+        values["measure"] = [each for each in measure if not (isinstance(each, dict) and Misfit.name in each)]
+    first = {str(name): float(c[0]) for name, c in dataset.coords.items() if c.dims == (CASE,) and name != CASE}
+    return load_config(values, {**first, **(model or {})}, argument=lambda _: "--model", announce=announce)

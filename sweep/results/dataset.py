@@ -182,10 +182,10 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
         if along := VARIABLES[name].along:
             words = {"long_name": f"number of the {along}"}
             coordinates[along] = xr.Variable((along,), np.arange(1, variable.shape[-1] + 1), words)
-    for name, column in (grid.table or {}).items():
+    for name, column in grid.table.items():
         coordinates[name] = xr.Variable((grid.row,), column, config.described(name))
-    if grid.rows is not None:
-        index = np.arange(grid.rows, dtype="int64")
+    if grid.table:
+        index = np.arange(grid.shape[-1], dtype="int64")
         coordinates[grid.row] = xr.Variable((grid.row,), index, {"long_name": ROWS[grid.row]})
     for name, value in grid.constants.items():
         coordinates[name] = xr.Variable((), value, config.described(name))

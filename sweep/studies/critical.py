@@ -54,8 +54,8 @@ def searchable(config: Config) -> Config:
             [config.fault(("start",), "cannot be given by angles and angular velocities here; give x0 and y0")]
         )
     parameters = config.parameters | {"n0": Values.one(0.0)}
-    cases = None if config.cases is None else {name: v for name, v in config.cases.items() if name != "n0"}
-    found = replace(measuring(config), parameters=parameters, cases=cases or None)
+    cases = {name: v for name, v in config.cases.items() if name != "n0"}
+    found = replace(measuring(config), parameters=parameters, cases=cases)
     return replace(found, integrator=found.integrator.patient)
 
 
@@ -157,7 +157,7 @@ class CriticalSpins(Search):
         self._asked = [(spin, spin.wanted()) for spin in outwards or spins]
         body = np.array([spin.body for spin, places in self._asked for _ in places], int)
         n0 = np.array([spin.sign * np.exp(place) for spin, places in self._asked for place in places])
-        varying = (*self.config.axes, *(self.config.cases or {}))
+        varying = (*self.config.axes, *self.config.cases)
         return {name: self.columns[name][body] for name in varying} | {"n0": n0}
 
     def learn(self, found: Mapping[str, Array]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from sweep.config import Config
 from sweep.engine.estimate import estimate as of_run
-from sweep.grid import Grid
 from sweep.results.memory import Memory
 from sweep.studies import SPIN_WIDTH, boundaries, critical
 from sweep.studies.search import measuring
@@ -39,7 +38,7 @@ def of_critical(config: Config) -> str:
         as `critical`.
     """
     config = critical.searchable(config)
-    grid = Grid.of(config)
+    grid = config.grid
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one body"
     bodies = f"bodies: {grid.size} ({axes}), each with spins of both signs"
     search = critical.CriticalSpins(config, Memory(), SPIN_WIDTH)

@@ -96,7 +96,7 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
         if name not in known:
             message = f"{brief(name)} is no parameter of the {config.tier.name} model{suggestion(name, known)}"
             raise fault_of(f"{message}; free may be {', '.join(known)}")
-    if config.cases is not None:
+    if config.cases:
         raise ConfigError([config.fault(("cases",), "cannot be fitted; a fit is of one body")])
     if more := [name for name in config.axes if name not in free]:
         raise ConfigError([config.fault(config.table[more[0]].place, "has several values; free it, or give one")])

@@ -73,7 +73,7 @@ class Indices(Study):
         names = [name for name in QUANTITIES if name in arrays]
         failed = np.isin(arrays["status"], (*FAILURES, IMPOSSIBLE))
         values = np.stack([np.where(failed, np.nan, arrays[name]) for name in names])
-        parameters = list(self.config.cases or {})
+        parameters = list(self.config.cases)
         found = with_intervals(values.reshape(len(names), len(parameters) + 2, -1), self.config.seed)
         attributes = {"title": f"{self.config.name}: Sobol indices", **self._attributes(self.grid.size, apart)}
         return xr.Dataset(

@@ -8,7 +8,6 @@ import xarray as xr
 
 from sweep import prediction
 from sweep.config import ConfigLike, load_config
-from sweep.grid import Grid
 from sweep.results import dataset
 
 
@@ -33,6 +32,6 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     array([3, 7], dtype=int16)
     """
     config = load_config(config, overrides)
-    grid = Grid.of(config)
+    grid = config.grid
     found = dataset.predicted(prediction.predict(config.tier, grid, config.measure))
     return dataset.label(config, grid, found, {"config": config.to_yaml()})

@@ -24,7 +24,7 @@ from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.faults import fault_of, suggestion
-from sweep.grid import SAMPLE, Array, Grid
+from sweep.grid import SAMPLE, Array
 from sweep.interrupt import deferred
 from sweep.kernels import path
 from sweep.kernels.build import PATH
@@ -190,9 +190,9 @@ def _described(times: Array, series: dict[str, Array], model: Model, system: str
 def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> str:
     """Trajectories, steps, samples and time, a line each; parameters and errors as of `trajectory`."""
     chosen = choose(config, at, samples)
-    columns, integrator = Grid.of(chosen).columns(), chosen.integrator
+    columns, integrator = chosen.grid.columns(), chosen.integrator
     model, step = chosen.equations, integrator.step
-    steps = np.full(Grid.of(chosen).size, integrator.t_end)
+    steps = np.full(chosen.grid.size, integrator.t_end)
     steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
     samples = (integrator.t_end / _intervals(model, columns)).sum()
     seconds = _PASSES * nominal_seconds(steps) + samples * _SAMPLE_SECONDS
@@ -221,14 +221,13 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
         config = replace(config, integrator=plain)
     dataset.check_names(config, SERIES)
     wanted = _numbers(config, at)
-    table = {name: values for name, values in (config.cases or {}).items() if samples and name not in wanted}
+    table = {name: values for name, values in config.cases.items() if samples and name not in wanted}
     drawn = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)] or [{}]
     if (count := prod(map(len, wanted.values())) * len(drawn)) > MAX_TRAJECTORIES:
         raise fault_of(f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")
     config = config.at_medians
     constants = {name: v.numbers[0] for name, v in config.parameters.items()}
-    if config.cases is not None:
-        constants |= {name: column[0] for name, column in config.cases.items()}
+    constants |= {name: column[0] for name, column in config.cases.items()}
     cells = [dict(zip(wanted, values, strict=True)) | row for values in product(*wanted.values()) for row in drawn]
     cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
     chosen = replace(config, parameters={}, cases=cases)

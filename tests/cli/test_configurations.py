@@ -9,7 +9,6 @@ from support import ROOT
 from support.cli import invoke, refused
 
 import sweep
-from sweep.grid import Grid
 
 TOY = ("--mass", "30g", "--length", "12.0±0.1cm", "--width", "3 cm", "--height", "15mm", "--angle", "2.0 +- 0.5 deg")
 
@@ -137,7 +136,7 @@ def test_a_copied_example_loads_and_is_not_overwritten(name: str, tmp_path: Path
     for copy in folder.iterdir():
         assert copy.read_bytes() == (ROOT / "configs" / copy.name).read_bytes()
     config = sweep.load_config(folder / f"{name}.yaml")
-    assert (config.name, Grid.of(config).size > 1) == (name, True)
+    assert (config.name, config.grid.size > 1) == (name, True)
     (folder / f"{name}.yaml").write_text("mine", encoding="utf-8")
     refused(invoke("examples", name, "--output", folder), f"{name}.yaml: exists already; choose another folder")
     assert (folder / f"{name}.yaml").read_text(encoding="utf-8") == "mine"

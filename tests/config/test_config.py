@@ -13,7 +13,6 @@ from support import ROOT, SMALL, Write
 
 from sweep import ConfigError, load_config
 from sweep.config.values import Range
-from sweep.grid import Grid
 from sweep.plots.quantities import check_pictures
 
 
@@ -67,7 +66,7 @@ def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
 @pytest.mark.parametrize("path", sorted((ROOT / "configs").glob("*.yaml")), ids=lambda p: p.stem)
 def test_the_configurations_we_ship_load_and_measure_what_they_draw(path: Path) -> None:
     config = load_config(path)
-    assert Grid.of(config).size > 1
+    assert config.grid.size > 1
     check_pictures(config)
 
 
@@ -129,7 +128,7 @@ def test_cases_of_a_parquet_file(write: Write, tmp_path: Path) -> None:
 def test_cases(write: Write, tmp_path: Path) -> None:
     (tmp_path / "cells.csv").write_text("mu, b,n0\n60,3,0.05\n1e2,2.5,-0.02\n\n", encoding="utf-8")
     config = load_config(write(CASES))
-    grid = Grid.of(config)
+    grid = config.grid
     assert (grid.dims, grid.shape) == (("case",), (2,))
     columns = grid.columns()
     assert (list(columns["mu"]), list(columns["n0"]), list(columns["a"])) == ([60, 100], [0.05, -0.02], [10, 10])

@@ -35,7 +35,7 @@ def config(surface, law, **more):
 
 
 def slope(found):
-    model, columns = found.equations, Grid.of(found).columns()
+    model, columns = found.equations, found.grid.columns()
     states = tuple(column + 0.01 * i for i, column in enumerate(model.start(columns)))
     return np.ravel(model.rhs(states, model.constants.of(columns))[0])
 

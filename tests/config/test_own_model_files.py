@@ -1,6 +1,8 @@
 """A user's model in a configuration: where it is found, when its code runs, and what is said of a broken one."""
 
+import dataclasses
 import hashlib
+import inspect
 import re
 import sys
 from collections.abc import Iterator
@@ -16,7 +18,8 @@ from support.own import FADING, PENDULUM
 
 import sweep
 from sweep.config import ConfigError, load_config
-from sweep.grid import Grid
+from sweep.config.user_models import TAKEN
+from sweep.explorer.state import State
 from sweep.models.model import ENERGY, LINEAR
 from sweep.models.theory.stability import stable_ranges
 from sweep.models.user import loading
@@ -85,7 +88,6 @@ BROKEN = {
     "offers": after(PENDULUM, "COUNT, SPIN})", 'COUNT, "modes"})', "cannot offer modes; it may offer COUNT, SPIN, EN"),
     "units": after(PENDULUM, "spin_state=1,", 'spin_state=1, units="CGS",', "units 'CGS' are unknown; choose paper, "),
     "default": after(PENDULUM, "0.5, at_least=0", "-1.0, at_least=0", "damping: its default -1 is out of its bounds"),
-    "taken": after(PENDULUM, 'Parameter("torque"', 'Parameter("step"', "drive.step: 'step' means something else"),
     "unknown": after(PENDULUM, "spin_state=1,", 'spin_state=1, parameters=("nu",),', "parameter 'nu' is unknown"),
     "no period": after(PENDULUM, "    slower_period=", "    # ", "give it slower_period, or do not offer COUNT"),
     "no motion": (PENDULUM.replace("2 + columns", "0 * columns").replace("0.5 + 0 * columns", "np.inf + columns"),
@@ -270,7 +272,7 @@ def test_a_body_of_either_surface_slips_by_the_law_of_a_file_as_by_the_same_of_o
     assert mine.surface == shape.get("surface", "ellipsoid")
     assert load_config(mine, {"mu": 0.6}).surface == load_config(dict(mine.document())).surface == mine.surface
     assert loading.compiled_as(mine.origin, mine.equations.name).constants._fields == ours.equations.constants._fields
-    columns, got = Grid.of(ours).columns(), []
+    columns, got = ours.grid.columns(), []
     for model in (ours.equations, mine.equations):
         constants = model.constants.of(columns)
         slopes, rest = model.rhs(model.start(columns), constants)
@@ -308,6 +310,24 @@ def test_a_package_offers_models_by_entry_points(package: Path) -> None:
         load_config({"model": "swing"}, announce=None)
     (package / "helper.py").write_text("x = 1\n", encoding="utf-8")
     assert load_config({"model": "swing", "drive": {"torque": 0.3}}).fingerprint() != first.fingerprint()
+
+
+@pytest.mark.parametrize("name", ["seed", "x"])
+def test_no_parameter_takes_the_name_of_a_setting_or_of_a_choice(folder: Path, name: str) -> None:
+    (folder / "pendulum.py").write_text(PENDULUM.replace('"torque"', f'"{name}"'), encoding="utf-8")
+    with pytest.raises(ConfigError, match=rf"pendulum.py: parameter drive.{name}: '{name}' means something else"):
+        load_config({"model": str(folder / "pendulum.py")})
+
+
+def test_all_names_of_arguments_and_of_choices_are_taken() -> None:
+    """What takes overrides takes its own arguments beside them; the addresses of the explorer name both."""
+    verbs = [each for name in sweep.__all__ if inspect.isfunction(each := getattr(sweep, name))]
+    with_more = [
+        s for s in map(inspect.signature, verbs) if any(p.kind == p.VAR_KEYWORD for p in s.parameters.values())
+    ]
+    arguments = {name for s in with_more for name, p in s.parameters.items() if p.kind != p.VAR_KEYWORD}
+    fields = {field.name for field in dataclasses.fields(State)} - {"cells", "at"}
+    assert arguments | fields | {"cell"} <= TAKEN
 
 
 @pytest.mark.parametrize("name", ["t_stop", "verified_spin_final", "reversal_times", "contact_x"])

@@ -9,7 +9,6 @@ from support import SMALL
 from support.physics import STONE, stone
 
 from sweep.config import Config, load_config
-from sweep.grid import Grid
 
 Read = Callable[[str], Config]
 BOWL = stone(("{a: 0.2, b: 0.03", "{surface: paraboloid, a: 0.01, b: 0.4"))
@@ -25,7 +24,7 @@ def test_a_real_body(read: Read) -> None:
     config = read(STONE)
     assert config.equations.name == "slip+coulomb-tanh+sigma"
     assert set(config.parameters) == set(config.tier.parameters)
-    columns = Grid.of(config).columns()
+    columns = config.grid.columns()
     assert columns["roll"] == pytest.approx(np.pi / 360)
     assert config.integrator.method == "dopri5"
     assert config.described("mu") == {"long_name": "coefficient of friction"}

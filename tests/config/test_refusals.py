@@ -184,6 +184,8 @@ CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
         ("mu,colour\n60,1\n", "cells.csv:1:2: colour", "unknown parameter; the parameters are a, b,"),
         ("mu,detla\n60,1\n", "cells.csv:1:2: detla", "unknown parameter (did you mean delta?)"),
         ("mu,mu\n60,1\n", "cells.csv:1:2: mu", "a second column of this name"),
+        ("\nmu,detla\n60,1\n", "cells.csv:2:2: detla", "unknown parameter (did you mean delta?)"),
+        ("\n\nmu,b\n60\n", "cells.csv:4", "1 values, but 2 columns in line 3"),
         ("mu,b\n60\n", "cells.csv:2", "1 values, but 2 columns in line 1"),
         ("mu,b\n60,wide\n", "cells.csv:2:2: b", "must be a finite number > 0 and < 1e+06, not 'wide'"),
         ("mu\n60\n\n-1\n", "cells.csv:4:1: mu", ">= 0"),
@@ -207,6 +209,8 @@ def test_broken_cases(table: str, place: str, said: str, write: Write, tmp_path:
     [
         ("body: {b: [1, 2]}\n", r"small\.yaml:4:8: body\.b: cannot be an axis beside cases"),
         ("model: averaged\n", "column mu: must be > 0 for the averaged model"),
+        ("samples: 5\n", "samples: needs a parameter that is a distribution"),
+        ("until: 0.05\n", "until: needs a parameter that is a distribution"),
     ],
 )
 def test_what_cannot_stand_beside_cases_is_refused(beside: str, said: str, write: Write, tmp_path: Path) -> None:

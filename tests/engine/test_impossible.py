@@ -14,7 +14,6 @@ from sweep import ConfigError
 from sweep.config import load_config
 from sweep.engine import local, run
 from sweep.engine.estimate import estimate
-from sweep.grid import Grid
 from sweep.kernels.status import IMPOSSIBLE
 from sweep.plots.marks import BLANK, legend, marks
 from sweep.results.summary import describe, failed_fraction
@@ -129,7 +128,7 @@ def test_what_is_refused(write: Write) -> None:
         sweep.trajectory(write(TEXT), b=[0.9, 3.0], offset=0.05)
     # A fixed step is judged by the bodies that there are.
     config = load_config(write(TEXT), {"step": 0.02})
-    assert Grid.of(config).size == 18
+    assert config.grid.size == 18
     assert "cells:  18" in estimate(config)
     predicted = sweep.predict(config)["n_c1_plus_linear"].transpose("b", "offset").values
     np.testing.assert_array_equal(np.isnan(predicted), GONE)

@@ -17,7 +17,6 @@ import sweep
 from sweep.config import ConfigError, load_config
 from sweep.engine.cluster import Cluster
 from sweep.engine.plan import kernels
-from sweep.grid import Grid
 from sweep.kernels import build as builder
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models import MODELS
@@ -222,8 +221,8 @@ def test_the_linear_theory_of_a_model_is_that_of_ours(folder: Path) -> None:
     (folder / "mine.py").write_text(UPRIGHT, encoding="utf-8")
     scene = {"friction": {"mu": [5.0, 60.0]}, "start": {"n0": [0.03, -0.1]}}
     config = load_config({"model": str(folder / "mine.py"), **scene})
-    found = predict(config.equations, Grid.of(config)).stability
-    ours = stable_ranges(MODELS["slip"], Grid.of(config).columns())
+    found = predict(config.equations, config.grid).stability
+    ours = stable_ranges(MODELS["slip"], config.grid.columns())
     np.testing.assert_allclose(found.ranges, ours, rtol=1e-12)
     assert np.isfinite(ours[:2]).all()
 

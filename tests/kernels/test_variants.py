@@ -11,7 +11,6 @@ from support import newton
 
 import sweep
 from sweep.config import load_config
-from sweep.grid import Grid
 from sweep.models.model import Model, stack
 
 BODY = "{a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}"
@@ -52,7 +51,7 @@ def against_newton(
     Returns the model, the parameters and the start of the scene.
     """
     config = load_config(folder / "scene.yaml")
-    columns, model = dict(Grid.of(config).columns()), config.equations
+    columns, model = dict(config.grid.columns()), config.equations
     start, result = stack(model.start(columns)), result.stack(cell=result["spin_final"].dims)
     for i in cells:
         parameters = {name: float(values[i]) for name, values in columns.items()} | more

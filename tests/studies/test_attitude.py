@@ -9,7 +9,6 @@ from support.physics import KANE_LEVINSON
 
 import sweep
 from sweep.config import load_config
-from sweep.grid import Grid
 from sweep.models.model import stack
 
 SERIES = ("heading", "roll_angle", "pitch_angle", "table_x", "table_y")
@@ -42,7 +41,7 @@ ROLLING = {**PAPERS, "model": "noslip", "friction": {}}
 )  # fmt: skip
 def test_attitude_and_path_are_those_of_newton_and_euler(scene: dict[str, Any], law: str | None, t_end: float) -> None:
     config = load_config(scene, {"t_end": t_end, "tolerance": 1e-12})
-    cell, model = Grid.of(config).columns(), config.equations
+    cell, model = config.grid.columns(), config.equations
     parameters = {"surface": scene["body"].get("surface")} | {name: float(v[0]) for name, v in cell.items()}
     one = sweep.trajectory(config, every=t_end / 50).isel(trajectory=0)
     expected = newton.pose(stack(model.start(cell))[:, 0], parameters, law, one["time"].values)

@@ -44,6 +44,12 @@ def test_a_heading_is_unwrapped(write: Write) -> None:
     np.testing.assert_allclose(found.error, np.radians(1 + TIMES), rtol=1e-12)
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("", np.pi / 180), (" (deg/s)", np.pi / 180), (" (rad/s)", 1.0)])
+def test_errors_are_in_the_unit_of_the_spin_unless_they_say_another(write: Write, unit: str, factor: float) -> None:
+    found = film.read(write(table(f"time (s),spin (deg/s),error{unit}", TIMES, SPINS, 1 + TIMES), "film.csv"))
+    np.testing.assert_allclose(found.error, factor * (1 + TIMES), rtol=1e-12)
+
+
 def test_rows_without_a_number_are_left_out(write: Write) -> None:
     spins = SPINS.copy()
     spins[[3, 7]] = np.nan
@@ -66,6 +72,8 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
         ("time\n1\n2\n", ":1:", "'spin (rad/s)', 'gyroscope z (rad/s)' or 'heading (deg)'; it has time"),
         ("spin (m/s),time\n1,2\n", ":1:", "spin is in 'm/s'; its unit must be 1/s, deg/s, rad/s, rpm or °/s"),
         (table("t,spin", TIMES[::-1], SPINS), ":3:", "the time goes back; sort the rows by time"),
+        ("t,spin\n\n0,1\n2,1\n1,1\n", ":5:", "the time goes back; sort the rows by time"),
+        (table("t,spin (1/s),error (rad)", TIMES, SPINS, 1 + TIMES), ":1:", "error is in 'rad'; its unit must be 1/s,"),
         (table("t,spin,error", TIMES, SPINS, TIMES), ":2:", "the error must be a number > 0"),
         (table("t,spin", TIMES[:5], SPINS[:5]), ":", "has 5 rows with a time and a spin; a fit needs at least 8"),
         (table("t,spin", 0 * TIMES, SPINS), ":", "rows with a time"),

@@ -14,7 +14,6 @@ from support.cli import invoke
 import sweep
 from sweep.config import ConfigError
 from sweep.explorer.slices import Source
-from sweep.grid import Grid
 from sweep.kernels.measures.misfit import Film, Seen
 from sweep.kernels.samples import sampled
 from sweep.models import MODELS
@@ -128,7 +127,7 @@ def test_a_heading_tells_the_same(write: Write, seen: tuple[np.ndarray, ...]) ->
 )
 def test_a_film_of_the_true_body_is_reproduced(write: Write, what: Seen) -> None:
     """By another derivation and integrator, with delay, bias and a sensor that leans."""
-    cell = Grid.of(config := sweep.load_config(write(STONE), {"mu": 0.3, "speed": 0.5, **ROCKED})).columns()
+    cell = (config := sweep.load_config(write(STONE), {"mu": 0.3, "speed": 0.5, **ROCKED})).grid.columns()
     start, true = stack(config.equations.start(cell))[:, 0], {"film_delay": 0.05, "film_bias": 0.3}
     lean = np.array([0.1, -0.05]) * (what == "gyroscope")
     if what == "gyroscope":

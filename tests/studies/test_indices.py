@@ -27,7 +27,7 @@ def ishigami(seed: int) -> np.ndarray:
     """The function of Ishigami and Homma (1990) at the samples of our design, shape (5, 1024)."""
     unit = {name: {"uniform": [0, 1]} for name in ("n0", "x0", "y0")}
     config = sweep.load_config({"friction": {"mu": 60}, "start": unit, "samples": 1000, "seed": seed})
-    x, y, z = (np.pi * (2 * np.array(column) - 1) for column in (designed(config).cases or {}).values())
+    x, y, z = (np.pi * (2 * np.array(column) - 1) for column in designed(config).cases.values())
     return np.reshape(np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x), (5, 1024))
 
 

@@ -10,7 +10,6 @@ from support.cli import invoke
 
 import sweep
 from sweep.config import ConfigError
-from sweep.grid import Grid
 from sweep.kernels.measures.misfit import Film
 
 STONE = """\
@@ -28,7 +27,7 @@ NOISE = 0.05
 def film(config: Path, law: str, error: float | None = None) -> Film:
     """What Newton's equations give with a law, and noise."""
     checked, times = sweep.load_config(config), np.arange(0, 2, 1 / 60)
-    columns, model = Grid.of(checked).columns(), checked.equations
+    columns, model = checked.grid.columns(), checked.equations
     p = {name: float(value[0]) for name, value in columns.items()}
     start = np.array(model.start(columns))[:, 0]
     spins = newton.spin(newton.follow(start, p, law, times, 1e-8))

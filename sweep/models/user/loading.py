@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import linecache
 import sys
-from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
 from importlib import metadata
@@ -18,7 +17,6 @@ from sweep.faults import fault_of
 from sweep.models.general import variants
 from sweep.models.general.laws import Law
 from sweep.models.general.selection import Physics
-from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.general.variants import SlipWith
 from sweep.models.model import Model
 from sweep.models.origin import Origin
@@ -36,11 +34,6 @@ def entry_point(name: str) -> Origin | None:
     if not found:
         return None
     return Origin.of_package(name, next(iter(found)).value)
-
-
-def entry_points() -> tuple[str, ...]:
-    """Names of all models that installed packages offer."""
-    return tuple(sorted(each.name for each in metadata.entry_points(group=GROUP)))
 
 
 @cache
@@ -106,13 +99,12 @@ def law(origin: Origin) -> Law | None:
     return made.law if isinstance(made, SlipWith) else None
 
 
-def find(origin: Origin, units: str, names: Collection[str], surface: str = ELLIPSOID.name) -> Model:
-    """The model for a configuration that names these parameters; `surface` is that of a body with a law of friction."""
+def find(origin: Origin, physics: Physics) -> Model:
+    """The model that the user brings, or that for this physics, which has the law of friction that they bring."""
     made = load(origin)
     if isinstance(made, Model):
         return made
-    found = Physics(units, made.law, SURFACES[surface], frozenset(names)).variant("slip")
-    return replace(found, origin=origin, own_parameters=made.own_parameters)
+    return replace(physics.variant("slip"), origin=origin, own_parameters=made.own_parameters)
 
 
 def compiled_as(origin: Origin, name: str) -> Model:

@@ -23,13 +23,6 @@ from sweep.parameters import PARAMETERS, Parameter
 
 _OFFERS = {COUNT: "COUNT", SPIN: "SPIN", ENERGY: "ENERGY", LINEAR: "LINEAR"}
 
-_TAKEN = frozenset({
-    "name", "model", "model_sha256", "units", "cases", "integrator", "measure", "verify", "refine",
-    "max_failed_fraction", "method", "step", "tolerance", "t_end", "stop_when_settled", "case", "trajectory", "time",
-    "every", "reporter", "progress", "config", "output", "fresh", "rerun", "cluster",
-})  # fmt: skip
-"""Names that mean something else in a configuration, as an argument or as a dimension."""
-
 Faults = Iterator[tuple[Any, str]]
 """The function at fault, or None, and what is wrong and what to do."""
 
@@ -95,8 +88,8 @@ def _names(name: str, taken: Collection[str], own: tuple[Parameter, ...], used: 
     if not name.isidentifier() or name in taken:
         yield None, f"the name {name!r} is no word of letters, digits and _, or taken ({', '.join(taken)}); change it"
     for p in own:
-        if wrong := [word for word in filter(None, (p.name, p.section)) if not word.isidentifier() or word in _TAKEN]:
-            yield None, f"parameter {p.path}: {wrong[0]!r} means something else in a configuration; rename it"
+        if wrong := [word for word in filter(None, (p.name, p.section)) if not word.isidentifier()]:
+            yield None, f"parameter {p.path}: {wrong[0]!r} is no word of letters, digits and _; rename it"
         if p.default is not None and not p.allows(p.default):
             yield None, f"parameter {p.path}: its default {p.default:g} is out of its bounds; it has to be {p.allowed}"
     known = [p.name for p in own]
