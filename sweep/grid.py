@@ -114,7 +114,7 @@ class Grid:
         return bodies, np.broadcast_to(np.arange(bodies.size).reshape(own), self.shape).ravel()
 
 
-_TILE = 1 << 18
+TILE = 1 << 18
 """Cells examined at a time, when all cells are."""
 
 BODY = tuple(p.name for p in PARAMETERS.values() if p.section in ("body", ""))
@@ -124,4 +124,4 @@ BODY = tuple(p.name for p in PARAMETERS.values() if p.section in ("body", ""))
 def distinct(grid: Grid, names: tuple[str, ...]) -> Iterator[dict[str, Array]]:
     """Columns of cells that have every combination of the parameters `names`, a bounded number of cells at a time."""
     grid = replace(grid, axes={n: v if n in names else v[:1] for n, v in grid.axes.items()})
-    return (grid.part(tile).columns() for tile in grid.tiles(_TILE))
+    return (grid.part(tile).columns() for tile in grid.tiles(TILE))

@@ -63,10 +63,10 @@ LAWS: dict"""
 
 STORE = '''"""A store in memory that counts what it saves."""
 
-from sweep.results.memory import Memory
+from sweep.results.store import Store
 
 
-class Counting(Memory):
+class Counting(Store):
     """Counts the tiles."""
 
     saved = 0
@@ -176,12 +176,9 @@ assert one["spin_final"].item() == other["spin_final"].item()
     "a store": Change(
         {"sweep/results/counting.py": STORE},
         {
-            "sweep/results/stores.py": [
-                ("import Memory\n", "import Memory\nfrom sweep.results.counting import Counting\n"),
-                (
-                    '"memory": lambda folder, identity, note: Memory()',
-                    '"memory": lambda folder, identity, note: Counting()',
-                ),
+            "sweep/engine/run.py": [
+                ("import Checkpoint\n", "import Checkpoint\nfrom sweep.results.counting import Counting\n"),
+                ("Store(), reporter", "Counting(), reporter"),
             ]
         },
         f"""

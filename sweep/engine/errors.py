@@ -19,7 +19,8 @@ the first run.  Figures: docs/explanation/accuracy.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from sweep.kernels.measures.margin import EXTREMES
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import FAILURES, RUNNING
+from sweep.models.model import take
 
 ROUNDS = 3
 """Largest number of repeats of a cell."""
@@ -75,8 +77,7 @@ _ORDER, _NEARER = 5, 1.1
 _ALIKE = 1.02
 
 
-@dataclass(frozen=True)
-class Errors:
+class Errors(NamedTuple):
     """What the companions of a run's cells tell, each of shape (cells,)."""
 
     spin: Array
@@ -99,13 +100,6 @@ class Errors:
         """Estimated error of the spin at the end, shape (cells,)."""
         return np.asarray(np.fmax(self.spin, self.least))
 
-    def put(self, rows: Array, other: Errors) -> None:
-        for each in fields(self):
-            getattr(self, each.name)[rows] = getattr(other, each.name)
-
-    def take(self, rows: Array) -> Errors:
-        return Errors(*(getattr(self, each.name)[rows] for each in fields(self)))
-
 
 def keep_tolerance(job: Plan, work: Work) -> Errors:
     """Find the error of each cell of `job`, whose runs have all ended, and repeat cells above the tolerance, in place.
@@ -116,7 +110,7 @@ def keep_tolerance(job: Plan, work: Work) -> Errors:
 
     While `work` goes on, the cells whose error is not known yet are `RUNNING`.
     """
-    found = Errors(*np.full((len(fields(Errors)), sum(grid.size for grid in job.grids)), np.nan))
+    found = Errors(*np.full((len(Errors._fields), sum(grid.size for grid in job.grids)), np.nan))
     waiting = []
     for part in job.parts:
         rows = np.flatnonzero(~part.failed)
@@ -171,7 +165,8 @@ def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None
         missed = (errors.told > limit) & (not part.fixed)
         done = now.take(~again)
         part.put(rows[~again], done, np.where(missed, MISSED, rules)[~again])
-        found.put(part.cells[rows[~again]], errors.take(~again))
+        for whole, some in zip(found, take(errors, ~again), strict=True):
+            whole[part.cells[rows[~again]]] = some
         if not again.any():
             return
         most = np.where(by_chance, np.inf, errors.spin / shorter**_LEAST_ORDER)[again]

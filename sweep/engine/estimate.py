@@ -61,6 +61,8 @@ def estimate(config: Config) -> str:
 
 def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share: float) -> Iterator[Array]:
     """The work for each cell, in steps of dopri5 alone: for each method, and for the cells run again to verify it."""
+    if not chosen:
+        return  # no body of the sample is possible
     relative = 1.0 if config.equations.name in MODELS else _GENERAL
     relative *= math.prod(each.cost for each in chosen[0].kernel.measurements)
     for each, theirs in zip(chosen, steps, strict=True):

@@ -19,7 +19,6 @@ from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
 from sweep.kernels.status import FAILURES, RUNNING, SETTLED
 from sweep.prediction import predict
-from sweep.results import dataset
 from sweep.results.provenance import this_cpu
 from sweep.results.store import Running, Store
 
@@ -120,7 +119,7 @@ def batches(
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
     """The results of a model that is a formula."""
-    arrays = dataset.predicted(predict(config.tier, grid))
+    arrays = predict(config.tier, grid).variables
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:
         arrays["reversals"] = arrays["reversals_predicted"]

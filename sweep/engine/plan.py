@@ -132,7 +132,7 @@ class Plan:
         """`arrays` over all cells cut into those of each grid, with the predictions for its cells and bodies."""
         ends = np.cumsum([grid.size for grid in self.grids])
         return [
-            {name: values[end - grid.size : end] for name, values in arrays.items()} | dataset.predicted(prediction)
+            {name: values[end - grid.size : end] for name, values in arrays.items()} | prediction.variables
             for grid, prediction, end in zip(self.grids, self.predictions, ends, strict=True)
         ]
 
@@ -196,6 +196,6 @@ def steps_of(method: str, config: Config, columns: Columns) -> tuple[Array, Arra
 def fill(config: Config, grids: tuple[Grid, ...], chosen: tuple[Choice, ...]) -> Plan:
     """Give each cell of `grids` its limits and start as well."""
     predictions = tuple(on_all_threads(lambda grid: predict(config.equations, grid, config.measure), grids))
-    stable = np.concatenate([each.stability.ranges for each in predictions if each.stability], axis=1)
+    stable = np.concatenate([each.ranges for each in predictions], axis=1)
     parts = [Part(**vars(each), config=config, stable=stable[:, each.cells], images=np.empty(0)) for each in chosen]
     return Plan(config, grids, predictions, tuple(part.start() for part in parts))

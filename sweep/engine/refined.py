@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from math import prod
 
 import numpy as np
@@ -11,15 +11,12 @@ import xarray as xr
 from sweep.config import Config
 from sweep.engine.refinement import UNKNOWN, Nodes, Outcomes, search
 from sweep.engine.whole import Some
-from sweep.grid import Array, Tile
+from sweep.grid import TILE, Array, distinct
 from sweep.kernels.status import IMPOSSIBLE
 from sweep.prediction import formulas
 from sweep.results import dataset
 from sweep.results.margins import Counts
 from sweep.results.store import Store
-
-_TILE = 1 << 18
-"""Cells for which the formulas are evaluated at a time."""
 
 
 class Refined(Some):
@@ -32,7 +29,10 @@ class Refined(Some):
         super().__init__(config, store)
         size = self.grid.size
         self._outcomes = Outcomes(np.zeros(size, np.int32), np.full(size, UNKNOWN, np.int8))
-        self._outcomes.status[self._impossible_nodes()] = IMPOSSIBLE
+        bad = [config.equations.impossible(columns) for columns in distinct(self.grid, tuple(self.grid.axes))]
+        self._outcomes.status[np.concatenate(bad)] = IMPOSSIBLE  # they need not be simulated
+        self._told = Outcomes(*(each.copy() for each in self._outcomes))
+        """What is known of the nodes, simulated or inferred."""
         self._margins = {name: np.full(size, np.nan) for name in ("margin_more", "margin_fewer")}
         self._learned = 0
         """Tiles whose results are known."""
@@ -45,8 +45,6 @@ class Refined(Some):
         """Indices of the nodes of each map, one for each value of the other axes."""
         self._open = [*range(len(self._maps))]
         """Maps that are not complete."""
-        self._told: dict[int, Outcomes] = {}
-        """What is known of each map, simulated or inferred."""
 
     def grow(self, tile_size: Callable[[int], int]) -> bool:
         """Add the nodes to simulate next, judging by the results of all tiles so far.  False if there are none.
@@ -69,9 +67,11 @@ class Refined(Some):
         known = Outcomes(*(each[nodes] for each in self._outcomes))
         if self._shape:
             counts = Counts.of({**known._asdict(), **{name: each[nodes] for name, each in self._margins.items()}})
-            new, self._told[i] = search(self._shape, known, counts, self.config.refine)
+            new, told = search(self._shape, known, counts, self.config.refine)
         else:
-            new, self._told[i] = np.flatnonzero(known.status == UNKNOWN), known
+            new, told = np.flatnonzero(known.status == UNKNOWN), known
+        for whole, part in zip(self._told, told, strict=True):
+            whole[nodes] = part
         return nodes[new]
 
     def dataset(self) -> xr.Dataset:
@@ -82,23 +82,10 @@ class Refined(Some):
 
     def _arrays(self, found: Mapping[str, Array]) -> dict[str, Array]:
         """All variables over the nodes or their bodies, by formula, simulated (`found`) or inferred."""
-        arrays = dataset.assemble(self.grid, self._formulas())
+        arrays = dataset.assemble(
+            self.grid, ((tile, formulas(self.config.tier, self.grid.part(tile))) for tile in self.grid.tiles(TILE))
+        )
         # No flag says "not simulated", so flags that cannot be inferred are left out.
         others = {n for n in found.keys() - arrays.keys() if n in dataset.VARIABLES and not dataset.VARIABLES[n].flags}
         self._place(self.cells, {name: found[name] for name in others - {"reversals"}}, arrays)
-        for name in Outcomes._fields:
-            arrays[name] = np.empty(self.grid.size, found[name].dtype)
-            for i, told in self._told.items():
-                arrays[name][self._maps[i]] = getattr(told, name)
-        arrays["inferred"] = self._outcomes.status == UNKNOWN
-        return arrays
-
-    def _impossible_nodes(self) -> Array:
-        """Indices of the nodes without a possible body, whose outcome need not be simulated."""
-        tiles = self.grid.tiles(_TILE)
-        bad = (self.config.equations.impossible(self.grid.part(tile).columns()) for tile in tiles)
-        return np.flatnonzero(np.concatenate(list(bad)))
-
-    def _formulas(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
-        for tile in self.grid.tiles(_TILE):
-            yield tile, dataset.predicted(formulas(self.config.tier, self.grid.part(tile)))
+        return arrays | self._told._asdict() | {"inferred": self._outcomes.status == UNKNOWN}

@@ -10,7 +10,8 @@ The map is cut into patches with 2^(depth + 1) intervals along each axis.
 3. A patch is halved along each axis around the nodes that are left, and around those that a neighbouring patch has
    simulated and that contradict it, and so on, down to patches of two intervals.
 4. In the end the inferred nodes beside another outcome are simulated, and those a few nodes around the end of a strip:
-   a strip of one outcome may be thinner than a node, and go on between two of them.
+   a strip of one outcome may be thinner than a node, and go on between two of them.  So are those inferred to have no
+   possible body: which these are is known without a simulation.
 
 Everything follows from the results known so far, so a search can be resumed from these alone.
 """
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from sweep.grid import Array
+from sweep.kernels.status import IMPOSSIBLE
 from sweep.results.margins import Counts
 
 Nodes = NDArray[np.intp]
@@ -87,7 +89,8 @@ def search(shape: tuple[int, ...], simulated: Outcomes, counts: Counts, depth: i
     new = np.unique(np.concatenate(wanted))
     new = new[~known[new]]
     if not len(new):
-        new = np.flatnonzero((_beside_changes(told, shape) | _around_ends(told, shape)) & ~known)
+        doubtful = _beside_changes(told, shape) | _around_ends(told, shape) | (told.status == IMPOSSIBLE)
+        new = np.flatnonzero(doubtful & ~known)
     return new, told
 
 

@@ -10,7 +10,7 @@ Each cell is judged by its own results alone, so nothing depends on which cells 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,7 +74,7 @@ def decide_failures(part: Part, work: Work, name: str) -> None:
 
 def _repeat(part: Part, rows: Array, first: Part, work: Work, name: str) -> None:
     """Decide the cells of `part` with the indices `rows`; `first` are these cells after their first run."""
-    now, met, halvings = first, Met.nothing(len(rows)), 0
+    now, met, halvings = first, Met(np.full(len(rows), RUNNING), np.zeros(len(rows))), 0
     brief = np.zeros(len(rows), bool)
     """Whether a repeat goes to where the run before failed, and no further."""
     while len(rows):
@@ -99,16 +99,15 @@ def _repeat(part: Part, rows: Array, first: Part, work: Work, name: str) -> None
         back = over & brief & ~true
         for here, kept in ((over & ~back, first if part.fixed else now), (back, before)):
             done = kept.take(here)
-            _conclude(done, met.take(here), true[here])
+            _conclude(done, take(met, here), true[here])
             rule = part.step_rule[rows[here]] if part.fixed else np.where(doubtful[here], MISSED, REPEAT)
             part.put(rows[here], done, np.where(halvings or doubtful[here], rule, part.step_rule[rows[here]]))
         brief = np.zeros(len(rows), bool) if part.fixed else long
-        rows, first, now, met, brief = rows[~over], first.take(~over), now.take(~over), met.take(~over), brief[~over]
+        rows, first, now, met, brief = rows[~over], first.take(~over), now.take(~over), take(met, ~over), brief[~over]
         halvings += 1
 
 
-@dataclass(frozen=True)
-class Met:
+class Met(NamedTuple):
     """Holds what runs that failed have met, as the approach in short steps tells it."""
 
     kind: Array
@@ -116,13 +115,6 @@ class Met:
     nothing, shape (cells,)."""
     time: Array
     """When, in sqrt(c/g), shape (cells,)."""
-
-    @classmethod
-    def nothing(cls, cells: int) -> Met:
-        return cls(np.full(cells, RUNNING), np.zeros(cells))
-
-    def take(self, rows: Array) -> Met:
-        return Met(self.kind[rows], self.time[rows])
 
     def agrees(self, other: Met, within: float | Array) -> Array:
         """Tell where both have met the same failure, at times that differ by at most `within`, shape (cells,)."""
@@ -139,7 +131,7 @@ def _conclude(part: Part, met: Met, true: Array) -> None:
 
 def _meet(part: Part, work: Work, name: str) -> Met:
     """Find what the failed cells of `part` have really met."""
-    met = Met.nothing(len(part.images))
+    met = Met(np.full(len(part.images), RUNNING), np.zeros(len(part.images)))
     rows = np.flatnonzero(part.failed)
     if not len(rows):
         return met

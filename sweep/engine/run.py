@@ -10,6 +10,7 @@ dataset of them, and `plots` draws its maps.  `engine.enlarged` takes over what 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +31,12 @@ from sweep.kernels.methods import METHODS
 from sweep.models.user.blame import blamed
 from sweep.plots import quantities
 from sweep.results import dataset
+from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.identity import Identity, not_resumed
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
 from sweep.results.store import Running, Store, StoreError
-from sweep.results.stores import STORES
 
 LARGE = 2_000_000
 """Cells of the largest dataset that is loaded into memory unasked."""
@@ -65,26 +66,34 @@ def run(
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)
     if output is None:
-        memory = STORES["memory"](Path(), identity, reporter.note)
-        return _compute(config, memory, reporter, cluster).dataset()
-    files = RunFiles(Path(output), config.name)
+        return _compute(config, Store(), reporter, cluster).dataset()
+    files = RunFiles(Path(output), config.name, config.picture)
     with files.locked():
         if fresh:
+            _forget_pictures(config, files)
             files.discard()
         found = files.identity()
         if found and not found.difference(identity):
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
             earlier = _earlier(config, found, identity, files, rerun)
-            for path in files.pictures(config.picture):
-                path.unlink(missing_ok=True)  # of a dataset that is gone
-            store = STORES["checkpoint"](files.checkpoint, identity, reporter.note)
+            _forget_pictures(config, files)
+            store = Checkpoint(files.checkpoint, identity, reporter.note)
             _compute(config, store, reporter, cluster, earlier).save(files.dataset)
         files.discard_checkpoint()
         point()
         result = open_dataset(files.dataset, load=config.grid.size <= LARGE)
         _draw(config.picture, result, files, reporter)
     return result
+
+
+def _forget_pictures(config: Config, files: RunFiles) -> None:
+    """Remove the pictures of a dataset that is there, or was: they would pass for those of the next one."""
+    named = files.pictures(config.picture)
+    with suppress(StoreError), open_dataset(files.dataset, load=False) as there:
+        named |= files.pictures(quantities.pictured(there))
+    for path in named:
+        path.unlink(missing_ok=True)
 
 
 def _earlier(

@@ -242,9 +242,9 @@ def named(*fields: str) -> Any:
     return namedtuple("Constants", fields)
 
 
-def take(constants: Any, cells: Any) -> Any:
-    """The constants of the cells with the indices `cells`, in a record of the same type."""
-    return type(constants)(*(values[cells] for values in constants))
+def take(record: Any, cells: Any) -> Any:
+    """Of a record of arrays, such as constants, those of the cells with the indices `cells`: one of the same type."""
+    return type(record)(*(values[cells] for values in record))
 
 
 def stack(columns: tuple[Array, ...]) -> Array:

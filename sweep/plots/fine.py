@@ -17,7 +17,6 @@ from sweep.grid import Grid
 from sweep.parameters import START
 from sweep.prediction import predict
 from sweep.results.accessor import configuration
-from sweep.results.dataset import predicted
 
 _POINTS = {1: 401, 2: 41}
 """Values along one axis, and along each of two; the eigenvalues of a body take 0.1 ms."""
@@ -68,7 +67,7 @@ def _evaluated(
     # No critical spin depends on the start.
     starts = {name: value.numbers[0] for name, value in config.parameters.items() if name in START}
     grid = Grid({name: np.array(values) for name, values in axes}, {**starts, **dict(fixed)})
-    found = predicted(predict(config.tier, grid))
+    found = predict(config.tier, grid).variables
     return {
         name: xr.DataArray(values.reshape(grid.shape), grid.axes, grid.dims)
         for name, values in found.items()

@@ -86,8 +86,7 @@ def simulate(
     kernel = make_kernel(method, chosen)
     cells = len(columns["a"])
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
-    stability = predict(chosen, Grid({}, {}, dict(columns))).stability if ranges else None
-    stable = stability.ranges if stability else None
+    stable = predict(chosen, Grid({}, {}, dict(columns))).ranges if ranges else None
     steps = np.broadcast_to(steps, cells).astype(float)
     images = kernel.images(columns, steps, t_end, stable)
     execute(kernel, images, stop_when_settled=settle)

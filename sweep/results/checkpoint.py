@@ -12,19 +12,17 @@ from pydantic import TypeAdapter
 
 from sweep.grid import Array
 from sweep.results.identity import Identity, require_same
-from sweep.results.store import Running, StoreError
+from sweep.results.store import Running, Store, StoreError
 from sweep.results.writing import replacing
 
 _IDENTITY = TypeAdapter(Identity)
 
 
-class Checkpoint:
+class Checkpoint(Store):
     """A folder with a file for each finished tile and one for the tiles at work.
 
     A file that cannot be read counts as missing: its cells are computed again.
     """
-
-    lasting = True
 
     def __init__(self, folder: Path, identity: Identity, note: Callable[[str], None]) -> None:
         """Resume from `folder`, or make it.
@@ -53,7 +51,7 @@ class Checkpoint:
         for left in folder.glob(".*.part"):
             left.unlink()
         numbered = [path for path in folder.iterdir() if re.fullmatch(r"\d{6,}\.npz", path.name)]
-        self.done = {int(path.stem) for path in numbered if self._read(path) is not None}
+        self.done: set[int] = {int(path.stem) for path in numbered if self._read(path) is not None}
 
     def save(self, tile: int, arrays: Mapping[str, Array]) -> None:
         self._write(self.folder / f"{tile:06d}.npz", arrays)

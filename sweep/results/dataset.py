@@ -19,7 +19,6 @@ from sweep.kernels.methods import METHODS
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.parameters import PAPER_UNITS, SI
-from sweep.prediction import Prediction
 from sweep.results import accessor as accessor
 from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.variables import Variable, in_si, with_unit, without_unit
@@ -148,21 +147,6 @@ def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, A
     result = {"status": table["status"], "spin_final": spin, "t_stop": times, "step": table["step"]}
     for each in kernel.measurements:
         result |= each.read(table, times)
-    return result
-
-
-def predicted(prediction: Prediction) -> dict[str, Array]:
-    """The predicted variables, each over the cells or over the bodies."""
-    result = {} if prediction.form_factor is None else {"form_factor": prediction.form_factor}
-    if formulas := prediction.formulas:
-        plus, minus = formulas.n_c1
-        result["reversals_predicted"] = formulas.reversals
-        result |= {"n_c1_plus": plus, "n_c1_minus": minus, "n_c2_plus": 2 * plus, "n_c2_minus": 2 * minus}
-    if (stability := prediction.stability) and stability.applies:
-        finite = [np.where(np.isfinite(n), n, np.nan) for n in stability.n_c1]
-        result["n_c1_plus_linear"], result["n_c1_minus_linear"] = finite
-    if found := prediction.reversal_time:
-        result |= {"t_first_reversal_predicted": found.time, "reversal_time_reason": found.reason}
     return result
 
 

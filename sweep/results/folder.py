@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 class RunFiles:
-    """The files of the run `name` in `folder`."""
+    """The files of the run `name` in `folder`, with pictures of `variables`."""
 
-    def __init__(self, folder: Path, name: str) -> None:
-        self.folder, self.name = folder, name
+    def __init__(self, folder: Path, name: str, variables: Sequence[str] = ()) -> None:
+        self.folder, self.name, self._variables = folder, name, variables
         self.dataset, self.picture, self.configuration, self.checkpoint = (
             folder / f"{name}.{suffix}" for suffix in ("nc", "png", "yaml", "checkpoint")
         )
@@ -59,7 +59,7 @@ class RunFiles:
                     break
             os.close(handle)  # a run that has just ended removed this lock file after we opened it
         try:
-            for target in (self.dataset, self.picture):
+            for target in (self.dataset, *self.pictures(self._variables)):
                 remove_unfinished(target)
             yield
         finally:

@@ -1,16 +1,16 @@
-"""Says what a run keeps while it goes on: the contract that every store meets.
+"""Keeps what a run has found while it goes on: the contract of all stores, and the one in memory.
 
 A run is computed in tiles, which have numbers.  A store keeps the results of finished tiles and,
 between two chunks of work, the images of the tiles at work, so that a stopped run can be resumed.
 
-To add a store, write a class with these members in a file of its own, and enter it in `sweep.results.stores`.  Nothing
-else knows which store it is given.  `tests/results/test_stores.py` checks the promises made here for each.
+To add a store, write a subclass in a file of its own, and take it in `sweep.engine.run` or `sweep.studies.kept`.
+Nothing else knows which store it is given.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from sweep.faults import Refused
 from sweep.grid import Array
@@ -31,27 +31,28 @@ class Running(NamedTuple):
     """Time spent on them so far."""
 
 
-class Store(Protocol):
-    """Keeps the results of finished tiles, and the images of unfinished ones."""
+class Store:
+    """Keeps the results of finished tiles, and the images of unfinished ones: this one in memory, while it lives.
 
-    lasting: bool
-    """Whether what it keeps outlives the process."""
+    Its images are those of the process at work, so that there are none to go on from.
+    """
 
-    @property
-    def done(self) -> Collection[int]:
+    def __init__(self) -> None:
+        self._tiles: dict[int, dict[str, Array]] = {}
+        self.done: Collection[int] = self._tiles.keys()
         """Numbers of the tiles that are finished: those saved, also by an earlier run."""
 
     def save(self, tile: int, arrays: Mapping[str, Array]) -> None:
         """Keep the results of a tile; from now on it is `done`."""
+        self._tiles[tile] = dict(arrays)
 
     def load(self, tile: int) -> dict[str, Array]:
         """The results of a tile that is `done`, bit for bit; `StoreError` if they are lost."""
+        return self._tiles[tile]
 
     def save_running(self, running: Running) -> None:
         """Keep the tiles at work, in place of those kept before."""
 
     def load_running(self) -> Running | None:
-        """Return what the last `save_running` kept; None if there is nothing, or one of its tiles is `done`.
-
-        A store that is not `lasting` may always return None.
-        """
+        """Return what the last `save_running` kept; None if there is nothing, or one of its tiles is `done`."""
+        return None

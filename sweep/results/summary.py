@@ -156,16 +156,18 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         error = dataset[f"{name}_error"].values if f"{name}_error" in dataset else np.empty(0)
         if np.isfinite(error).any():
             yield f"{name} error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}{words}"
-    if "step_rule" in dataset:
-        simulated = status != IMPOSSIBLE
-        rule, step = (np.ravel(dataset[name].values)[simulated] for name in ("step_rule", "step"))
+    if "step_rule" in dataset and (status != IMPOSSIBLE).any():
+        rule, step = (np.ravel(dataset[name].values)[status != IMPOSSIBLE] for name in ("step_rule", "step"))
         who = ", ".join(f"{name} in {(rule == code).sum()}" for code, name in STEP_RULES.items() if code in rule)
         yield f"step: {step.min():.3g} to {step.max():.3g}, set by {who} cells"
     if "verified_cell" in dataset:
         changed = dataset.attrs.get("verified_counts_changed")
         counts = f"{changed} counts changed, " if changed is not None else ""
-        spin = f"the largest difference in spin is {dataset.attrs['verified_largest_spin_difference']:.1e}"
-        yield f"verified: {dataset.sizes['verified']} cells run again with finer steps: {counts}{spin}"
+        spin = dataset.attrs.get("verified_largest_spin_difference")
+        found = (
+            f"{counts}the largest difference in spin is {spin:.1e}" if spin is not None else "none of them to its end"
+        )
+        yield f"verified: {dataset.sizes['verified']} cells run again with finer steps: {found}"
     if "wall_time" in dataset.attrs:
         seconds, rate = dataset.attrs["wall_time"], dataset.attrs["trajectories_per_second"]
         yield f"cost: {seconds:.3g} s, {rate:.3g} trajectories/s"

@@ -138,13 +138,12 @@ class CriticalSpins(Search):
     def __init__(self, config: Config, store: Store, width: float) -> None:
         super().__init__(config, store, width)
         self.prediction = predict(config.equations, self.grid)
-        assert self.prediction.stability is not None  # it is a model
         self.columns = self.grid.columns()
         self.first = _reasons_of_n_c1(config, self.columns, self.prediction)
         limit = SPIN_LIMIT * config.equations.spin_unit(self.columns)
         self.spins = [
             Spin(body, (1.0, -1.0)[side], width, _way(abs(n_c1[body]), limit[body]))
-            for side, n_c1 in enumerate(self.prediction.stability.n_c1)
+            for side, n_c1 in enumerate(self.prediction.n_c1)
             for body in np.flatnonzero(self.first[side] == Reason.EXISTS).tolist()
         ]
         self._asked: list[tuple[Spin, list[float]]] = []
@@ -182,7 +181,7 @@ class CriticalSpins(Search):
                 inner[at], outer[at] = (spin.sign * np.exp(end) for end in (spin.root.low, spin.root.high))
             elif spin.reason in (Reason.UNDECIDED, Reason.REVERSES_AT_N_C1):
                 outer[at] = spin.sign * np.exp(spin.reverses) if np.isfinite(spin.reverses) else np.nan
-        arrays: dict[str, Array] = dict(dataset.predicted(self.prediction))
+        arrays: dict[str, Array] = dict(self.prediction.variables)
         arrays.pop("reversals_predicted", None)
         for half, side in enumerate(("plus", "minus")):
             arrays[f"n_c2_{side}_simulated"] = (inner[half] + outer[half]) / 2
@@ -203,11 +202,10 @@ def _way(n_c1: float, limit: float) -> list[float]:
 
 def _reasons_of_n_c1(config: Config, columns: Columns, prediction: Prediction) -> Array:
     """Why the eigenvalues have no n_c1, or that it exists: n_c1+ and n_c1- of all bodies, shape (2, bodies)."""
-    assert prediction.stability is not None
-    formulas, linear = prediction.formulas, np.array(prediction.stability.n_c1)
-    unresisted = np.isnan(linear) | (columns["mu"] <= 0 if formulas else False)
+    by_formula, linear = prediction.variables.get("n_c1_plus"), prediction.n_c1
+    unresisted = np.isnan(linear) | (columns["mu"] <= 0 if by_formula is not None else False)
     never = np.isinf(linear)
-    uncoupled = never & (np.isnan(formulas.n_c1[0]) if formulas else False)
+    uncoupled = never & (np.isnan(by_formula) if by_formula is not None else False)
     impossible = np.broadcast_to(config.equations.impossible(columns), linear.shape)
     reasons = [Reason.IMPOSSIBLE, Reason.NO_FRICTION, Reason.NO_COUPLING, Reason.NOT_FOUND]
     return np.select([impossible, unresisted, uncoupled, never], reasons, Reason.EXISTS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sweep.config import Config
 from sweep.engine.estimate import estimate as of_run
-from sweep.results.memory import Memory
+from sweep.results.store import Store
 from sweep.studies import SPIN_WIDTH, boundaries, critical
 from sweep.studies.search import measuring
 
@@ -41,7 +41,7 @@ def of_critical(config: Config) -> str:
     grid = config.grid
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one body"
     bodies = f"bodies: {grid.size} ({axes}), each with spins of both signs"
-    search = critical.CriticalSpins(config, Memory(), SPIN_WIDTH)
+    search = critical.CriticalSpins(config, Store(), SPIN_WIDTH)
     if not search.spins:
         return f"{bodies}; none has an n_c1 from which to search"
     search.rounds.append(search.ask())

@@ -19,7 +19,6 @@ from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.identity import require_same
-from sweep.results.memory import Memory
 from sweep.results.provenance import identify
 from sweep.results.store import Store
 from sweep.studies.search import Study
@@ -52,7 +51,7 @@ def kept(
         return found.labelled().assign_attrs(vars(identity))
 
     if output is None:
-        return search(Memory())
+        return search(Store())
     files = RunFiles(Path(output), f"{config.name}_{maker.rpartition('.')[2]}")
     with files.locked():
         if fresh:

@@ -33,5 +33,5 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """
     config = load_config(config, overrides)
     grid = config.grid
-    found = dataset.predicted(prediction.predict(config.tier, grid, config.measure))
+    found = prediction.predict(config.tier, grid, config.measure).variables
     return dataset.label(config, grid, found, {"config": config.to_yaml()})

@@ -111,6 +111,40 @@ def test_a_refined_map(write: Write) -> None:
     np.testing.assert_array_equal(refined["reversals"].where(same), full["reversals"].where(same))
 
 
+MOMENTS = {"Ixx": 2, "Iyy": 20, "Izz": {"start": 11, "stop": 51, "num": 17}, "Ixy": 0}
+
+
+@pytest.mark.parametrize("change", [{"Ixx": [2, 12]}, {"Ixx": [2], "Ixy": [-0.3]}])
+def test_a_refined_map_infers_no_body_to_be_impossible(change: dict[str, Any]) -> None:
+    """It is known which are: some lie between others here, or there is hardly any that is not."""
+    config = {"body": {**MOMENTS, **change}, "friction": {"mu": 60}, "start": {"n0": 0.05}}
+    config |= {"integrator": {"t_end": 20}, "measure": ["reversals"]}
+    refined, full = sweep.run(config, refine=3), sweep.run(config)
+    gone = full["status"] == IMPOSSIBLE
+    assert 0 < gone.sum() < gone.size
+    np.testing.assert_array_equal(refined["status"] == IMPOSSIBLE, gone)
+    assert not refined["inferred"].values[gone.values].any()
+
+
+def test_parts_of_a_run_tell_what_there_is(edge: xr.Dataset) -> None:
+    """Even if no body of them can be, or no cell that was verified came to its end."""
+    words = describe(edge.sel(b=0.9, offset=[1.0]))
+    assert "2 impossible" in words
+    assert "step:" not in words
+    failing = {"friction": {"mu": 60}, "start": {"n0": 3.0, "x0": 5.0}, "measure": ["reversals"]}
+    how = {"verify": 1.0, "method": "dopri5", "t_end": 20, "estimate_errors": False, "max_failed_fraction": 1}
+    assert "verified: 0 cells run again with finer steps: none" in describe(sweep.run(failing, **how))
+
+
+def test_an_estimate_of_cells_none_of_which_can_be() -> None:
+    """So it seems of a large table of which the sample meets no other."""
+    offsets = np.ones(10_000)
+    offsets[1] = 0.0
+    told = estimate(load_config({"cases": {"offset": offsets}, "body": {"delta": 0.03}, "friction": {"mu": 60}}))
+    assert "cells:  10000" in told
+    assert "steps:  0 if" in told
+
+
 def test_critical_spins_of_the_others(write: Write) -> None:
     found = sweep.critical(write(TEXT.replace("[0.02, 0.05]", "0.05")), width=1e-2, b=[0.9, 3.0], offset=[0.0, 0.3])
     gone = np.array([[True, False], [False, False]])

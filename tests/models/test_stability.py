@@ -94,9 +94,7 @@ def test_each_body_by_itself() -> None:
     found = []
     for number in (1, 2):
         with threads(number):
-            stability_ = predict(slip.MODEL, Grid({}, {}, bodies)).stability
-        assert stability_
-        found.append(stability_.ranges)
+            found.append(predict(slip.MODEL, Grid({}, {}, bodies)).ranges)
     np.testing.assert_array_equal(found[0], found[1])
     some = {name: values[::7] for name, values in bodies.items()}
     np.testing.assert_array_equal(found[0][:, ::7], stability.stable_ranges(slip.MODEL, some))

@@ -36,6 +36,18 @@ def test_a_run_draws_the_pictures_that_are_named(tmp_path: Path) -> None:
     assert drawn(folder)["map.png"] == before["map_form_factor.png"]
 
 
+def test_pictures_of_another_dataset_are_removed(tmp_path: Path) -> None:
+    """With those that a run which was killed has left half-written."""
+    file = tmp_path / "map.yaml"
+    file.write_text(f"{FORMULA}picture: [status, form_factor]\n", encoding="utf-8")
+    sweep.run(file, output=tmp_path)
+    (tmp_path / ".map_form_factor.png.77.part").touch()
+    sweep.run(file, output=tmp_path, progress=False)
+    assert not [*tmp_path.glob(".*.part")]
+    sweep.run(file, output=tmp_path, fresh=True, mu=[20, 61], picture=["status"])
+    assert set(drawn(tmp_path)) == {"map.png"}
+
+
 def test_without_a_name_it_is_what_the_dataset_is_about(tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_text(FORMULA, encoding="utf-8")
     result = sweep.run(tmp_path / "map.yaml", output=tmp_path, progress=False)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sweep.results.checkpoint import Checkpoint
 from sweep.results.identity import Identity
 from sweep.results.store import Running, Store
-from sweep.results.stores import STORES
 
 TILE = {
     "status": np.array([1, 2], np.int8),
@@ -21,13 +21,13 @@ TILE = {
 RUNNING = Running([4, 2], {"dopri5": np.arange(6.0).reshape(2, 3)}, 1.5)
 
 
-def opened(name: str, folder: Path) -> Store:
-    return STORES[name](folder / "x", Identity("name: x", "0" * 16, "1" * 16, "sweep 0"), pytest.fail)
+def opened(folder: Path) -> Checkpoint:
+    return Checkpoint(folder / "x", Identity("name: x", "0" * 16, "1" * 16, "sweep 0"), pytest.fail)
 
 
-@pytest.fixture(params=STORES)
+@pytest.fixture(params=["memory", "checkpoint"])
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
-    return opened(request.param, tmp_path)
+    return Store() if request.param == "memory" else opened(tmp_path)
 
 
 def same(found: dict[str, np.ndarray], saved: dict[str, np.ndarray]) -> None:
@@ -55,27 +55,25 @@ def test_running_tiles_come_back_until_one_is_done(store: Store) -> None:
     assert store.load_running() is None
     store.save_running(RUNNING)
     store.save_running(RUNNING._replace(seconds=2.5))
-    if store.lasting:
+    if isinstance(store, Checkpoint):
         same_running(store.load_running(), 2.5)
     store.save(2, TILE)
     assert store.load_running() is None
 
 
-def save_and_die(name: str, folder: Path) -> None:
-    store = opened(name, folder)
+def save_and_die(folder: Path) -> None:
+    store = opened(folder)
     store.save(7, TILE)
     store.save_running(RUNNING)
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-@pytest.mark.parametrize("name", STORES)
-def test_a_lasting_store_outlives_its_process(name: str, tmp_path: Path) -> None:
-    process = multiprocessing.get_context("spawn").Process(target=save_and_die, args=(name, tmp_path))
+def test_a_checkpoint_outlives_its_process(tmp_path: Path) -> None:
+    process = multiprocessing.get_context("spawn").Process(target=save_and_die, args=(tmp_path,))
     process.start()
     process.join(60)
     assert process.exitcode == -signal.SIGKILL
-    again = opened(name, tmp_path)
-    assert set(again.done) == ({7} if again.lasting else set())
-    if again.lasting:
-        same(again.load(7), TILE)
-        same_running(again.load_running(), 1.5)
+    again = opened(tmp_path)
+    assert set(again.done) == {7}
+    same(again.load(7), TILE)
+    same_running(again.load_running(), 1.5)

@@ -21,7 +21,7 @@ from sweep.kernels.status import SETTLED
 from sweep.plots import levels as drawn
 from sweep.plots import picture
 from sweep.results.margins import FOUND, OPEN, Counts, smoothed
-from sweep.results.memory import Memory
+from sweep.results.store import Store
 from sweep.studies.boundaries import Boundaries
 from sweep.studies.curve import Cell, Curve, Point
 from sweep.studies.roots import Root
@@ -139,7 +139,7 @@ def test_a_spin_that_comes_no_nearer_to_zero_tells_no_distance_from_the_next_cou
 def test_both_ends_of_each_bracket_are_simulated_with_their_errors(width: float) -> None:
     """With simulations that a formula replaces: one reversal begins where mu = 70 + b."""
 
-    class Formula(Memory):
+    class Formula(Store):
         def load(self, tile: int) -> dict[str, Array]:
             cells = search.rounds[tile]
             distance = cells["mu"] - 70 - cells["b"]
