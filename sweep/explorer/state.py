@@ -161,7 +161,8 @@ def read(
     known : what they are, by name
     """
     state, faults, all_choices = first(source), list[str](), choices(source)
-    for key, values in query.items():
+    # Limits come last, because another variable does away with them.
+    for key, values in sorted(query.items(), key=lambda pair: pair[0] in LIMITS):
         choice = all_choices.get(key)
         if choice and (k := choice.find(values[-1])) is not None:
             state = choice.put(state, k)
