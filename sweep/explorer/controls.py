@@ -93,16 +93,16 @@ class _Widgets:
         """Let the widgets say that option `k` is chosen."""
         self._buttons.active = k if k < self._choice.buttons else None
         if isinstance(self._more, Slider):
-            self._more.value = k
+            self._more.update(value=k, title=f"{labels.symbol(self._choice.name)} = {self._choice.words[k]}")
         elif self._more:
             self._more.value = self._choice.options[k] if k >= self._choice.buttons else ""
 
 
 def _slider(choice: Choice) -> Slider:
-    """A slider over the indices of an axis that says the value."""
-    symbol = labels.symbol(choice.name)
+    """A slider over the indices of an axis, which says the value while it is dragged."""
     slider = Slider(start=0, end=len(choice.words) - 1, step=1, value=0, width=190, show_value=False, name=choice.name,
-                    title=f"{symbol} = {choice.words[0]}", stylesheets=[BARE])  # fmt: skip
+                    stylesheets=[BARE])  # fmt: skip
+    args = {"values": list(choice.words), "symbol": labels.symbol(choice.name)}
     code = "cb_obj.title = `${symbol} = ${values[cb_obj.value]}`"
-    slider.js_on_change("value", CustomJS(args={"values": list(choice.words), "symbol": symbol}, code=code))
+    slider.js_on_change("value", CustomJS(args=args, code=code))
     return slider

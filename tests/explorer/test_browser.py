@@ -28,6 +28,7 @@ from PIL import Image
 from support import ROOT, own
 
 import sweep
+from sweep.explorer.slices import Source
 from sweep.kernels.status import LIFT_OFF
 from sweep.plots import animation, labels
 
@@ -397,6 +398,23 @@ def test_axes_variable_and_selection_change(go: Open, served: str, opened: xr.Da
     assert mapper[0] == -mapper[1]
     select(page, "show", "final spin n", "show=spin_final")
     select(page, "x", "start spin n₀", "x=n0&y=mu")
+
+
+def document_of(dataset: xr.Dataset, **query: str) -> Any:
+    """The document that the server makes of an address, without a browser."""
+    from bokeh.document import Document
+
+    from sweep.explorer.view import View
+
+    document = Document()
+    View(document, Source(dataset), None, None, {key: [value] for key, value in query.items()})
+    return document
+
+
+def test_a_slider_says_the_value_of_a_link(opened: xr.Dataset) -> None:
+    long = opened.isel(n0=[0] * 9).assign_coords(n0=np.arange(1, 10) / 100)
+    slider = document_of(long, n0="0.06").get_model_by_name("n0")
+    assert (slider.value, slider.title) == (5, "n₀ = 0.06")
 
 
 def test_the_colour_scale_is_chosen(visit: Open, opened: xr.Dataset) -> None:
