@@ -5,7 +5,7 @@ There is no glyph per cell: an image and a table of bits are sent as binary arra
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,6 @@ from sweep.explorer.cuts import Cuts
 from sweep.explorer.patterns import TILES
 from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.explorer.state import COUNTS, State
-from sweep.grid import Array
 from sweep.plots import labels, marks, places, theory
 from sweep.plots.description import Map
 from sweep.plots.scales import Scale
@@ -47,15 +46,10 @@ class MapFigure:
 
     Parameters
     ----------
-    probe, request : where the browser writes which cell is under the pointer, and which one is to be run; None on a
-        page without a server
     main : the map beside which this one stands, with the same cells
     """
 
-    def __init__(
-        self, source: Source, x: str, y: str, probe: ColumnDataSource | None = None,
-        request: ColumnDataSource | None = None, main: MapFigure | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, source: Source, x: str, y: str, main: MapFigure | None = None) -> None:
         self._source, self.axes = source, (x, y)
         self._x, self._y = (source.axes.get(axis, PlacedAxis("", np.zeros(1))) for axis in (x, y))
         self.placed = self._x, self._y
@@ -76,6 +70,9 @@ class MapFigure:
         self._lines = {name: _line(plot, *style) for name, style in LINES.items()}
         self._numbers = _counts(plot)
         self._uncertain = plot.scatter([], [], color="white", line_color="black", line_width=0.7)
+        # Here the browser writes which cell is under the pointer, which one is to be run, and what is enclosed.
+        self.probe = ColumnDataSource({"i": [-1], "j": [-1]}, name="probe")
+        self.request = ColumnDataSource({"i": [-1], "j": [-1], "add": [False], "count": [0]}, name="request")
         self.selected = ColumnDataSource({"xs": [], "ys": []}, name="selected")
         for colour, dash in (("black", "solid"), ("white", "dashed")):
             plot.patches("xs", "ys", source=self.selected, fill_color=None, line_color=colour, line_dash=dash)
@@ -86,18 +83,19 @@ class MapFigure:
         self.cuts = Cuts(source, [(self._x, plot.x_range), (self._y, plot.y_range)])
         _connect(plot, self._cells, {"figure": plot, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
-                 "ex": ex, "ey": ey, "cursor": self.cursor, "probe": probe, "request": request, "cells": self._cells,
-                 "selected": self.selected, "main": main is None, "cuts": self.cuts.models,
+                 "ex": ex, "ey": ey, "cursor": self.cursor, "probe": self.probe, "request": self.request,
+                 "cells": self._cells, "selected": self.selected, "main": main is None, "cuts": self.cuts.models,
                  "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
-    def show(self, part: Map, columns: Mapping[str, Array], state: State) -> Scale:
-        """Show a map over these axes; returns how its values become colours.
+    def show(self, state: State, names: Iterable[str]) -> tuple[Map, Scale]:
+        """Show the variable of a state, of which the pointer tells, and of `names` as well.
 
-        Parameters
-        ----------
-        columns : what the pointer shows of a cell beside its place: tables of shape (y, x) by their variables
-        state : in which the visitor has chosen of the colour scale
+        Returns
+        -------
+        the map, and how its values become colours
         """
+        self.part = part = self._source.map(state.show, *self.axes, state.at)
+        columns = {state.show: part.values, **self._source.tables(names, *self.axes, state.at)}
         scale = scale_of(part, state)
         logarithmic = is_logarithmic(scale)
         for image in self._images:
@@ -126,7 +124,7 @@ class MapFigure:
         self.figure.right = [self._bar(part, scale, mapper)]
         tip, formatters = _tip(self._source, part, list(columns))
         self._hover.update(tooltips=tip, formatters=formatters)
-        return scale
+        return part, scale
 
     def _bar(self, part: Map, scale: Scale, mapper: Any) -> models.ColorBar:
         chosen_by_bokeh: Any = "auto" if is_logarithmic(scale) else models.BasicTicker()

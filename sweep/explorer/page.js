@@ -125,7 +125,7 @@ const sweep = (() => {
     const i = cell(current.ex, event.x), j = cell(current.ey, event.y)
     if (i < 0 || j < 0) return
     choose(i, j)
-    if (current.request) ask(current.request, i, j, Boolean(event.modifiers?.shift))
+    ask(current.request, i, j, Boolean(event.modifiers?.shift))
   }
 
   /** Take note of what a lasso or a box encloses. */
@@ -145,7 +145,7 @@ const sweep = (() => {
     const here = i < 0 || j < 0 ? chosen(cursor) : [i, j]
     if (here[0] >= 0 && String(here) !== String(current.cut)) cut(...here)
     clearTimeout(waiting)
-    if (probe) waiting = setTimeout(() => tell(probe, ...here), 50)
+    waiting = setTimeout(() => tell(probe, ...here), 50)
   }
 
   function tell(probe, i, j) {
@@ -166,8 +166,8 @@ const sweep = (() => {
       const stride = event.shiftKey ? 10 : 1
       const next = i < 0 ? [0, 0] : [clamp(i + stride * di, ex), clamp(j + stride * dj, ey)]
       choose(...next)
-      if (probe) tell(probe, ...next)
-    } else if (event.key === "Enter" && request && i >= 0) {
+      tell(probe, ...next)
+    } else if (event.key === "Enter" && i >= 0) {
       ask(request, i, j, event.shiftKey)
     } else {
       return

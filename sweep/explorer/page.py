@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,6 @@ from jinja2 import Environment
 from sweep.explorer import figure, patterns, state
 from sweep.explorer.colours import beyond
 from sweep.explorer.slices import Source
-from sweep.grid import Array
 from sweep.plots import labels
 from sweep.plots.description import Map
 from sweep.plots.scales import Scale
@@ -76,9 +76,8 @@ def save_html(
     shown, faults = state.read({k: [v] for k, v in query.items() if v}, source, {})
     if faults:
         raise ValueError("; ".join(faults))
-    part = source.map(shown.show, shown.x, shown.y, shown.at)
     drawn = figure.MapFigure(source, shown.x, shown.y)
-    scale = drawn.show(part, _all_values(source, shown, part.values.size), shown)
+    part, scale = drawn.show(shown, _told(source, shown))
     document = Document()
     document.add_root(Column(drawn.figure, drawn.cuts.root, sizing_mode="stretch_width", name="map"))
     document.add_root(Div(text=legend(part, scale), sizing_mode="stretch_width", name="legend"))
@@ -92,9 +91,10 @@ def save_html(
         temporary.write_text(html, encoding="utf-8")
 
 
-def _all_values(source: Source, shown: state.State, cells: int) -> dict[str, Array]:
-    """The tables of all variables over the map; of a large one only the counts and how they came about."""
+def _told(source: Source, shown: state.State) -> list[str]:
+    """The variables that the pointer tells: all, or of a large map only the counts and how they came about."""
     plain = [n for n in source.variables if source.dims_of(n) <= set(source.dims)]
+    cells = math.prod(len(axis.values) for name, axis in source.axes.items() if name in (shown.x, shown.y))
     if cells * len(plain) > _MOST_VALUES:
-        plain = [n for n in plain if n in (shown.show, "reversals", "reversals_predicted", "difference", "status")]
-    return source.tables(plain, shown.x, shown.y, shown.at)
+        return [n for n in plain if n in ("reversals", "reversals_predicted", "difference", "status")]
+    return plain

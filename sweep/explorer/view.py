@@ -57,10 +57,6 @@ class View:
     def _build(self) -> None:
         self._calls = ColumnDataSource({"name": [], "given": []}, name="calls")
         self._calls.js_on_change("data", CustomJS(code="sweep.called(cb_obj.data)"))
-        self._probe = ColumnDataSource({"i": [-1], "j": [-1]}, name="probe")
-        controls.on(self._probe, "data", lambda _: self._point())
-        self._request = ColumnDataSource({"i": [-1], "j": [-1], "add": [False], "count": [0]}, name="request")
-        controls.on(self._request, "data", lambda _: self._requested())
         self._shown = self._figure()
         self._map = Row(sizing_mode="stretch_width", name="map", styles={"flex-wrap": "wrap"})
         self._legend = Div(sizing_mode="stretch_width", name="legend")
@@ -94,28 +90,22 @@ class View:
             self._draw_cells()
 
     def _draw_map(self) -> None:
-        state = self.state
-        beside = [n for n in _BESIDE if n in self._source.variables]
-        part = self._source.map(state.show, state.x, state.y, state.at)
-        tables = self._source.tables(beside, state.x, state.y, state.at)
+        state, beside = self.state, [n for n in _BESIDE if n in self._source.variables]
         if self._shown.axes != (state.x, state.y):
             self._shown, self._second = self._figure(), None
         self._second = (self._second or self._figure(self._shown)) if state.beside else None
         self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts.root]
         if self._second:
-            second = self._source.map(state.beside, state.x, state.y, state.at)
-            self._second.show(
-                second, {state.beside: second.values, **tables}, replace(state, spacing="", low=None, high=None)
-            )
-        self._part = part
-        columns = {state.show: part.values, **tables}
-        self._legend.text = page.legend(part, self._shown.show(part, columns, state))
+            self._second.show(replace(state, show=state.beside, spacing="", low=None, high=None), beside)
+        self._legend.text = page.legend(*self._shown.show(state, beside))
         self._controls.show(state)
         self._draw_selection()
 
     def _figure(self, main: figure.MapFigure | None = None) -> figure.MapFigure:
         """A map over the chosen axes, or a second one beside `main`."""
-        made = figure.MapFigure(self._source, self.state.x, self.state.y, self._probe, self._request, main)
+        made = figure.MapFigure(self._source, self.state.x, self.state.y, main)
+        controls.on(made.probe, "data", lambda _: self._point())
+        controls.on(made.request, "data", lambda _: self._requested())
         controls.on(made.selected, "data", lambda _: self._draw_selection())
         return made
 
@@ -126,7 +116,7 @@ class View:
         if self._selection.visible:
             corners = np.array([around["xs"][0], around["ys"][0]], float)
             chosen = selection.enclosed(corners, *self._shown.placed)
-            told = selection.statistics(self._part, chosen)
+            told = selection.statistics(self._shown.part, chosen)
             self._selection.text = str(PARTS.selection(int(chosen.sum()), *told))
 
     def _place(self, source: ColumnDataSource) -> dict[str, int] | None:
@@ -135,14 +125,15 @@ class View:
         if not all(isinstance(d, list | np.ndarray) and len(d) and isinstance(d[0], int | np.integer) for d in data):
             return None
         i, j = (int(d[0]) for d in data)
-        if not (0 <= i < len(self._part.x.values) and 0 <= j < len(self._part.y.values)):
+        across, up = self._shown.placed
+        if not (0 <= i < len(across.values) and 0 <= j < len(up.values)):
             return None
         index = {**self.state.at, self.state.x: i}
         return {**index, self.state.y: j} if self.state.y else index
 
     def _point(self) -> None:
         """Tell about the cell under the pointer, or else about the chosen one."""
-        index = self._place(self._probe)
+        index = self._place(self._shown.probe)
         if index is None:
             self._cell.text = str(PARTS.hint("" if self._setup else why_still(self._source)))
             return
@@ -155,7 +146,7 @@ class View:
 
     def _requested(self) -> None:
         """Run the cell that was clicked, or chosen with Enter."""
-        index = self._place(self._request)
+        index = self._place(self._shown.request)
         if index is None or not self._setup:
             return
         cell = {**self._setup.base, **self._source.parameters_at(tuple(self._setup.base), index)}
@@ -163,7 +154,7 @@ class View:
             self._activate(self._drawn.cells.index(cell))
             return
         self._faults = []
-        self._drawn.add(cell, beside=bool(self._request.data["add"][0]) or bool(self._chosen.keep.active))
+        self._drawn.add(cell, beside=bool(self._shown.request.data["add"][0]) or bool(self._chosen.keep.active))
         self._draw_cells()
 
     def _edit(self, name: str, value: float) -> None:

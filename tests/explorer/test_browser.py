@@ -385,6 +385,8 @@ def test_axes_variable_and_selection_change(go: Open, served: str, opened: xr.Da
     assert model(page, "map figure", "m.left[0].axis_label") == "start spin n₀ (√(g/c))"
     page.get_by_role("button", name="3", exact=True).click()
     page.wait_for_url(re.compile("b=3"))
+    page.mouse.move(*place(page, 1, 1))
+    page.locator("#cell").get_by_text("μ = 50, b = 3, n₀ = 0.05").wait_for()
     page.get_by_role("button", name="difference").click()
     page.wait_for_url(re.compile("show=difference"))
     settle(page)
@@ -415,6 +417,17 @@ def test_a_slider_says_the_value_of_a_link(opened: xr.Dataset) -> None:
     long = opened.isel(n0=[0] * 9).assign_coords(n0=np.arange(1, 10) / 100)
     slider = document_of(long, n0="0.06").get_model_by_name("n0")
     assert (slider.value, slider.title) == (5, "n₀ = 0.06")
+
+
+def test_no_cell_is_told_along_other_axes(opened: xr.Dataset) -> None:
+    """Until the pointer is on one: its indices were those of the old axes."""
+    document = document_of(opened, x="mu", y="b")
+    cell = document.get_model_by_name("cell")
+    nothing = cell.text
+    document.get_model_by_name("probe").data = {"i": [1], "j": [1]}
+    assert "μ = 50, b = 3, n₀ = 0.02" in cell.text
+    document.get_model_by_name("y").value = "n0"
+    assert cell.text == nothing
 
 
 def test_the_colour_scale_is_chosen(visit: Open, opened: xr.Dataset) -> None:

@@ -1,5 +1,6 @@
 """What can be drawn of a dataset, and what it is about, is the same for pictures and the explorer; nothing is run."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -136,11 +137,10 @@ def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None
 )
 def test_pictures_and_explorer_have_the_same_colours(name: str, whole: xr.Dataset) -> None:
     from sweep.explorer.figure import MapFigure  # needs Bokeh
-    from sweep.explorer.state import first
 
     whole["reversals"] += xr.DataArray(np.arange(SIZE[1], dtype="int16") ** 3, dims="delta")
-    part, shown = Source(whole).map(name, "delta", "n0", {}), MapFigure(Source(whole), "delta", "n0")
-    shown.show(part, {}, first(Source(whole)))
+    shown = MapFigure(Source(whole), "delta", "n0")
+    part, _ = shown.show(replace(state.first(Source(whole)), show=name), [])
     (bar,) = shown.figure.right
     mapper, values = bar.color_mapper, np.unique(part.shown)
     straight = np.log if "Log" in type(mapper).__name__ else np.asarray
