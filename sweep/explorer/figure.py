@@ -1,5 +1,7 @@
 """The map of a slice as a Bokeh figure: one image, patterns that the browser draws over it, and hover by index.
 
+Under it stand cuts along the row and the column of the cell under the pointer, which the browser draws too.
+
 There is no glyph per cell: an image and a table of bits are sent as binary arrays, so that a million cells stay fluid.
 """
 
@@ -15,7 +17,6 @@ from bokeh.plotting import figure
 
 from sweep.explorer import axes
 from sweep.explorer.colours import is_logarithmic, mapping, scale_of
-from sweep.explorer.cuts import Cuts
 from sweep.explorer.patterns import TILES
 from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.explorer.state import COUNTS, State
@@ -25,6 +26,9 @@ from sweep.plots.scales import Scale
 
 HEIGHT = 480
 """Of the map, in pixels."""
+
+_CUT_HEIGHT = 150
+"""Of a cut, in pixels."""
 
 _SHORT = COUNTS | {"status": "end"}
 """What these are called under the pointer, where the table must not hide the map."""
@@ -80,19 +84,20 @@ class MapFigure:
         self.pins: ColumnDataSource = _pins(plot, main and main.pins)
         self._hover = models.HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
-        self.cuts = Cuts(source, [(self._x, plot.x_range), (self._y, plot.y_range)])
+        ranges = zip(self.placed, (plot.x_range, plot.y_range), strict=True)
+        self._cuts = [_cut(source, axis, span) for axis, span in ranges if axis.name]
+        self.cuts = models.Row(*(cut["plot"] for cut in self._cuts), name="cuts", sizing_mode="stretch_width",
+                               styles={"flex-basis": "100%", "flex-wrap": "wrap"})  # fmt: skip
         _connect(plot, self._cells, {"figure": plot, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
                  "ex": ex, "ey": ey, "cursor": self.cursor, "probe": self.probe, "request": self.request,
-                 "cells": self._cells, "selected": self.selected, "main": main is None, "cuts": self.cuts.models,
+                 "cells": self._cells, "selected": self.selected, "main": main is None, "cuts": self._cuts,
                  "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
     def show(self, state: State, names: Iterable[str]) -> tuple[Map, Scale]:
-        """Show the variable of a state, of which the pointer tells, and of `names` as well.
+        """Show the variable of a state, and let the pointer tell of `names` as well.
 
-        Returns
-        -------
-        the map, and how its values become colours
+        Returns the map, and how its values become colours.
         """
         self.part = part = self._source.map(state.show, *self.axes, state.at)
         columns = {state.show: part.values, **self._source.tables(names, *self.axes, state.at)}
@@ -118,7 +123,8 @@ class MapFigure:
         at = {"x": self._x.place(part.x.values[across]), "y": self._y.place(part.y.values[up])}
         self._uncertain.data_source.data = at
         self._uncertain.glyph.size = float(np.clip(120 / max(part.values.shape), 2.0, 6.0))
-        self.cuts.spell((scale.ticks or {}) if part.flags else {})
+        for cut in self._cuts:
+            cut["plot"].yaxis.major_label_overrides = (scale.ticks or {}) if part.flags else {}
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]
@@ -193,6 +199,22 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
     plot.title.update(text_font_size="14px", text_font_style="bold")
     plot.yaxis.visible = bool(up.name)
     return plot
+
+
+def _cut(source: Source, axis: PlacedAxis, span: Any) -> dict[str, Any]:
+    """The figure of a cut along an axis, and what `cut` of page.js has to know to fill it."""
+    plot = figure(
+        height=_CUT_HEIGHT, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, x_range=span,
+        x_axis_type=axes.kind(axis), x_axis_label=source.label(axis.name), name=f"cut along {axis.name}", title=" ",
+        outline_line_color=None,
+    )  # fmt: skip
+    data = ColumnDataSource({"at": [], "value": [], "here": []}, syncable=False)
+    plot.step("at", "value", source=data, mode="center", color="#0072b2", line_width=1.5)
+    plot.scatter("at", "here", source=data, color="#d55e00", size=8)
+    axes.style(plot, axis)
+    plot.title.update(text_font_size="12px", text_font_style="normal")
+    plot.grid.grid_line_color = axes.GRID
+    return {"plot": plot, "at": axis.place(axis.values), "values": axis.values, "symbol": labels.symbol(axis.name)}
 
 
 def _tip(source: Source, part: Map, columns: list[str]) -> tuple[str, dict[str, models.CustomJSHover]]:

@@ -79,7 +79,7 @@ def save_html(
     drawn = figure.MapFigure(source, shown.x, shown.y)
     part, scale = drawn.show(shown, _told(source, shown))
     document = Document()
-    document.add_root(Column(drawn.figure, drawn.cuts.root, sizing_mode="stretch_width", name="map"))
+    document.add_root(Column(drawn.figure, drawn.cuts, sizing_mode="stretch_width", name="map"))
     document.add_root(Div(text=legend(part, scale), sizing_mode="stretch_width", name="legend"))
     dress(document, source)
     variables = document.template_variables

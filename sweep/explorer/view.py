@@ -94,7 +94,7 @@ class View:
         if self._shown.axes != (state.x, state.y):
             self._shown, self._second = self._figure(), None
         self._second = (self._second or self._figure(self._shown)) if state.beside else None
-        self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts.root]
+        self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts]
         if self._second:
             self._second.show(replace(state, show=state.beside, spacing="", low=None, high=None), beside)
         self._legend.text = page.legend(*self._shown.show(state, beside))
