@@ -754,6 +754,11 @@ def test_a_map_is_one_file_that_needs_no_network(go: Open, opened: xr.Dataset, t
     assert "ended at the time limit" in near
     assert "lower bound" in text(page, "legend")
     assert len(np.unique(pixels(page, 2, 0), axis=0)) > 1
+    page.mouse.click(*place(page, 2, 0))
+    page.locator("#map").focus()
+    for key in ("ArrowUp", "Enter"):
+        page.keyboard.press(key)
+    wait(page, "cut along mu", "m.title.text === 'at b = 3'")
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
 
 
