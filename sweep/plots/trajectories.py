@@ -67,8 +67,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     ValueError
         if there is no such series.
     """
-    over_time = set(dataset["time"].dims) - {"trajectory"}
-    series = [str(name) for name, v in dataset.data_vars.items() if over_time & set(v.dims)]
+    series = [str(name) for name, v in dataset.data_vars.items() if "time" in v.dims]
     if variable is not None and variable not in series:
         raise ValueError(f"there is no series {variable}; choose {', '.join(series)}")
     alone = variable is not None or SAMPLE in dataset.coords
@@ -227,8 +226,7 @@ def reversal_times(one: xr.Dataset) -> Array:
     """
     if "ripple_free_spin" not in one:
         return np.array([])
-    good = np.isfinite(one["time"].values)
-    time, spin = one["time"].values[good], one["ripple_free_spin"].values[good]
+    time, spin = one["time"].values, one["ripple_free_spin"].values
     if is_of_own_body(one):  # whose period nobody knows
         at = np.flatnonzero(spin[1:] * spin[:-1] < 0)
         return np.asarray(time[at] + (time[at + 1] - time[at]) * spin[at] / (spin[at] - spin[at + 1]))
