@@ -82,7 +82,7 @@ def choose(
     across = _across(dataset, dims, x, y)
     rest = [d for d in dims if d not in across]
     if names == ["probability"] and len(across) < 2:
-        rest.remove("count")  # all counts are drawn together
+        rest = [d for d in rest if d != "count"]  # all counts are drawn together
     elif names == ["probability"] and "count" in rest:
         dataset = dataset.isel(count=_telling(dataset))
     if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
