@@ -152,10 +152,9 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
 
 def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
     """Draw a series of sampled trajectories; returns the entries for the legend."""
-    samples, time = int(dataset[SAMPLE].max()) + 1, dataset["time"]
+    time = dataset["time"]
     entries: list[Artist] = []
-    for i in range(dataset.sizes["trajectory"] // samples):
-        one = dataset.isel(trajectory=slice(i * samples, (i + 1) * samples))
+    for i, one in enumerate(_cells(dataset)):
         tails = [(1 - share) / 2 for share in _BANDS]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # no sample goes on so long
@@ -166,6 +165,14 @@ def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
         entries.append(Line2D([], [], color=f"C{i}", label=_of_samples(dataset, one)))
     held = [Patch(color="0.4", alpha=opacity, label=f"{share:.0%} of them") for share, opacity in _BANDS.items()]
     return entries + held
+
+
+def _cells(dataset: xr.Dataset) -> list[xr.Dataset]:
+    """The samples of each cell, of which some may be left out: as their numbers rise, so do those of trajectories."""
+    numbers, samples = dataset["trajectory"].values, dataset[SAMPLE].values
+    goes_on = (np.diff(samples) > 0) & (np.diff(samples) == np.diff(numbers))
+    places = np.split(np.arange(len(numbers)), np.flatnonzero(~goes_on) + 1)
+    return [dataset.isel(trajectory=each) for each in places]
 
 
 def _of_samples(dataset: xr.Dataset, one: xr.Dataset) -> str:
