@@ -128,7 +128,7 @@ def plot(
         figure = cast(Figure, ax.get_figure(root=True))
     else:
         across = inches(width) if width is not None else None
-        with mpl.rc_context(style(across) | ({"figure.figsize": figsize} if figsize else {})):
+        with mpl.rc_context(style(figsize[0] if figsize else across, printed=across is not None)):
             figure = _drawn(opened, variable, axes, how, histogram=histogram)
             if across:
                 figure.letter()

@@ -128,6 +128,8 @@ def test_settings_of_the_user_are_obeyed() -> None:
 
 def test_a_figure_has_the_size_that_is_asked_for(small: xr.Dataset) -> None:
     np.testing.assert_allclose(picture.plot(small, figsize=(6, 9)).get_size_inches(), (6, 9))
+    usual, other = (picture.plot(made(), figsize=(6.4, height)) for height in (4.8, 5))  # matplotlib's own is 6.4 × 4.8
+    assert [axes.get_title() for axes in usual.axes] == [axes.get_title() for axes in other.axes]
 
 
 @pytest.mark.parametrize(
