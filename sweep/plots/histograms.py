@@ -71,6 +71,8 @@ def _edges(maps: list[Map]) -> Array:
     if values.dtype.kind in "iu":
         width = -(-(high - low + 1) // _MOST)
         return np.arange(low, high + width + 1, width) - 0.5
+    if low == high:
+        return np.asarray(low + np.array([-0.1, 0.1]) * (abs(low) or 1.0))
     number = min(len(np.histogram_bin_edges(values, "auto")), _MOST)
     spaced = np.geomspace if isinstance(common_scale(maps).norm, LogNorm) else np.linspace
     return spaced(low, high, number + 1)
