@@ -108,6 +108,7 @@ def test_the_command_draws_for_print_without_a_title(small: xr.Dataset, tmp_path
     target = tmp_path / "small.svg"
     result = invoke("plot", tmp_path / "small.nc", "--width", "3.5 in", "--no-title", "--output", target)
     assert result.exit_code == 0, result.output
+    refused(invoke("plot", tmp_path / "small.nc", "--no-title", "--output", "x.html"), "--no-title: not for a page")
     assert 'width="252pt"' in target.read_text(encoding="utf-8")
     title = str(open_dataset(tmp_path / "small.nc").attrs["title"])
     assert title in {text.get_text() for text in texts(picture.plot(small))}
