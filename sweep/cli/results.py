@@ -52,7 +52,7 @@ def plot(
     if formats.suffix(target) == formats.PAGE:
         if len(files) > 1:
             refuse(f"--output {target}", f"a page shows one dataset; write a {formats.A_PICTURE} of several")
-        for option, value in {"limits": limits, **how}.items():
+        for option, value in {"limits": limits, "no-title": no_title, **how}.items():
             if value and option not in ("x", "y"):
                 refuse(f"--{option}", f"not for a page; write a {formats.A_PICTURE}")
         with needs_bokeh("--output"):

@@ -262,10 +262,13 @@ def _followed(config: Config, cells: tuple[str, ...], quiet: bool, **how: Any) -
 def _save(config: Config, verb: str, result: xr.Dataset, output: Path | None) -> RunFiles:
     """Write a dataset that needed no checkpoint, and its picture."""
     from sweep.plots import picture
+    from sweep.results import netcdf
     from sweep.results.folder import RunFiles
 
     files = RunFiles(output or Path("runs") / config.name, f"{config.name}_{verb}")
-    files.save_result(result, picture.plot(result))
+    files.folder.mkdir(parents=True, exist_ok=True)
+    netcdf.write(files.dataset, result)
+    picture.plot(result, output=files.picture)
     return files
 
 

@@ -180,6 +180,6 @@ def _draw(variables: Sequence[str], result: xr.Dataset, files: RunFiles, reporte
     for path, variable in files.pictures(variables).items():
         if others or not path.exists():
             try:
-                files.save_picture(picture.plot(result, variable), path)
+                picture.plot(result, variable, output=path)
             except ValueError as error:
                 reporter.note(f"no picture{f' of {variable}' if variable else ''}: {error}")

@@ -44,7 +44,7 @@ def scale_of(part: Map, state: State) -> Scale:
         return common_scale([part], cmap=palette)
     low = shown.min() if state.low is None else state.low
     high = shown.max() if state.high is None else state.high
-    given = (state.low, state.high) != (None, None) and low < high
+    given = (state.low, state.high) != (None, None) and low < high and (low > 0 or part.name != "ratio")
     scale = common_scale([part], (low, high) if given else None, palette)
     norm = {"linear": Normalize, "log": LogNorm}.get(state.spacing)
     if norm is None or not (low < high and (low > 0 or norm is Normalize)):

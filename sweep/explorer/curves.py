@@ -57,7 +57,7 @@ class Curves:
             self._label(present[0])
         for part, series in ((self.spin, "spin"), (self.energy, "energy")):
             part.visible = any(series in one for one in present)
-        end = max([float(np.nanmax(one["time"])) for one in present], default=1.0)
+        end = max([float(one["time"].max()) for one in present], default=1.0)
         chosen = curves[active] if active < len(curves) else None
         if (chosen, end) != self._played:
             self._played = chosen, end
@@ -108,9 +108,8 @@ class _Slot:
         one, reversals = (
             (curve.dataset, curve.reversals) if curve else (xr.Dataset({"time": ("time", [])}), np.zeros(0))
         )
-        good = np.isfinite(one["time"].values)
         columns = {
-            name: (one[name].values if name in one else np.full(len(good), np.nan))[good].astype("float32")
+            name: (one[name].values if name in one else np.full(one.sizes["time"], np.nan)).astype("float32")
             for name in ("time", *_OVER_TIME)
         }
         at = _told([columns[name] for name in _OVER_TIME])

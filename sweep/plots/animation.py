@@ -64,13 +64,16 @@ def animate(
     Raises
     ------
     ValueError
-        if the bodies have no attitude or are too many, the stretch is empty, or there is no such format.
+        if the bodies have no attitude or are too many, the stretch is empty, the speed is not above zero, or there is
+        no such format.
     StoreError
         if the file is not a dataset, or `output` cannot be written.
     """
     path = None if output is None else Path(output)
     if path is not None:
         check(path)
+    if speed is not None and not speed > 0:
+        raise ValueError(f"speed: {speed:g}; give a number above zero")
     found = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
     if "heading" not in found:
         raise ValueError("its bodies have no attitude; animate trajectories of the models slip or noslip")
@@ -80,7 +83,8 @@ def animate(
     end = min(_until(found) if end is None else end, last)
     if not begin < end:
         raise ValueError(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
-    count = int(np.ceil(FRAMES_A_SECOND * ((end - begin) / speed if speed else SECONDS))) + 1
+    seconds = SECONDS if speed is None else (end - begin) / speed
+    count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
     scene = _Scene(found, np.linspace(begin, end, count))
     animation = FuncAnimation(scene.figure, scene.show, frames=count, interval=1000 / FRAMES_A_SECOND, repeat=True)
     if path is not None:

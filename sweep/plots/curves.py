@@ -17,7 +17,7 @@ from sweep.plots.description import describe
 from sweep.plots.figure import BESIDE, Frames, set_scale
 from sweep.plots.marks import BLANK, legend
 from sweep.plots.panels import Panels
-from sweep.plots.quantities import COMPARISONS, PREDICTIONS
+from sweep.plots.quantities import PREDICTIONS
 from sweep.plots.scales import Limits
 
 _STYLES: dict[str, dict[str, Any]] = {
@@ -43,8 +43,7 @@ _BELOW = 0.03
 def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[Artist]:
     """The variables over the one long axis, in a panel for each value of the others; returns entries for a legend."""
     dataset, x = panels.dataset, panels.across[0] if panels.across else ""
-    names = [name for name in panels.names if name not in COMPARISONS] or panels.names
-    names = names[:1] + [name for name in names[1:] if dataset[name].notnull().any()]
+    names = panels.names[:1] + [name for name in panels.names[1:] if dataset[name].notnull().any()]
     kinds = legend(dataset, names[0])
     entries: dict[str, Artist] = {}
     for axes, chosen in frames:

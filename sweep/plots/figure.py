@@ -65,15 +65,17 @@ _LEAST = 2.1
 """Inches of a map across, at least."""
 
 
-def style(width: float | None = None) -> dict[Any, Any]:
+def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
     """The settings of matplotlib for a figure: ours, except where the user has changed matplotlib's.
 
     Parameters
     ----------
-    width : inches of a figure for print; by default as the user has set it, or of a screen
+    width : inches of the figure; None for as the user has set it, or for a screen
+    printed : whether it is for print
     """
-    ours = _STYLE | (_PRINT if width else {})
+    ours = _STYLE | (_PRINT if printed else {})
     found = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
+    # Panels tell the height, and this one keeps the size from being taken for matplotlib's default.
     return found | ({"figure.figsize": [width, width / 2]} if width else {})
 
 

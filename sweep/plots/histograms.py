@@ -19,7 +19,6 @@ from sweep.plots.figure import Frames
 from sweep.plots.hatches import HATCHES
 from sweep.plots.marks import legend
 from sweep.plots.panels import Panels
-from sweep.plots.quantities import COMPARISONS
 
 _MOST = 60
 """Bars of a histogram, at most."""
@@ -27,8 +26,7 @@ _MOST = 60
 
 def draw(panels: Panels, frames: Frames) -> list[Artist]:
     """Draw the shares of the cells, simulated and predicted; returns entries for a legend."""
-    dataset, across = panels.dataset, panels.across[::-1] or [""]
-    names = [name for name in panels.names if name not in COMPARISONS] or panels.names
+    dataset, names, across = panels.dataset, panels.names, panels.across[::-1] or [""]
     maps = [[describe(chosen, name, *across) for name in names] for _, chosen in frames]
     edges, bound = _edges([each for of_one in maps for each in of_one]), legend(dataset, names[0]).get("time_limit")
     words = {name: labels.words(dataset, name) for name in names}
@@ -73,6 +71,8 @@ def _edges(maps: list[Map]) -> Array:
     if values.dtype.kind in "iu":
         width = -(-(high - low + 1) // _MOST)
         return np.arange(low, high + width + 1, width) - 0.5
+    if low == high:
+        return np.asarray(low + np.array([-0.1, 0.1]) * (abs(low) or 1.0))
     number = min(len(np.histogram_bin_edges(values, "auto")), _MOST)
     spaced = np.geomspace if isinstance(common_scale(maps).norm, LogNorm) else np.linspace
     return spaced(low, high, number + 1)

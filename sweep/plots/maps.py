@@ -18,7 +18,6 @@ from sweep.plots.description import Map, common_scale, describe
 from sweep.plots.figure import BESIDE, RATIO, Picture, arrangement, fits, panel_width, set_scale
 from sweep.plots.marks import legend, of_all, with_results
 from sweep.plots.panels import MAX_PANELS, Panel, Panels, title
-from sweep.plots.quantities import COMPARISONS
 from sweep.plots.scales import Limits, Scale
 
 MAX_VALUES = 1000
@@ -42,10 +41,11 @@ _OF_DIFFERENCES = ("failed", "not_run", "impossible", "time_limit")
 
 def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, *, contours: bool = False) -> Picture:
     """A map of each variable over two axes, side by side, and such a row for each value of the other axes."""
-    dataset, names = panels.dataset, panels.names
+    dataset, names = panels.dataset, panels.names + panels.compared
     maps = _maps(panels, names)
     together = len(names) if fits(len(names)) else 1
-    groups = [_columns(maps[0], names[i : i + together]) for i in range(0, len(names), together)]
+    bar = [] if maps[0][names[0]].flags else [""]  # flags are told in the legend
+    groups = [[name, *bar] for name in names] if together == 1 else [[*panels.names, *bar, *panels.compared, *bar]]
     count = len(groups) * len(maps)
     rows, across = arrangement(count, together)
     columns = across * together
@@ -53,7 +53,7 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, 
     small = width < _SMALL
     figure = Picture(width * columns + _AROUND, 1.6 + width * RATIO * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
-    each_scales = [_scales(maps, k, limits, cmap) for k in range(len(maps))]
+    each_scales = [_scales(maps, k, panels.names, limits, cmap) for k in range(len(maps))]
     entries: dict[str, Artist] = {}
     first = None
     widths = across * [1 if name else _BAR for name in groups[0]]
@@ -67,8 +67,8 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, 
                 continue
             axes = figure.add_subplot(at, sharex=first, sharey=first)
             first = first or axes
-            shown, alone = maps[k][name], len(names) == 1
-            entries |= _map(axes, shown, scales[name], alone=alone, labelled=not small, contours=contours)
+            shown, compared = maps[k][name], name in panels.compared
+            entries |= _map(axes, shown, scales[name], labelled=not small, contours=contours, compared=compared)
             axes.set_title(_title(panels, name, panels.each[k], small=small and together > 1))
             _label_axes(axes, dataset, shown, left=i == 0, lowest=place + across >= count)
     figure.explain([*_meanings([panels], [maps], each_scales[0]), *entries.values()])
@@ -80,7 +80,7 @@ def draw_in(axes: Axes, panels: Panels, limits: Limits | None, cmap: str | None,
     name = panels.names[0]
     shown = _maps(panels, [name])[0][name]
     scale = common_scale([shown], limits, cmap)
-    _map(axes, shown, scale, alone=True, labelled=True, contours=contours)
+    _map(axes, shown, scale, labelled=True, contours=contours)
     _label_axes(axes, panels.dataset, shown)
     _bar(make_axes(axes)[0], panels.dataset, name, scale)
 
@@ -114,7 +114,7 @@ def draw_beside(
     for panels, of_one in zip(each, maps, strict=True):
         for panel, shown in zip(panels.each, of_one, strict=True):
             axes = figure.add_subplot(grid[next(places)])
-            entries |= _map(axes, shown[name], scale, alone=True, labelled=width >= _SMALL, contours=contours)
+            entries |= _map(axes, shown[name], scale, labelled=width >= _SMALL, contours=contours)
             words = [_name(panels.dataset), title(panels.dataset, panel)]
             axes.set_title(", ".join(filter(None, words)))
             _label_axes(axes, panels.dataset, shown[name])
@@ -133,26 +133,18 @@ def _maps(panels: Panels, names: list[str]) -> Maps:
     return [{name: describe(panels.dataset.isel(panel), name, right, down) for name in names} for panel in panels.each]
 
 
-def _columns(shown: dict[str, Map], names: list[str]) -> list[str]:
-    """The variables of a group in their order, and "" for each bar: after the last map that shares its scale."""
-    if any(shown[name].flags for name in names):  # told in the legend
-        return names
-    counted = [name for name in names if name not in COMPARISONS]
-    compared = [name for name in names if name in COMPARISONS]
-    return [*counted, *([""] if counted else []), *(each for name in compared for each in (name, ""))]
-
-
-def _scales(maps: Maps, k: int, limits: Limits | None, cmap: str | None) -> dict[str, Scale]:
+def _scales(maps: Maps, k: int, together: list[str], limits: Limits | None, cmap: str | None) -> dict[str, Scale]:
     """The scales of a panel: what is simulated and predicted share theirs, and flags theirs with the other panels."""
     shown = maps[k]
-    together = [name for name in shown if len(shown) == 1 or name not in COMPARISONS]
     panels = maps if shown[together[0]].flags else [shown]
     common = common_scale([panel[name] for panel in panels for name in together], limits, cmap)
     return {name: common if name in together else common_scale([each]) for name, each in shown.items()}
 
 
-def _map(axes: Axes, shown: Map, scale: Scale, *, alone: bool, labelled: bool, contours: bool) -> dict[str, Artist]:
-    """Draw one map, alone or with others of the same cells; returns the entries that its lines need in the legend."""
+def _map(
+    axes: Axes, shown: Map, scale: Scale, *, labelled: bool, contours: bool, compared: bool = False
+) -> dict[str, Artist]:
+    """Draw one map, perhaps of how two others compare; returns the entries that its lines need in the legend."""
     set_scale(axes, "x", shown.x.values)
     set_scale(axes, "y", shown.y.values)
     values = np.ma.masked_where(shown.blank, shown.values)
@@ -162,7 +154,6 @@ def _map(axes: Axes, shown: Map, scale: Scale, *, alone: bool, labelled: bool, c
     )  # fmt: skip
     axes.set(xlim=shown.x.edges[[0, -1]], ylim=shown.y.edges[[0, -1]])
     dark = ~shown.blank & (scale.lightness(values.filled(values.data.flat[0])) < 0.5)
-    compared = shown.name in COMPARISONS and not alone
     hatches.draw(axes, {kind: w for kind, w in shown.marks.items() if not compared or kind in _OF_DIFFERENCES},
                  (shown.y.edges, shown.x.edges), dark)  # fmt: skip
     if contours:
@@ -172,10 +163,10 @@ def _map(axes: Axes, shown: Map, scale: Scale, *, alone: bool, labelled: bool, c
 
 def _title(panels: Panels, name: str, panel: Panel, *, small: bool) -> str:
     """Name what a map shows; a small one beside others leaves the values of its panel to the first of them."""
-    words = labels.words(panels.dataset, name)
-    if len(panels.names) > 1:  # what they have in common stands at the bar
-        words = words.rpartition(", ")[2] if name in COMPARISONS else words.partition(", ")[2] or "simulated"
-        words = (name if name in COMPARISONS else words.partition(" (")[0]) if small else words
+    words, compared = labels.words(panels.dataset, name), name in panels.compared
+    if panels.compared:  # what they have in common stands at the bar
+        words = words.rpartition(", ")[2] if compared else words.partition(", ")[2] or "simulated"
+        words = (name if compared else words.partition(" (")[0]) if small else words
     elif panel:
         words = ""  # it stands at the bar or in the legend
     where = title(panels.dataset, panel) if not small or name == panels.names[0] else ""

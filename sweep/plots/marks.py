@@ -94,8 +94,8 @@ def legend(dataset: xr.Dataset, name: str, *others: xr.Dataset) -> dict[str, str
     for kind in WORDS:
         counts = [int(kinds[kind].sum()) for kinds in found]
         if any(counts):
-            first = next(each for each, count in zip(datasets, counts, strict=True) if count)
-            entries[kind] = f"{meaning(first, name, kind)} ({of_all(counts, [kinds[kind].size for kinds in found])})"
+            there = [each for each, count in zip(datasets, counts, strict=True) if count]
+            entries[kind] = f"{_meaning(there, name, kind)} ({of_all(counts, [kinds[kind].size for kinds in found])})"
     return entries
 
 
@@ -111,13 +111,14 @@ def of_all(counts: list[int], sizes: list[int]) -> str:
     return " and ".join(f"{count} of {size}" for count, size in zip(counts, sizes, strict=True))
 
 
-def meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
-    """Say what a kind of cell means for a variable, in words."""
+def _meaning(datasets: list[xr.Dataset], name: str, kind: str) -> str:
+    """Say what a kind of cell, which all these datasets have, means for a variable, in words."""
     if kind == "failed":
-        codes, counts = np.unique(dataset["status"], return_counts=True)
+        each = [dataset["status"].values.ravel() for dataset in datasets]
+        codes, counts = np.unique(np.concatenate(each), return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]
         return f"failed: {', '.join(ends)}"
-    if kind == "inferred" and field(dataset, name).dtype.kind == "f":
+    if kind == "inferred" and field(datasets[0], name).dtype.kind == "f":
         return "not simulated: only counts are inferred"
     return _PER_VARIABLE.get((name, kind), WORDS[kind])
 

@@ -43,7 +43,9 @@ class Panels:
     whole: xr.Dataset
     """Of all cells."""
     names: list[str]
-    """Variables, among them perhaps `difference`."""
+    """The variable, and beside it its prediction if there is one: what shares a scale."""
+    compared: list[str]
+    """How these two compare, for maps alone: `difference` or `ratio`."""
     across: list[str]
     """Dimensions drawn as axes, the vertical one first: up to two."""
     each: list[Panel]
@@ -70,7 +72,7 @@ def choose(
         if there is no such variable or axis, or there would be too many panels.
     """
     dataset = dataset.isel(_nearest(dataset, sel or {}))
-    names = _variables(dataset, variable)
+    names, compared = _variables(dataset, variable)
     dims = [str(d) for d in field(dataset, names[0]).dims]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in dims:
@@ -80,7 +82,7 @@ def choose(
     across = _across(dataset, dims, x, y)
     rest = [d for d in dims if d not in across]
     if names == ["probability"] and len(across) < 2:
-        rest.remove("count")  # all counts are drawn together
+        rest = [d for d in rest if d != "count"]  # all counts are drawn together
     elif names == ["probability"] and "count" in rest:
         dataset = dataset.isel(count=_telling(dataset))
     if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
@@ -89,9 +91,9 @@ def choose(
     whole = dataset
     if most and len(across) == 2:
         dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // most)) for d in across})
-    dataset = dataset.assign({name: field(dataset, name) for name in names})
+    dataset = dataset.assign({name: field(dataset, name) for name in names + compared})
     dataset = dataset.sortby([d for d in across if d in dataset.coords])
-    return Panels(dataset, whole, names, across, indices(dataset, rest))
+    return Panels(dataset, whole, names, compared, across, indices(dataset, rest))
 
 
 def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:
@@ -129,14 +131,14 @@ def in_lines(constants: str, width: float) -> str:
     return fill(breakable, min(_HEADING, int(_LETTERS * width)), break_on_hyphens=False).replace(space, " ")
 
 
-def _variables(dataset: xr.Dataset, variable: str | None) -> list[str]:
+def _variables(dataset: xr.Dataset, variable: str | None) -> tuple[list[str], list[str]]:
     """The variables to draw: by default what the dataset is about; a prediction beside it, and how the two compare."""
     chosen = variable or subject(dataset)
     field(dataset, chosen)  # raises if there is none
     predicted, comparison = PREDICTIONS.get(chosen, ("", ""))
     named = variable or next(iter(pictured(dataset)), "")
     alone = predicted not in dataset or named == "reversals"
-    return [chosen] if alone else [chosen, predicted, comparison]
+    return ([chosen], []) if alone else ([chosen, predicted], [comparison])
 
 
 def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:

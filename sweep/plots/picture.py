@@ -128,7 +128,7 @@ def plot(
         figure = cast(Figure, ax.get_figure(root=True))
     else:
         across = inches(width) if width is not None else None
-        with mpl.rc_context(style(across) | ({"figure.figsize": figsize} if figsize else {})):
+        with mpl.rc_context(style(figsize[0] if figsize else across, printed=across is not None)):
             figure = _drawn(opened, variable, axes, how, histogram=histogram)
             if across:
                 figure.letter()
@@ -183,7 +183,7 @@ def _draw_in(
     if {kind(each) for each in datasets} != {RUN} or len(datasets) > 1:
         raise ValueError("ax: only a map or a curve of one run is drawn into given axes")
     chosen = panels.choose(datasets[0], variable, **axes, most=None if histogram else maps.MAX_VALUES)
-    if len(chosen.each) > 1 or "probability" in chosen.names:
+    if len(chosen.each) > 1 or (chosen.names == ["probability"] and "count" in chosen.dataset.dims):
         raise ValueError(f"ax: {chosen.names[0]} needs more than one panel; select a value of each other axis")
     if len(chosen.across) == 2 and not histogram:
         maps.draw_in(ax, chosen, **how)

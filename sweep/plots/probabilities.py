@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
+from sweep.plots import labels
 from sweep.plots.figure import Frames, set_scale
 from sweep.plots.panels import Panels, title
 from sweep.results.probabilities import interval, sound
@@ -21,33 +22,34 @@ _COLOURS = 0.85
 
 
 def draw(panels: Panels, frames: Frames) -> list[Artist]:
-    """Draw the probabilities over the one long axis, or those of each panel; returns entries for a legend."""
+    """Draw the probabilities over the one long axis, or over counts; returns entries for a legend."""
     for axes, chosen in frames:
-        if panels.across:
-            _curves(axes, chosen, panels.across[0])
+        if panels.across in ([], ["count"]):
+            _bars(axes, chosen, lowest=len(frames) == 1 or bool(axes.get_xlabel()))
         else:
-            _bars(axes, chosen)
+            _curves(axes, chosen, panels.across[0])
         axes.set_ylim(0, 1.02)
         axes.grid(alpha=0.3)
     return frames[0][0].get_legend_handles_labels()[0]
 
 
 def _curves(axes: Axes, chosen: xr.Dataset, x: str) -> None:
-    """Draw the probability of each count or more, with its interval as a band."""
-    counts = chosen["count"].values
-    colours = mpl.colormaps["viridis"](_COLOURS * np.arange(len(counts)) / max(len(counts) - 1, 3))
+    """Draw the probability of each count or more, or of a chosen one, with its interval as a band."""
+    each = chosen if "count" in chosen.dims else chosen.expand_dims("count")
+    counts = each.sizes["count"]
+    colours = mpl.colormaps["viridis"](_COLOURS * np.arange(counts) / max(counts - 1, 3))
     at = chosen[x].values
     set_scale(axes, "x", at)
-    for count, colour in zip(counts, colours, strict=True):
-        one = chosen.sel(count=count)
-        axes.plot(at, one["probability"], color=colour, linewidth=1.2, label=title(chosen, {"count": count - 1}))
+    for i, colour in enumerate(colours):
+        one = each.isel(count=i)
+        axes.plot(at, one["probability"], color=colour, linewidth=1.2, label=title(each, {"count": i}))
         axes.fill_between(at, one["probability_low"], one["probability_high"], color=colour, alpha=0.25, linewidth=0)
     axes.set_ylabel("probability, with its interval of 95 %")
 
 
-def _bars(axes: Axes, chosen: xr.Dataset) -> None:
-    """Draw the probability of each count, with its interval."""
-    at_least = np.concatenate([[1.0], chosen["probability"].values, [0.0]])
+def _bars(axes: Axes, chosen: xr.Dataset, *, lowest: bool) -> None:
+    """Draw the probability of each count, or of a chosen one or more and of fewer, with its interval."""
+    at_least = np.concatenate([[1.0], np.atleast_1d(chosen["probability"]), [0.0]])
     share: Array = np.array([more - still for more, still in pairwise(at_least)])
     low, high = interval(share, np.asarray(sound(chosen).sum()))
     axes.bar(np.arange(len(share)), share, color="C0", label="share of the samples", zorder=2)
@@ -55,6 +57,9 @@ def _bars(axes: Axes, chosen: xr.Dataset) -> None:
         np.arange(len(share)), share, yerr=[share - low, high - share],
         fmt="none", ecolor="black", elinewidth=1, capsize=3, label="interval of 95 %", zorder=3,
     )  # fmt: skip
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("spin reversals")
+    if "count" in chosen.dims:
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.set_xlabel("spin reversals" if lowest else "")
+    else:
+        axes.set_xticks([0, 1], labels=["fewer", labels.measured(chosen, "count", float(chosen["count"]))])
     axes.set_ylabel("probability")

@@ -44,8 +44,6 @@ PREDICTIONS = {
 }
 """What is drawn beside a simulated variable: the predicted one, and how the two compare."""
 
-COMPARISONS = tuple(comparison for _, comparison in PREDICTIONS.values())
-
 DERIVED = {
     "difference": Derived(("reversals", "reversals_predicted"), _difference),
     "ratio": Derived(("t_first_reversal", "t_first_reversal_predicted"), _ratio),

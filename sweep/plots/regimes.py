@@ -10,14 +10,8 @@ import xarray as xr
 
 from sweep.kernels.status import SETTLED
 
-SETTLES, FEW, REGULAR, WANDERS, UNDECIDED = range(5)
-REGIMES = {
-    SETTLES: "settles",
-    FEW: "few_reversals",
-    REGULAR: "reverses_regularly",
-    WANDERS: "wanders",
-    UNDECIDED: "undecided",
-}
+REGIMES = ("settles", "few_reversals", "reverses_regularly", "wanders", "undecided")
+"""The names of the regimes, whose codes are their places.  A cell is of the first whose condition it meets."""
 
 FEWEST = 4
 """Reversals below which nothing is said about their regularity: two cycles."""
@@ -42,7 +36,8 @@ def regimes(dataset: xr.Dataset) -> xr.DataArray:
     """
     status, reversals, variation, exponent, error = (dataset[name] for name in NEEDS)
     conditions = [status == SETTLED, reversals < FEWEST, variation < SAME, exponent > SURE * error]
-    kinds = [SETTLES, FEW, REGULAR, WANDERS]
-    found = np.select([condition.values for condition in conditions], kinds, UNDECIDED).astype("int8")
-    words = {"flag_values": np.array(list(REGIMES), "int8"), "flag_meanings": " ".join(REGIMES.values())}
+    codes = np.arange(len(REGIMES), dtype="int8")
+    *kinds, undecided = codes
+    found = np.select([condition.values for condition in conditions], kinds, undecided)
+    words = {"flag_values": codes, "flag_meanings": " ".join(REGIMES)}
     return xr.DataArray(found, status.coords, status.dims, "regime", {"long_name": "regime of motion", **words})

@@ -92,7 +92,15 @@ def continuous(values: Array, limits: Limits | None = None, name: str | None = N
 
 
 def ratios(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
-    """A diverging scale of positive numbers, logarithmic and the same on both sides of one."""
+    """A diverging scale of positive numbers, logarithmic and the same on both sides of one.
+
+    Raises
+    ------
+    ValueError
+        if a limit is not positive.
+    """
+    if limits and not limits[0] > 0:
+        raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; give numbers above zero for a ratio")
     finite = values[np.isfinite(values) & (values > 0)]
     most = float(np.abs(np.log(finite)).max(initial=0.01))
     top = max(np.abs(np.log(limits))) if limits else min(most, log(_MAX_RATIO))

@@ -67,8 +67,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     ValueError
         if there is no such series.
     """
-    over_time = set(dataset["time"].dims) - {"trajectory"}
-    series = [str(name) for name, v in dataset.data_vars.items() if over_time & set(v.dims)]
+    series = [str(name) for name, v in dataset.data_vars.items() if "time" in v.dims]
     if variable is not None and variable not in series:
         raise ValueError(f"there is no series {variable}; choose {', '.join(series)}")
     alone = variable is not None or SAMPLE in dataset.coords
@@ -153,10 +152,9 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
 
 def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
     """Draw a series of sampled trajectories; returns the entries for the legend."""
-    samples, time = int(dataset[SAMPLE].max()) + 1, dataset["time"]
+    time = dataset["time"]
     entries: list[Artist] = []
-    for i in range(dataset.sizes["trajectory"] // samples):
-        one = dataset.isel(trajectory=slice(i * samples, (i + 1) * samples))
+    for i, one in enumerate(_cells(dataset)):
         tails = [(1 - share) / 2 for share in _BANDS]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # no sample goes on so long
@@ -167,6 +165,14 @@ def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
         entries.append(Line2D([], [], color=f"C{i}", label=_of_samples(dataset, one)))
     held = [Patch(color="0.4", alpha=opacity, label=f"{share:.0%} of them") for share, opacity in _BANDS.items()]
     return entries + held
+
+
+def _cells(dataset: xr.Dataset) -> list[xr.Dataset]:
+    """The samples of each cell, of which some may be left out: as their numbers rise, so do those of trajectories."""
+    numbers, samples = dataset["trajectory"].values, dataset[SAMPLE].values
+    goes_on = (np.diff(samples) > 0) & (np.diff(samples) == np.diff(numbers))
+    places = np.split(np.arange(len(numbers)), np.flatnonzero(~goes_on) + 1)
+    return [dataset.isel(trajectory=each) for each in places]
 
 
 def _of_samples(dataset: xr.Dataset, one: xr.Dataset) -> str:
@@ -227,8 +233,7 @@ def reversal_times(one: xr.Dataset) -> Array:
     """
     if "ripple_free_spin" not in one:
         return np.array([])
-    good = np.isfinite(one["time"].values)
-    time, spin = one["time"].values[good], one["ripple_free_spin"].values[good]
+    time, spin = one["time"].values, one["ripple_free_spin"].values
     if is_of_own_body(one):  # whose period nobody knows
         at = np.flatnonzero(spin[1:] * spin[:-1] < 0)
         return np.asarray(time[at] + (time[at + 1] - time[at]) * spin[at] / (spin[at] - spin[at + 1]))

@@ -8,17 +8,11 @@ import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import xarray as xr
 
 from sweep.results import netcdf
 from sweep.results.identity import Identity
 from sweep.results.store import StoreError
 from sweep.results.writing import remove_unfinished, replacing
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class RunFiles:
@@ -87,17 +81,6 @@ class RunFiles:
                 os.link(self.dataset, temporary)
             except OSError:  # a file system without links
                 shutil.copyfile(self.dataset, temporary)
-
-    def save_result(self, dataset: xr.Dataset, figure: Figure) -> None:
-        """Write a dataset that needed no checkpoint, and its picture."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        netcdf.write(self.dataset, dataset)
-        self.save_picture(figure)
-
-    def save_picture(self, figure: Figure, path: Path | None = None) -> None:
-        """Write a picture, by default the first one."""
-        with replacing(path or self.picture) as temporary:
-            figure.savefig(temporary, format="png")
 
     def discard(self) -> None:
         """Remove all that an earlier run left."""

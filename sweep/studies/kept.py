@@ -67,5 +67,5 @@ def kept(
         if not files.picture.exists():
             from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
 
-            files.save_picture(picture.plot(result))
+            picture.plot(result, output=files.picture)
     return result

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 from support import Write
@@ -247,13 +248,19 @@ def test_a_trajectory_begins_at_the_medians(write: Write) -> None:
 
 
 def test_bars_curves_and_maps_of_probabilities(write: Write) -> None:
-    curves = sweep.plot(sweep.run(write(SCENE), t_end=1000)).axes[0]
+    two = sweep.run(write(SCENE), t_end=1000)
+    curves = sweep.plot(two).axes[0]
     assert [line.get_label() for line in curves.lines][:2] == ["1 reversal or more", "2 reversals or more"]
     one = sweep.run(write(SCENE), t_end=1000, b=3)
     bars = sweep.plot(one).axes[0]
     heights = [bar.get_height() for bar in bars.patches]
     expected = np.bincount(one["reversals"].values) / 32
     np.testing.assert_allclose(heights, expected, atol=1e-12)
+    panels = sweep.plot(two, x="count").axes
+    assert [axes.get_xlabel() for axes in panels] == ["", "spin reversals"]
+    for axes, here in zip(panels, two["reversals"].values, strict=True):
+        expected = np.bincount(here, minlength=two.sizes["count"] + 1) / 32
+        np.testing.assert_allclose([bar.get_height() for bar in axes.patches], expected, atol=1e-12)
     several = sweep.run(write(SCENE), t_end=300, b=np.linspace(2, 6, 5), mu=np.linspace(40, 200, 5), samples=4)
     assert maps(sweep.plot(several)) == min(several.sizes["count"], 3)
     assert maps(sweep.plot(several, sel={"count": 1})) == 1
@@ -262,6 +269,23 @@ def test_bars_curves_and_maps_of_probabilities(write: Write) -> None:
     np.testing.assert_array_equal(shown.values, several["probability"].transpose("mu", "b", "count")[..., 0])
     setup = Setup(source)
     assert setup.config.parameters["n0"].numbers == (0.05,)
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["in given axes", "in a figure"])
+def test_the_probability_of_a_chosen_count(write: Write, given: bool) -> None:
+    two = sweep.run(write(SCENE), t_end=1000)
+    shares = (two["reversals"] >= 2).mean("sample").values
+
+    def drawn_of(dataset: xr.Dataset) -> Axes:
+        ax = Figure().subplots() if given else None
+        return sweep.plot(dataset, "probability", sel={"count": 2}, ax=ax).axes[0]
+
+    (curve,) = drawn_of(two).lines
+    np.testing.assert_array_equal(curve.get_ydata(), shares)
+    assert curve.get_label() == "2 reversals or more"
+    bars = drawn_of(two.isel(b=1))
+    np.testing.assert_allclose([bar.get_height() for bar in bars.patches], [1 - shares[1], shares[1]], atol=1e-12)
+    assert [text.get_text() for text in bars.get_xticklabels()] == ["fewer", "2 reversals or more"]
 
 
 def maps(figure: Figure) -> int:

@@ -40,6 +40,14 @@ def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
     assert colours.beyond(part, colours.scale_of(part, state.first(source))) == ""
 
 
+@pytest.mark.parametrize("low", [0.0, -1.0])
+def test_a_ratio_keeps_its_scale_where_a_limit_is_not_positive(opened: xr.Dataset, low: float) -> None:
+    source = Source(opened.assign(t_first_reversal=opened["b"], t_first_reversal_predicted=2 * opened["mu"]))
+    part, first = source.map("ratio", "mu", "b", {"n0": 1}), state.first(source)
+    scales = [colours.scale_of(part, each) for each in (first, first.limited("low", low))]
+    assert colours.mapping(scales[0]) == colours.mapping(scales[1])
+
+
 def test_descending_axes_are_turned(opened: xr.Dataset) -> None:
     turned = Source(opened.isel(mu=slice(None, None, -1)))
     straight = Source(opened)

@@ -97,6 +97,9 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path, monkeypatch: pytest.Mon
         animation.animate(turning(7))
     with pytest.raises(ValueError, match="nothing lies between"):
         animation.animate(turning(), begin=11)
+    for speed in (0, -5, np.nan):
+        with pytest.raises(ValueError, match=f"speed: {speed:g}; give a number above zero"):
+            animation.animate(turning(), speed=speed)
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
     with pytest.raises(ValueError, match="ffmpeg, which is not installed"):
         animation.animate(turning(), tmp_path / "clip.mp4")

@@ -56,6 +56,17 @@ def test_real_numbers_have_bins_and_a_scale_like_their_map() -> None:
         assert 2 < len(shares(axes)[0]) <= 60
 
 
+@pytest.mark.parametrize("value", [5.0, -5.0, 0.0, 1e-9])
+def test_one_real_number_has_a_bar_that_can_be_seen(value: float) -> None:
+    dataset = made()
+    dataset["spin_final"][:] = value
+    (axes,) = picture.plot(dataset, "spin_final", histogram=True).axes
+    ((middle, share),) = shares(axes)[0].items()
+    assert (middle, share) == (pytest.approx(value), 1)
+    bar, *_ = (each for each in axes.patches if isinstance(each, StepPatch))
+    assert np.ptp(bar.get_data().edges) > 0.1 * np.ptp(axes.get_xlim())
+
+
 def test_a_status_is_told_in_words() -> None:
     (axes,) = picture.plot(made(), "status", histogram=True).axes
     assert "settled" in {text.get_text() for text in axes.get_xticklabels()}

@@ -266,13 +266,15 @@ def test_axes_in_any_order_of_values() -> None:
         ({"x": "b", "y": "b"}, "x and y are both b"),
         ({"cmap": "q"}, "no colour map q; choose"),
         ({"limits": (2, 1)}, r"limits: 2..1; give"),
+        ({"limits": (0, 2), "variable": "ratio"}, r"limits: 0..2; give numbers above zero for a ratio"),
         ({"variable": "q"}, "no variable q; choose reversals"),
         ({"output": "x.jpg"}, "x.jpg: unknown format; write a png, pdf, svg or eps"),
     ],
 )
 def test_wrong_choices_are_refused(wrong: dict[str, Any], said: str) -> None:
+    whole = 1.0 * made().reversals
     with pytest.raises(ValueError, match=said):
-        picture.plot(made(), **wrong)
+        picture.plot(made().assign(t_first_reversal=whole, t_first_reversal_predicted=2 * whole), **wrong)
 
 
 def test_curves_tell_lower_bounds_and_crossings() -> None:

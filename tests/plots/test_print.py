@@ -108,6 +108,7 @@ def test_the_command_draws_for_print_without_a_title(small: xr.Dataset, tmp_path
     target = tmp_path / "small.svg"
     result = invoke("plot", tmp_path / "small.nc", "--width", "3.5 in", "--no-title", "--output", target)
     assert result.exit_code == 0, result.output
+    refused(invoke("plot", tmp_path / "small.nc", "--no-title", "--output", "x.html"), "--no-title: not for a page")
     assert 'width="252pt"' in target.read_text(encoding="utf-8")
     title = str(open_dataset(tmp_path / "small.nc").attrs["title"])
     assert title in {text.get_text() for text in texts(picture.plot(small))}
@@ -128,6 +129,8 @@ def test_settings_of_the_user_are_obeyed() -> None:
 
 def test_a_figure_has_the_size_that_is_asked_for(small: xr.Dataset) -> None:
     np.testing.assert_allclose(picture.plot(small, figsize=(6, 9)).get_size_inches(), (6, 9))
+    usual, other = (picture.plot(made(), figsize=(6.4, height)) for height in (4.8, 5))  # matplotlib's own is 6.4 × 4.8
+    assert [axes.get_title() for axes in usual.axes] == [axes.get_title() for axes in other.axes]
 
 
 @pytest.mark.parametrize(

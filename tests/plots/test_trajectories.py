@@ -101,6 +101,28 @@ def test_one_series_is_drawn_alone() -> None:
         picture.plot(made([60]), "reversals")
 
 
+@pytest.mark.parametrize(
+    ("part", "cells"),
+    [
+        (slice(None), {"μ = 60": slice(0, 4), "μ = 100": slice(4, 8)}),
+        (slice(2, 4), {"": slice(2, 4)}),
+        (slice(2, 6), {"μ = 60": slice(2, 4), "μ = 100": slice(4, 6)}),
+        ([0, 3, 5, 6], {"μ = 60": [0, 3], "μ = 100": [5, 6]}),
+        ([1, 5], {"μ = 60": [1], "μ = 100": [5]}),
+    ],
+    ids=str,
+)
+def test_bands_are_of_the_samples_that_are_there(part: Any, cells: dict[str, Any]) -> None:
+    whole = made([60] * 4 + [100] * 4, n0=np.tile([0.01, 0.02, 0.04, 0.08], 2))
+    whole = whole.assign_coords(trajectory=np.arange(8), sample=("trajectory", np.tile(np.arange(4), 2)))
+    whole["spin"] = whole["spin"] * xr.DataArray(np.random.default_rng(1).random(8), dims="trajectory")
+    figure = picture.plot(whole.isel(trajectory=part))
+    curves = [line for line in figure.axes[0].lines if line.get_gid() == "spin"]
+    assert [text.partition("median")[0].rstrip(", ") for text in entries(figure)[: len(cells)]] == list(cells)
+    for curve, here in zip(curves, cells.values(), strict=True):
+        np.testing.assert_allclose(curve.get_ydata(), np.median(whole["spin"][here], axis=0), atol=1e-15)
+
+
 def test_a_page_of_all_series_fits_a_screen() -> None:
     assert picture.plot(made([60])).get_size_inches()[1] * 110 < 1200
 
