@@ -58,11 +58,6 @@ def approach(model: Model, states: Array, constants: Any, stretch: Array) -> tup
     return status, time
 
 
-def compile_approach(model: Model) -> None:
-    """Compile `approach` for a model, or load it from disk."""
-    compiled_approach(model)(np.empty((0, 0)), *3 * [np.empty(0)])
-
-
 @cache
 def compiled_approach(model: Model) -> Cached:
     """Compiled (rows, stretch, status, time) -> None: `approach` for the cells of `rows`, states and constants."""
@@ -77,7 +72,7 @@ def compiled_approach(model: Model) -> Cached:
         for i in prange(len(rows)):
             status[i], time[i] = follow(load(rows, i), load_constants(rows, i), stretch[i])
 
-    return parallel(run, f"approach-{model.key}", *model.files)
+    return parallel(run, "(f8[:, ::1], f8[::1], f8[::1], f8[::1])", f"approach-{model.key}", *model.files)
 
 
 def _make_follow(model: Model) -> Any:

@@ -119,7 +119,8 @@ class Kernel:
         advance = make_advance(run_block, look, compare, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
-        self.advancing = parallel(advance, name, *self.model.files)
+        types = "(f8[:, ::1], i8[::1], i8, b1, i8, f8[:, ::1])"
+        self.advancing = parallel(advance, types, name, *self.model.files)
 
     def table(self, images: Array) -> Table:
         """`images`, accessed by the names of their quantities."""
@@ -196,15 +197,6 @@ class Kernel:
     def _reached(self, table: Table, t_end: float | Array) -> Array:
         """Times of the states, shape (cells,)."""
         return np.asarray(table["done"] * t_end / table["goal"])
-
-    def is_compiled(self) -> bool:
-        """Tell whether the first call of `advance` will find machine code, in memory or on disk."""
-        return self.advancing.is_compiled()
-
-    def compile(self) -> None:
-        """Compile `advance`, or load it from disk, so that no timing of a run includes that."""
-        if not self.advancing.is_ready():  # a parallel call wakes all threads, which takes some milliseconds
-            self.advance(np.empty((0, len(self.layout.names))), np.empty(0, dtype=np.int64), 0, False)
 
     def filling(self) -> tuple[Cached, ...]:
         """The compiled functions that `images` calls."""

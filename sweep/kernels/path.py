@@ -46,11 +46,6 @@ def stretches(model: Model, states: Array, constants: Any, interval: Array, step
     return found
 
 
-def compile_path(model: Model) -> None:
-    """Compile `stretches` for a model, or load it from disk."""
-    compiled_path(model)(np.empty((0, 0)), np.empty(0, np.int64))
-
-
 @cache
 def compiled_path(model: Model) -> Cached:
     """Compiled (lanes, steps) -> None: `stretches` for groups of lanes, in place."""
@@ -82,4 +77,4 @@ def compiled_path(model: Model) -> Cached:
         for g in prange(len(groups)):
             follow(groups[g], steps[g])
 
-    return parallel(run, f"path-{model.key}", *model.files)
+    return parallel(run, "(f8[:, ::1], i8[::1])", f"path-{model.key}", *model.files)

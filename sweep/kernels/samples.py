@@ -105,4 +105,5 @@ def _compiled(model: Model, seen: Any) -> Cached:
         for g in prange(len(groups)):
             follow(groups[g], h[g], steps[g], spins[g])
 
-    return parallel(run, f"samples-{seen.__name__}-{model.key}", *model.files)
+    types = "(f8[:, ::1], f8[::1], i8[::1], f8[:, :, ::1])"
+    return parallel(run, types, f"samples-{seen.__name__}-{model.key}", *model.files)

@@ -258,4 +258,4 @@ def compiled_start_up(form: StiffForm) -> Cached:
                 for i in range(size):
                     points[j * size + i] = points[(steps[level] - HISTORY + 1 + 2 * j) * size + i]
 
-    return serial(run, f"start-up-{form.full.name}")
+    return serial(run, "(f8[::1], f8[::1], i8[::1])", f"start-up-{form.full.name}")
