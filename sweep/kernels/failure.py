@@ -81,8 +81,7 @@ def _make_follow(model: Model) -> Any:
     # Not inlined: it would be compiled three times over.
     step = compiled(make_step(DOPRI5, model.rhs, n))
     terms = [f"abs(one[{i}] - two[{i}]) / max(abs(two[{i}]), {_SMALL!r})" for i in range(n)]
-    source = f"def difference(one, two):\n    return max({', '.join(terms)})"
-    difference = compile_inline("difference", source, {})
+    difference = compile_inline("difference", "one, two", [f"return max({', '.join(terms)})"], {})
     # The difference of one step from two of half the length exceeds the error of the latter by this factor.
     allowed = _TOLERANCE * (2**DOPRI5.order - 1)
 

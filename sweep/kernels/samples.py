@@ -88,7 +88,7 @@ def _compiled(model: Model, seen: Any) -> Cached:
     load_states, load_axis = make_load(model.states, layout), make_load(axis, layout)
     load_constants = make_load(constants, layout, model.constants)
     store, step, wide, lanes = make_store(model.states, layout), make_step(DOPRI5, model.rhs, n), full_width(), LANES
-    lost = compile_inline("lost", f"def lost():\n    return {tuple_of(['np.nan'] * n)}", {"np": np})
+    lost = compile_inline("lost", "", [f"return {tuple_of(['np.nan'] * n)}"], {"np": np})
 
     @exactly_compiled
     def follow(group: Any, h: float, steps: int, spins: Any) -> None:

@@ -158,18 +158,17 @@ class AdamsKernel(Kernel):
         known = names(self.form) | {"watch": self._make_watch(), "full_width": full_width(), "np": np}
         first, size = self.layout.at(_HISTORY[0]), len(POINT) * LANES
         lines = [
-            "def run_block(group):",
-            "    full_width()",
-            f"    history = np.empty({(HISTORY + BLOCK) * size})",
-            f"    for i in range({HISTORY * size}):",
-            f"        history[i] = group[{first} + i]",
-            f"    for oldest in range(0, {BLOCK * size}, {size}):",
-            f"        for lane in range({LANES}):",
-            *(f"            {line}" for line in self._step_lines()),
-            f"    for i in range({HISTORY * size}):",
-            f"        group[{first} + i] = history[{BLOCK * size} + i]",
+            "full_width()",
+            f"history = np.empty({(HISTORY + BLOCK) * size})",
+            f"for i in range({HISTORY * size}):",
+            f"    history[i] = group[{first} + i]",
+            f"for oldest in range(0, {BLOCK * size}, {size}):",
+            f"    for lane in range({LANES}):",
+            *(f"        {line}" for line in self._step_lines()),
+            f"for i in range({HISTORY * size}):",
+            f"    group[{first} + i] = history[{BLOCK * size} + i]",
         ]
-        return compiled(compile_inline("run_block", "\n".join(lines), known))
+        return compiled(compile_inline("run_block", "group", lines, known))
 
     def _step_lines(self) -> list[str]:
         """The source of one step, from eight points of the history, of which the first is at `oldest`, to the ninth.
