@@ -22,11 +22,9 @@ from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
-_FAILED_AT = "failed_at"
-"""The time of a failure, which the engine finds out (`sweep.engine.repeats`); 0 if there is none."""
-
-_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", _FAILED_AT, *STABLE)
-
+_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", "failed_at", *STABLE)
+"""Quantities of every image.  `failed_at` is the time of a failure, which the engine finds out
+(`sweep.engine.repeats`); 0 if there is none."""
 
 STRETCH = 100.0
 """The length of a step divides this evenly if t_end is a multiple of it, in sqrt(c/g).  So it does not depend on t_end:
@@ -156,7 +154,7 @@ class Kernel:
         if self.ripple:
             table.set_columns(self.ripple, stack(self.model.ripple.of(columns)).T)
         for each in self.measurements:
-            for name, values in each.start(self.model, columns, step, rattle).items():
+            for name, values in each.start(self.model, columns, rattle).items():
                 table[name] = values
         return images
 

@@ -145,8 +145,7 @@ class AdamsKernel(Kernel):
 
     def carry(self, images: Array) -> None:
         """As `Kernel.carry`."""
-        if self.form.resolves_modes:
-            stretches.carry(self, images, self.tolerance)
+        stretches.carry(self, images, self.tolerance)
 
     def _make_run_block(self) -> Any:
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes.

@@ -50,7 +50,7 @@ class Lyapunov(Measurement):
         "lyapunov_error": measured("float64", "standard error of the largest Lyapunov exponent, in 1/sqrt(c/g)"),
     }  # fmt: skip
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"bin_width": 1.0}
 
     def make_look(self, layout: Layout) -> Any:

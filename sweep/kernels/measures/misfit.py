@@ -91,7 +91,7 @@ class Misfit(Measurement):
     def shared(self) -> Array:
         return self.film.rows if self.film else super().shared
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"film_end": self.film.time[-1] if self.film else 0.0}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
