@@ -10,7 +10,6 @@ handled a cell.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -55,27 +54,23 @@ class Kernel:
     model: Model
     layout: Layout
     measurements: tuple[Measurement, ...]
+    measure: tuple[str, ...]
+    """The specs of the measurements."""
+    shared: Array
+    """What the measurements compare with."""
     advancing: Cached
     """The compiled function behind `advance`."""
 
     def _lay_out(self, model: Model, measurements: Sequence[Measurement], more: Iterable[str] = ()) -> None:
         """Name the quantities of an image: states, constants, what every kernel needs, measurements, and `more`."""
         self.model, self.measurements = model, tuple(measurements)
+        self.measure = tuple(each.spec for each in measurements)
+        self.shared = next((each.shared for each in measurements if each.shared.size), np.empty((0, 0)))
         self.constants = tuple(f"constant.{name}" for name in model.constants._fields)
         measured = (name for each in self.measurements for name in each.quantities)
         self._ripple = model.ripple if self.follows_ripple else NO_RIPPLE
         self.ripple = tuple(f"ripple.{name}" for name in self._ripple.names)
         self.layout = Layout((*model.states, *self.constants, *_BASE, *self.ripple, *measured, *more))
-
-    @property
-    def measure(self) -> tuple[str, ...]:
-        """The specs of the measurements."""
-        return tuple(each.spec for each in self.measurements)
-
-    @cached_property
-    def shared(self) -> Array:
-        """What the measurements compare with."""
-        return next((each.shared for each in self.measurements if each.shared.size), np.empty((0, 0)))
 
     @property
     def follows_work(self) -> bool:
