@@ -91,7 +91,9 @@ def make_extended(model: Model) -> Any:
     slopes, _ = model.rhs(states, constants)
     parts = [(each.value, each.slope) if isinstance(each, Traced) else (repr(float(each)), _ZERO) for each in slopes]
     result = tuple_of(part[i] for i in (0, 1) for part in parts)
-    return compile_inline("extended", "z, p", [*lines, f"return {result}, (0.0, 0.0, 1.0, 1.0)"], {"np": np})
+    lines.append(f"return {result}, (0.0, 0.0, 1.0, 1.0)")
+    # The source of a constant may be one of the latter two.
+    return compile_inline("extended", "z, p", lines, {"np": np, "inf": np.inf, "nan": np.nan})
 
 
 def undifferentiable(model: Model) -> str:
