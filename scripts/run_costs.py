@@ -85,7 +85,7 @@ def main(files: list[str]) -> None:
     for name, values in times.items():
         print(f"{np.median(values / base):6.2f} {np.median(values):6.1f} ns a step  {name}", flush=True)
     for piece in ("kernel dopri5 slip reversals", "kernel adams slip reversals", "images adams slip",
-                  "approach dopri5 slip", "theory dopri5 slip"):  # fmt: skip
+                  "approach dopri5 slip", "endings dopri5 slip"):  # fmt: skip
         print(f"{compile_seconds(*piece.split()):6.1f} s  {piece}", flush=True)
 
 

@@ -103,20 +103,21 @@ def exactly_compiled(function: Callable[..., Any]) -> Any:
     return load_numba().njit(function, error_model=OPTIONS["error_model"])
 
 
-def parallel(function: Callable[..., Any], specialisation: str, *modules: str) -> Cached:
+def parallel(function: Callable[..., Any], types: str, specialisation: str, *modules: str) -> Cached:
     """`function`, with prange, from the cache on disk, or compiled when it is first called.
 
     Parameters
     ----------
+    types : of its arguments, as Numba writes a signature
     specialisation : tells apart what is made from the same function; one of them has one signature only
     modules : files of models from outside the package
     """
-    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), specialisation, *modules)
+    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), types, specialisation, *modules)
 
 
-def serial(function: Callable[..., Any], specialisation: str) -> Cached:
+def serial(function: Callable[..., Any], types: str, specialisation: str) -> Cached:
     """As `parallel`, but on the thread that calls it, while other threads go on."""
-    return Cached(load_numba().njit(function, nogil=True, **OPTIONS), specialisation)
+    return Cached(load_numba().njit(function, nogil=True, **OPTIONS), types, specialisation)
 
 
 @cache
@@ -227,8 +228,8 @@ class Cached:
     specialisation and of the hash of all numeric sources and of the libraries that compile them.
     """
 
-    def __init__(self, dispatcher: Any, specialisation: str, *modules: str) -> None:
-        self._dispatcher, self._cache, self._found = dispatcher, None, False
+    def __init__(self, dispatcher: Any, types: str, specialisation: str, *modules: str) -> None:
+        self._dispatcher, self._types, self._cache, self._found = dispatcher, types, None, False
         if INTERPRETED:  # Numba has returned the function as it was
             return
         with suppress(RuntimeError):  # Numba finds no folder to write to: each process compiles for itself
@@ -237,17 +238,18 @@ class Cached:
 
     def __call__(self, *arguments: Any) -> None:
         if not self.is_ready():
-            self._load(arguments)
+            self.compile()
         # Compiled code does not warn of a division by zero.
         with np.errstate(all="ignore") if INTERPRETED else nullcontext():
             self._dispatcher(*arguments)
 
-    def _load(self, arguments: tuple[Any, ...]) -> None:
+    def compile(self) -> None:
+        """Compile it, or load it from disk, so that no timing of a run includes that."""
         # Numba compiles on one thread at a time, but while it loads from disk another thread finds it half ready.
         with _LOADING:
             if not self.is_ready():
                 with nullcontext() if self.is_compiled() else compiling():
-                    self._dispatcher.compile(tuple(map(load_numba().typeof, arguments)))
+                    self._dispatcher.compile(self._types)
 
     def is_ready(self) -> bool:
         """Tell whether there is machine code in memory, or none is needed."""

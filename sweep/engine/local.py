@@ -59,7 +59,7 @@ def run_batch(
         return
     job = plan(config, *(grid.part(tiles[i]) for i in batch))
     for part in job.parts:
-        part.kernel.compile()
+        part.kernel.advancing.compile()
     began = time.perf_counter() - (left.seconds if left else 0)
     work, twice = Work(left.tables if left else None), config.integrator.estimate_errors
     first = _FIRST if twice else 1.0

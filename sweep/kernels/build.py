@@ -21,31 +21,37 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 
-import numpy as np
-
 from sweep.interrupt import point
-from sweep.jit import compiled, compiling, load_numba, threads
-from sweep.kernels.failure import compile_approach, compiled_approach
+from sweep.jit import Cached, compiled, compiling, load_numba, threads
+from sweep.kernels.failure import compiled_approach
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
-from sweep.kernels.path import compile_path, compiled_path
+from sweep.kernels.path import compiled_path
 from sweep.models import find
-from sweep.models.model import MODES, Columns, Model
+from sweep.models.model import MODES, Model
 from sweep.models.origin import Origin
-from sweep.models.stiff.final_spin import compile_following, compiled_following
+from sweep.models.stiff.final_spin import compiled_following
 from sweep.models.user import loading
 from sweep.models.user.blame import blamed
-from sweep.parameters import PAPER_PARAMETERS
 
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and where the model comes from."""
 
-PATH, APPROACH = "path", "approach"
+KERNEL, IMAGES, ENDINGS, PATH, APPROACH = "kernel", "images", "endings", "path", "approach"
 
-_SECONDS = {"images": 4.0, "endings": 3.0, PATH: 4.0, APPROACH: 4.0}
+_PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
+    KERNEL: lambda kernel: (kernel.advancing,),
+    IMAGES: lambda kernel: kernel.filling(),
+    ENDINGS: lambda kernel: (compiled_following(),) if MODES in kernel.model.offers else (),
+    PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
+    APPROACH: lambda kernel: (compiled_approach(kernel.model),),
+}
+"""The compiled functions of each piece."""
+
+_SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, PATH: 4.0, APPROACH: 4.0}
 """Time to compile a piece that is no kernel (`scripts/run_costs.py`)."""
 
 _POLL = 0.05
@@ -66,7 +72,7 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
         if a model that a user brings cannot be compiled.
     """
     kernels = list(kernels)
-    if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.is_compiled()]:
+    if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.advancing.is_compiled()]:
         with compiling():
             try_compiling(users[0])
     if jobs := missing(kernels, *also):
@@ -81,7 +87,7 @@ def missing(kernels: Sequence[Kernel], *also: str) -> list[Job]:
 
 def compile_seconds(jobs: Sequence[Job]) -> float:
     """Roughly how long it takes to compile `jobs` side by side."""
-    each = [METHODS[piece[1]].compile_seconds if piece[0] == "kernel" else _SECONDS[piece[0]] for piece, _ in jobs]
+    each = [METHODS[piece[1]].compile_seconds if piece[0] == KERNEL else _SECONDS[piece[0]] for piece, _ in jobs]
     return max(max(each, default=0.0), sum(each) / threads())
 
 
@@ -97,17 +103,11 @@ def try_compiling(model: Model) -> None:
 
 def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """Name what the cache lacks to run `kernel`, by the arguments of this module, the longest first."""
-    model = kernel.model.key
-    if kernel.advancing.is_missing():
-        yield "kernel", kernel.method, model, *(each.spec for each in kernel.measurements if each.in_kernel)
-    if any(function.is_missing() for function in kernel.filling()):
-        yield "images", kernel.method, model
-    if MODES in kernel.model.offers and compiled_following().is_missing():
-        yield "endings", PLAIN, model
-    if PATH in also and kernel.model.path and compiled_path(kernel.model).is_missing():
-        yield PATH, PLAIN, model
-    if APPROACH in also and compiled_approach(kernel.model).is_missing():
-        yield APPROACH, PLAIN, model
+    for piece in (KERNEL, IMAGES, ENDINGS, *also):
+        if any(function.is_missing() for function in _PIECES[piece](kernel)):
+            method = kernel.method if piece in (KERNEL, IMAGES) else PLAIN
+            measure = (each.spec for each in kernel.measurements if each.in_kernel and piece == KERNEL)
+            yield piece, method, kernel.model.key, *measure
 
 
 def _compile(jobs: list[Job]) -> None:
@@ -148,20 +148,8 @@ def main(piece: str, method: str, name: str, *measure: str) -> None:
         model = find(name)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.disable()  # to look for cycles among what Numba keeps takes a twentieth of the time
-    if piece == APPROACH:
-        compile_approach(model)
-    elif piece == "endings":
-        compile_following()
-    elif piece == PATH:
-        compile_path(model)
-    else:
-        kernel = make_kernel(method, model, measure)
-        kernel.compile() if piece == "kernel" else kernel.images(_any_body(model), np.full(1, 0.1), 10.0)
-
-
-def _any_body(model: Model) -> Columns:
-    body = {name: 1.5 if p.default is None else p.default for name, p in PAPER_PARAMETERS.items()}
-    return {name: np.full(1, body.get(name, 1.5)) for name in {*body, *model.parameters}}
+    for function in _PIECES[piece](make_kernel(method, model, measure)):
+        function.compile()
 
 
 if __name__ == "__main__":

@@ -28,33 +28,33 @@ def make_load(names: Sequence[str], layout: Any, record: Any = None) -> Any:
 def make_gather(arguments: str, places: Iterable[str], record: Any = None) -> Any:
     """Compiled (arguments) -> what is at `places`, expressions, as a tuple or as the `NamedTuple` `record`."""
     made = f"{'record' if record else ''}{tuple_of(places)}"
-    return compile_inline("load", f"def load({arguments}):\n    return {made}", {"record": record})
+    return compile_inline("load", arguments, [f"return {made}"], {"record": record})
 
 
 def make_store(names: Sequence[str], layout: Any) -> Any:
     """Compiled (group, lane, keep, new, old) -> None: sets the quantities `names` to `new` if `keep`, else to `old`."""
-    lines = [f"    group[{layout.at(name)} + lane] = new[{i}] if keep else old[{i}]" for i, name in enumerate(names)]
-    return compile_inline("store", "\n".join(["def store(group, lane, keep, new, old):", *lines]), {})
+    lines = [f"group[{layout.at(name)} + lane] = new[{i}] if keep else old[{i}]" for i, name in enumerate(names)]
+    return compile_inline("store", "group, lane, keep, new, old", lines, {})
 
 
 def make_rest(n_states: int, spin_state: int) -> Any:
     """Compiled (states) -> states with the same spin and no rattle."""
     rest = tuple_of(f"y[{i}]" if i == spin_state else "0.0" for i in range(n_states))
-    return compile_inline("rest", f"def rest(y):\n    return {rest}", {})
+    return compile_inline("rest", "y", [f"return {rest}"], {})
 
 
 def call_all(name: str, arguments: str, functions: Sequence[Any]) -> Any:
     """Compiled (arguments) -> None: calls each of `functions`; if there is none, it leaves no instruction behind."""
-    calls = [f"    f{i}({arguments})" for i in range(len(functions))] or ["    pass"]
+    calls = [f"f{i}({arguments})" for i in range(len(functions))] or ["pass"]
     names = {f"f{i}": function for i, function in enumerate(functions)}
-    return compile_inline(name, "\n".join([f"def {name}({arguments}):", *calls]), names)
+    return compile_inline(name, arguments, calls, names)
 
 
 def all_true(name: str, arguments: str, functions: Sequence[Any]) -> Any:
     """Compiled (arguments) -> bool: whether each of `functions` is true; True if there is none."""
     calls = " & ".join(f"f{i}({arguments})" for i in range(len(functions))) or "True"
     names = {f"f{i}": function for i, function in enumerate(functions)}
-    return compile_inline(name, f"def {name}({arguments}):\n    return {calls}", names)
+    return compile_inline(name, arguments, [f"return {calls}"], names)
 
 
 def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]) -> Any:
@@ -63,13 +63,16 @@ def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[s
     The lines are the body of the loop itself.  If they were a function of their own, LLVM would unroll the loop over
     lanes before inlining it, and nothing would be vectorised.
     """
-    loop = [f"    for lane in range({LANES}):", *(f"        {line}" for line in lines)]
-    source = "\n".join([f"def {name}({arguments}):", "    full_width()", *loop])
-    return compiled(compile_inline(name, source, names | {"full_width": full_width()}))
+    loop = ["full_width()", f"for lane in range({LANES}):", *(f"    {line}" for line in lines)]
+    return compiled(compile_inline(name, arguments, loop, names | {"full_width": full_width()}))
 
 
-def compile_inline(name: str, source: str, names: dict[str, Any]) -> Any:
-    """Compile generated source that may use `names`.  Equal sources have equal file names in every process."""
+def compile_inline(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]) -> Any:
+    """Compiled (arguments) -> what `lines` return, which may use `names`.
+
+    Equal sources have equal file names in every process.
+    """
+    source = "\n".join([f"def {name}({arguments}):", *(f"    {line}" for line in lines)])
     digest = hashlib.sha256(source.encode()).hexdigest()[:16]
     filename = f"<sweep {name} {digest}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)

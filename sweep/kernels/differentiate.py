@@ -91,9 +91,9 @@ def make_extended(model: Model) -> Any:
     slopes, _ = model.rhs(states, constants)
     parts = [(each.value, each.slope) if isinstance(each, Traced) else (repr(float(each)), _ZERO) for each in slopes]
     result = tuple_of(part[i] for i in (0, 1) for part in parts)
-    body = [f"    {line}" for line in lines]
-    source = "\n".join(["def extended(z, p):", *body, f"    return {result}, (0.0, 0.0, 1.0, 1.0)"])
-    return compile_inline("extended", source, {"np": np})
+    lines.append(f"return {result}, (0.0, 0.0, 1.0, 1.0)")
+    # The source of a constant may be one of the latter two.
+    return compile_inline("extended", "z, p", lines, {"np": np, "inf": np.inf, "nan": np.nan})
 
 
 def undifferentiable(model: Model) -> str:

@@ -58,11 +58,6 @@ def approach(model: Model, states: Array, constants: Any, stretch: Array) -> tup
     return status, time
 
 
-def compile_approach(model: Model) -> None:
-    """Compile `approach` for a model, or load it from disk."""
-    compiled_approach(model)(np.empty((0, 0)), *3 * [np.empty(0)])
-
-
 @cache
 def compiled_approach(model: Model) -> Cached:
     """Compiled (rows, stretch, status, time) -> None: `approach` for the cells of `rows`, states and constants."""
@@ -77,7 +72,7 @@ def compiled_approach(model: Model) -> Cached:
         for i in prange(len(rows)):
             status[i], time[i] = follow(load(rows, i), load_constants(rows, i), stretch[i])
 
-    return parallel(run, f"approach-{model.key}", *model.files)
+    return parallel(run, "(f8[:, ::1], f8[::1], f8[::1], f8[::1])", f"approach-{model.key}", *model.files)
 
 
 def _make_follow(model: Model) -> Any:
@@ -86,8 +81,7 @@ def _make_follow(model: Model) -> Any:
     # Not inlined: it would be compiled three times over.
     step = compiled(make_step(DOPRI5, model.rhs, n))
     terms = [f"abs(one[{i}] - two[{i}]) / max(abs(two[{i}]), {_SMALL!r})" for i in range(n)]
-    source = f"def difference(one, two):\n    return max({', '.join(terms)})"
-    difference = compile_inline("difference", source, {})
+    difference = compile_inline("difference", "one, two", [f"return max({', '.join(terms)})"], {})
     # The difference of one step from two of half the length exceeds the error of the latter by this factor.
     allowed = _TOLERANCE * (2**DOPRI5.order - 1)
 

@@ -10,7 +10,6 @@ handled a cell.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,11 +21,9 @@ from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
-_FAILED_AT = "failed_at"
-"""The time of a failure, which the engine finds out (`sweep.engine.repeats`); 0 if there is none."""
-
-_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", _FAILED_AT, *STABLE)
-
+_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", "failed_at", *STABLE)
+"""Quantities of every image.  `failed_at` is the time of a failure, which the engine finds out
+(`sweep.engine.repeats`); 0 if there is none."""
 
 STRETCH = 100.0
 """The length of a step divides this evenly if t_end is a multiple of it, in sqrt(c/g).  So it does not depend on t_end:
@@ -57,27 +54,23 @@ class Kernel:
     model: Model
     layout: Layout
     measurements: tuple[Measurement, ...]
+    measure: tuple[str, ...]
+    """The specs of the measurements."""
+    shared: Array
+    """What the measurements compare with."""
     advancing: Cached
     """The compiled function behind `advance`."""
 
     def _lay_out(self, model: Model, measurements: Sequence[Measurement], more: Iterable[str] = ()) -> None:
         """Name the quantities of an image: states, constants, what every kernel needs, measurements, and `more`."""
         self.model, self.measurements = model, tuple(measurements)
+        self.measure = tuple(each.spec for each in measurements)
+        self.shared = next((each.shared for each in measurements if each.shared.size), np.empty((0, 0)))
         self.constants = tuple(f"constant.{name}" for name in model.constants._fields)
         measured = (name for each in self.measurements for name in each.quantities)
         self._ripple = model.ripple if self.follows_ripple else NO_RIPPLE
         self.ripple = tuple(f"ripple.{name}" for name in self._ripple.names)
         self.layout = Layout((*model.states, *self.constants, *_BASE, *self.ripple, *measured, *more))
-
-    @property
-    def measure(self) -> tuple[str, ...]:
-        """The specs of the measurements."""
-        return tuple(each.spec for each in self.measurements)
-
-    @cached_property
-    def shared(self) -> Array:
-        """What the measurements compare with."""
-        return next((each.shared for each in self.measurements if each.shared.size), np.empty((0, 0)))
 
     @property
     def follows_work(self) -> bool:
@@ -119,7 +112,8 @@ class Kernel:
         advance = make_advance(run_block, look, compare, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
-        self.advancing = parallel(advance, name, *self.model.files)
+        types = "(f8[:, ::1], i8[::1], i8, b1, i8, f8[:, ::1])"
+        self.advancing = parallel(advance, types, name, *self.model.files)
 
     def table(self, images: Array) -> Table:
         """`images`, accessed by the names of their quantities."""
@@ -155,7 +149,7 @@ class Kernel:
         if self.ripple:
             table.set_columns(self.ripple, stack(self.model.ripple.of(columns)).T)
         for each in self.measurements:
-            for name, values in each.start(self.model, columns, step, rattle).items():
+            for name, values in each.start(self.model, columns, rattle).items():
                 table[name] = values
         return images
 
@@ -196,15 +190,6 @@ class Kernel:
     def _reached(self, table: Table, t_end: float | Array) -> Array:
         """Times of the states, shape (cells,)."""
         return np.asarray(table["done"] * t_end / table["goal"])
-
-    def is_compiled(self) -> bool:
-        """Tell whether the first call of `advance` will find machine code, in memory or on disk."""
-        return self.advancing.is_compiled()
-
-    def compile(self) -> None:
-        """Compile `advance`, or load it from disk, so that no timing of a run includes that."""
-        if not self.advancing.is_ready():  # a parallel call wakes all threads, which takes some milliseconds
-            self.advance(np.empty((0, len(self.layout.names))), np.empty(0, dtype=np.int64), 0, False)
 
     def filling(self) -> tuple[Cached, ...]:
         """The compiled functions that `images` calls."""

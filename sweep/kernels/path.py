@@ -46,11 +46,6 @@ def stretches(model: Model, states: Array, constants: Any, interval: Array, step
     return found
 
 
-def compile_path(model: Model) -> None:
-    """Compile `stretches` for a model, or load it from disk."""
-    compiled_path(model)(np.empty((0, 0)), np.empty(0, np.int64))
-
-
 @cache
 def compiled_path(model: Model) -> Cached:
     """Compiled (lanes, steps) -> None: `stretches` for groups of lanes, in place."""
@@ -60,12 +55,13 @@ def compiled_path(model: Model) -> Cached:
     constants = tuple(f"constant.{name}" for name in model.constants._fields)
     layout = Layout((*moving, *constants, "interval"))
     load, load_constants = make_load(moving, layout), make_load(constants, layout, model.constants)
-    source = f"""def extended(z, p):
-    y = {tuple_of(f"z[{i}]" for i in range(n))}
-    slopes, extras = rhs(y, p)
-    turning, along, across = path(y, z[{n + 1}], z[{n + 2}], p)
-    return {tuple_of([*(f"slopes[{i}]" for i in range(n)), "turning", "along", "across"])}, extras"""
-    extended = compile_inline("extended", source, {"rhs": model.rhs, "path": model.path})
+    lines = [
+        f"y = {tuple_of(f'z[{i}]' for i in range(n))}",
+        "slopes, extras = rhs(y, p)",
+        f"turning, along, across = path(y, z[{n + 1}], z[{n + 2}], p)",
+        f"return {tuple_of([*(f'slopes[{i}]' for i in range(n)), 'turning', 'along', 'across'])}, extras",
+    ]
+    extended = compile_inline("extended", "z, p", lines, {"rhs": model.rhs, "path": model.path})
     store, step = make_store(moving, layout), make_step(DOPRI5, extended, len(moving))
     INTERVAL, wide, lanes = layout.at("interval"), full_width(), LANES
 
@@ -82,4 +78,4 @@ def compiled_path(model: Model) -> Cached:
         for g in prange(len(groups)):
             follow(groups[g], steps[g])
 
-    return parallel(run, f"path-{model.key}", *model.files)
+    return parallel(run, "(f8[:, ::1], i8[::1])", f"path-{model.key}", *model.files)

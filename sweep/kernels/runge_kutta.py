@@ -99,32 +99,25 @@ def make_step(tableau: Tableau, rhs: Any, n_states: int) -> Any:
     Painlevé denominator were positive in every stage (`sound`, which is also false where they are NaN);
     and whether in some stage the force (`airborne`) or the denominator (`jammed`) was zero or negative.
     """
-    return compile_inline("step", step_source(tableau, n_states), {"rhs": rhs})
-
-
-def step_source(tableau: Tableau, n_states: int) -> str:
-    """The Python source of a step."""
-    lines = ["def step(y, p, h):", "    k0, m0 = rhs(y, p)"]
+    lines = ["k0, m0 = rhs(y, p)"]
     for stage, row in enumerate(tableau.a, start=1):
         weights = {j: f"h{stage}_{j}" for j, w in enumerate(row) if w}
-        lines += [f"    {name} = h * {float(row[j])!r}" for j, name in weights.items()]
+        lines += [f"{name} = h * {float(row[j])!r}" for j, name in weights.items()]
         sums = [" + ".join(f"{name} * k{j}[{i}]" for j, name in weights.items()) for i in range(n_states)]
-        lines.append(f"    k{stage}, m{stage} = rhs({tuple_of(f'y[{i}] + ({sums[i]})' for i in range(n_states))}, p)")
+        lines.append(f"k{stage}, m{stage} = rhs({tuple_of(f'y[{i}] + ({sums[i]})' for i in range(n_states))}, p)")
     b = {j: repr(float(w)) for j, w in enumerate(tableau.b) if w}
     stages = range(tableau.stages)
     power = " + ".join(f"{w} * m{j}[1]" for j, w in b.items())
     sums = [" + ".join(f"{w} * k{j}[{i}]" for j, w in b.items()) for i in range(n_states)]
     result = tuple_of(f"y[{i}] + h * ({sums[i]})" for i in range(n_states))
-    return "\n".join(
-        [
-            *lines,
-            f"    work = h * ({power})",
-            f"    sound = {' & '.join(f'(m{j}[2] > 0.0) & (m{j}[3] > 0.0)' for j in stages)}",
-            f"    airborne = {' | '.join(f'(m{j}[2] <= 0.0)' for j in stages)}",
-            f"    jammed = {' | '.join(f'(m{j}[3] <= 0.0)' for j in stages)}",
-            f"    return {result}, m0[0], work, sound, airborne, jammed",
-        ]
-    )
+    lines += [
+        f"work = h * ({power})",
+        f"sound = {' & '.join(f'(m{j}[2] > 0.0) & (m{j}[3] > 0.0)' for j in stages)}",
+        f"airborne = {' | '.join(f'(m{j}[2] <= 0.0)' for j in stages)}",
+        f"jammed = {' | '.join(f'(m{j}[3] <= 0.0)' for j in stages)}",
+        f"return {result}, m0[0], work, sound, airborne, jammed",
+    ]
+    return compile_inline("step", "y, p, h", lines, {"rhs": rhs})
 
 
 _STABILITY_SHARE = 0.9

@@ -88,7 +88,7 @@ def _compiled(model: Model, seen: Any) -> Cached:
     load_states, load_axis = make_load(model.states, layout), make_load(axis, layout)
     load_constants = make_load(constants, layout, model.constants)
     store, step, wide, lanes = make_store(model.states, layout), make_step(DOPRI5, model.rhs, n), full_width(), LANES
-    lost = compile_inline("lost", f"def lost():\n    return {tuple_of(['np.nan'] * n)}", {"np": np})
+    lost = compile_inline("lost", "", [f"return {tuple_of(['np.nan'] * n)}"], {"np": np})
 
     @exactly_compiled
     def follow(group: Any, h: float, steps: int, spins: Any) -> None:
@@ -105,4 +105,5 @@ def _compiled(model: Model, seen: Any) -> Cached:
         for g in prange(len(groups)):
             follow(groups[g], h[g], steps[g], spins[g])
 
-    return parallel(run, f"samples-{seen.__name__}-{model.key}", *model.files)
+    types = "(f8[:, ::1], f8[::1], i8[::1], f8[:, :, ::1])"
+    return parallel(run, types, f"samples-{seen.__name__}-{model.key}", *model.files)

@@ -55,10 +55,10 @@ def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Lay
     own, load, store = make_load(model.states, layout), make_load(names, layout), make_store(names, layout)
     load_constants = make_load(constants, layout, model.constants)
     squares = " + ".join(f"z[{i}] * z[{i}]" for i in range(n, 2 * n))
-    length = compile_inline("length", f"def length(z):\n    return np.sqrt({squares})", {"np": np})
+    length = compile_inline("length", "z", [f"return np.sqrt({squares})"], {"np": np})
     # The states, and the tangent times a share.
     both = tuple_of([*(f"y[{i}]" for i in range(n)), *(f"share * z[{i}]" for i in range(n, 2 * n))])
-    begin = compile_inline("begin", f"def begin(y, z, share):\n    return {both}", {})
+    begin = compile_inline("begin", "y, z, share", [f"return {both}"], {})
     STEP, DONE, CAUGHT_UP, GREW = map(layout.at, ("step", "done", _DONE, GROWTH))
     block, lanes, wide = BLOCK, LANES, full_width()
 

@@ -54,7 +54,7 @@ def make_kernel(method: str, model: Model, measure: tuple[str, ...] | None = Non
     """The compiled kernel, with these measurements, by default with those of a run."""
     kernel = methods.make_kernel(method, model, measures.default(model) if measure is None else measure)
     build([kernel])
-    kernel.compile()
+    kernel.advancing.compile()
     return kernel
 
 

@@ -104,7 +104,8 @@ def test_a_larger_run_of_the_same_file_takes_its_cells_over(few: xr.Dataset, fol
 
 def test_kernels_depend_on_what_the_file_says_not_on_where_it_lies(folder: Path) -> None:
     def compiled(file: str) -> bool:
-        return all(kernel.is_compiled() for kernel in kernels(load_config(folder / "pendulum.yaml", {"model": file})))
+        config = load_config(folder / "pendulum.yaml", {"model": file})
+        return all(kernel.advancing.is_compiled() for kernel in kernels(config))
 
     sweep.run(folder / "pendulum.yaml", **FEW)
     (folder / "copy.py").write_text(PENDULUM, encoding="utf-8")

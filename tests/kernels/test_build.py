@@ -9,9 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
-from support import ENDS, ROOT, Write
+from support import ENDS, ROOT, Write, columns
 from support.kernels import kernel, threads
 from support.runs import run_cells
 
@@ -20,7 +21,9 @@ from sweep.engine.estimate import estimate
 from sweep.jit import Cached, showing
 from sweep.kernels import build as builder
 from sweep.kernels.build import build
+from sweep.kernels.samples import sampled
 from sweep.kernels.status import LIFT_OFF
+from sweep.models import MODELS
 
 AUTO = "body: {b: [2, 3]}\nfriction: {mu: [1, 1000]}\nintegrator: {method: auto, t_end: 10}\nname: auto\n"
 """Its cells need both methods."""
@@ -95,10 +98,37 @@ def test_an_estimate_compiles_nothing(write: Write, monkeypatch: pytest.MonkeyPa
     def refuse(*_: object) -> None:
         raise AssertionError("compiled")
 
-    monkeypatch.setattr(Cached, "__call__", refuse)
+    for use in ("__call__", "compile"):
+        monkeypatch.setattr(Cached, use, refuse)
     monkeypatch.setattr(builder, "_start", refuse)
     told = estimate(sweep.load_config(write(AUTO)))
     assert [line.split(":")[0] for line in told.splitlines()] == ["cells", "steps", "memory", "time"]
+
+
+def test_functions_are_compiled_for_the_arguments_that_they_get(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise Numba would compile them once more when they are called."""
+    call, signatures = Cached.__call__, dict[str, int]()
+
+    def count(function: Cached, *arguments: object) -> None:
+        call(function, *arguments)
+        dispatcher = function._dispatcher
+        signatures[dispatcher.py_func.__qualname__.split(".")[0]] = len(dispatcher.signatures)
+
+    monkeypatch.setattr(Cached, "__call__", count)
+    run_cells([ENDS[LIFT_OFF], {}], method="adams", t_end=2000.0)
+    sampled(MODELS["slip"], columns(), np.full(1, 0.1), 1.0, 2)
+    sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, t_end=10.0)
+    assert signatures == dict.fromkeys(signatures, 1)
+    made = ("make_advance", "compiled_start_up", "_follow", "compiled_approach", "_compiled", "compiled_path")
+    assert signatures.keys() == set(made)
+
+
+def test_a_piece_that_does_not_exist_is_refused() -> None:
+    command = [sys.executable, "-m", "sweep.kernels.build", "theory", "dopri5", "averaged"]
+    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr
+        assert process.stderr.read().endswith("KeyError: 'theory'\n")
+        assert process.wait() == 1
 
 
 def test_measurements_without_a_place_in_the_kernel_share_it() -> None:

@@ -23,7 +23,7 @@ from sweep.parameters import PAPER_PARAMETERS
 body = {name: np.array([60.0 if name == "mu" else p.default]) for name, p in PAPER_PARAMETERS.items()}
 for measure in sys.argv[1:]:
     kernel = make_kernel("dopri5", MODELS["averaged"], measure.split("+"))
-    found = kernel.is_compiled()
+    found = kernel.advancing.is_compiled()
     images = kernel.images(body, np.array([0.1]), 50.0)
     execute(kernel, images, stop_when_settled=False)
     print("found" if found else "compiled", repr(float(kernel.model.energy(*kernel.unpack(images))[0][0])))

@@ -1,5 +1,7 @@
 """Traced derivatives of right-hand sides, against complex steps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,22 @@ def test_every_operation_has_its_derivative() -> None:
         for each, here, after, before in zip(found, function(*at), ahead, behind, strict=True):
             assert eval(each.value, names) == pytest.approx(here)
             assert eval(each.slope, names) == pytest.approx((after - before) / 2e-6, rel=1e-8, abs=1e-8)
+
+
+def test_constants_need_not_be_finite() -> None:
+    """A bound of infinity bounds nothing, and what is not a number stays so."""
+    model = find("averaged")
+
+    def rhs(y: tuple[object, ...], p: object) -> object:
+        slopes, rest = model.rhs(y, p)
+        return (*(np.maximum(np.minimum(slope, np.inf), -np.inf) for slope in slopes[:-1]), np.nan), rest
+
+    y = np.linspace(0.1, 0.4, 2 * len(model.states))
+    p = model.constants(*np.linspace(0.5, 1.5, len(model.constants._fields)))
+    expected, _ = make_extended(model)(y, p)
+    found, _ = make_extended(replace(model, rhs=rhs))(y, p)
+    n = len(model.states)
+    np.testing.assert_array_equal(found, (*expected[: n - 1], np.nan, *expected[n:-1], 0.0))
 
 
 def test_a_branch_is_refused() -> None:

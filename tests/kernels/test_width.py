@@ -25,12 +25,12 @@ def python(code: str, cache: Path, **environment: str) -> str:
 @pytest.mark.parametrize(("called", "wide"), [("full_width()", True), ("pass", False)])
 def test_the_widest_vectors_against_the_preference_of_the_compiler(called: str, wide: bool, tmp_path: Path) -> None:
     """The code is looked at, not run, so that any CPU will do."""
-    source = f"def add(x, y):\n    {called}\n    for i in range(64):\n        y[i] = x[i] * 2.0 + y[i]"
+    lines = [called, "for i in range(64):", "    y[i] = x[i] * 2.0 + y[i]"]
     code = f"""
 import numba
 from sweep.jit import compiled, full_width
 from sweep.kernels.codegen import compile_inline
-add = compiled(compile_inline("add", {source!r}, {{"full_width": full_width()}}))
+add = compiled(compile_inline("add", "x, y", {lines}, {{"full_width": full_width()}}))
 add.compile((numba.float64[::1], numba.float64[::1]))
 print(next(iter(add.inspect_asm().values())))
 """

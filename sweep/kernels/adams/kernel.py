@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import Cached, compiled, full_width, inline
+from sweep.jit import Cached, compiled, full_width
 from sweep.kernels.adams import start_up, stretches, weights
 from sweep.kernels.adams.start_up import count_levels, duration
 from sweep.kernels.adams.step import (
@@ -34,9 +34,11 @@ from sweep.kernels.adams.step import (
     POINT,
     PREDICT,
     PREDICTOR_NODES,
+    WORK,
     advance_lines,
     load_lines,
     names,
+    places,
 )
 from sweep.kernels.codegen import compile_inline
 from sweep.kernels.kernel import Kernel, steps_to
@@ -143,8 +145,7 @@ class AdamsKernel(Kernel):
 
     def carry(self, images: Array) -> None:
         """As `Kernel.carry`."""
-        if self.form.resolves_modes:
-            stretches.carry(self, images, self.tolerance)
+        stretches.carry(self, images, self.tolerance)
 
     def _make_run_block(self) -> Any:
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes.
@@ -153,22 +154,20 @@ class AdamsKernel(Kernel):
         compiled, not one for each place in a ring of eight.  The history is not part of the group: LLVM sees then that
         no step reads from one what it has written to the other.
         """
-        known = names(self.form) | {"watch": self._make_watch(), "work_of": self._make_work()}
-        known |= {"full_width": full_width(), "np": np}
+        known = names(self.form) | {"watch": self._make_watch(), "full_width": full_width(), "np": np}
         first, size = self.layout.at(_HISTORY[0]), len(POINT) * LANES
         lines = [
-            "def run_block(group):",
-            "    full_width()",
-            f"    history = np.empty({(HISTORY + BLOCK) * size})",
-            f"    for i in range({HISTORY * size}):",
-            f"        history[i] = group[{first} + i]",
-            f"    for oldest in range(0, {BLOCK * size}, {size}):",
-            f"        for lane in range({LANES}):",
-            *(f"            {line}" for line in self._step_lines()),
-            f"    for i in range({HISTORY * size}):",
-            f"        group[{first} + i] = history[{BLOCK * size} + i]",
+            "full_width()",
+            f"history = np.empty({(HISTORY + BLOCK) * size})",
+            f"for i in range({HISTORY * size}):",
+            f"    history[i] = group[{first} + i]",
+            f"for oldest in range(0, {BLOCK * size}, {size}):",
+            f"    for lane in range({LANES}):",
+            *(f"        {line}" for line in self._step_lines()),
+            f"for i in range({HISTORY * size}):",
+            f"    group[{first} + i] = history[{BLOCK * size} + i]",
         ]
-        return compiled(compile_inline("run_block", "\n".join(lines), known))
+        return compiled(compile_inline("run_block", "group", lines, known))
 
     def _step_lines(self) -> list[str]:
         """The source of one step, from eight points of the history, of which the first is at `oldest`, to the ninth.
@@ -176,15 +175,17 @@ class AdamsKernel(Kernel):
         The lines are the body of the loop itself.  If they were a function of their own, LLVM would unroll the loop
         over lanes before inlining it, and nothing would be vectorised.
         """
-        places = {
-            name.format(slot): slot * len(POINT) + i for slot in range(HISTORY + 1) for i, name in enumerate(POINT)
-        }
+        points, work = places(POINT), ["work = 0.0"]
 
         def at(name: str) -> str:
-            if name in places:
-                return f"history[oldest + {places[name] * LANES} + lane]"
+            if name in points:
+                return f"history[oldest + {points[name]} + lane]"
             return f"group[{self.layout.at(name)} + lane]"
 
+        if self.follows_work:
+            powers = ", ".join(map(at, stretches.POWERS))
+            work = [f"p0, p1, p2 = {powers}", f"{powers} = power, p0, p1"]
+            work += [f"work = {WORK.format('power', 'p0', 'p1', 'p2')}"]
         return [
             *load_lines(self.form, at),
             f"status, done, h, old = {at('status')}, {at('done')}, {at('step')}, {at('spin')}",
@@ -192,32 +193,10 @@ class AdamsKernel(Kernel):
             *advance_lines(self.form, at),
             f"{at('done')} = done + (1.0 if accepted else 0.0)",
             f"{at('spin')} = spin if accepted else old",
-            "work = work_of(group, lane, h, power)",
+            *work,
             f"now = {at('begin')} + (done + 1.0) * h",
             "watch(group, lane, accepted, y, p, old, work, h, now)",
         ]
-
-    def _make_work(self) -> Any:
-        """Inline (group, lane, h, power) -> the work of friction in a step.
-
-        It is computed by the Adams-Moulton formula of order four, or 0 if no measurement needs it.
-        """
-        if not self.follows_work:
-            return _no_work
-        P0, P1, P2 = map(self.layout.at, stretches.POWERS)
-
-        @inline
-        def work_of(group: Any, lane: int, h: Any, power: Any) -> Any:
-            p0, p1, p2 = group[P0 + lane], group[P1 + lane], group[P2 + lane]
-            group[P0 + lane], group[P1 + lane], group[P2 + lane] = power, p0, p1
-            return h / 24.0 * (9.0 * power + 19.0 * p0 - 5.0 * p1 + p2)
-
-        return work_of
-
-
-@inline
-def _no_work(group: Any, lane: int, h: Any, power: Any) -> Any:  # noqa: ARG001
-    return 0.0
 
 
 # The error in spin at t = 400 is about n ρ θ⁶, within a factor of ten for most of 877 wide cells, where θ is the phase

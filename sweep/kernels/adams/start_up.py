@@ -25,11 +25,13 @@ from sweep.kernels.adams.step import (
     PREDICTOR_NODES,
     SLIPS,
     SLOPES,
+    WORK,
     At,
     advance_lines,
     constants,
     load_lines,
     names,
+    places,
 )
 from sweep.kernels.adams.weights import plain_weights
 from sweep.kernels.codegen import compile_lanes
@@ -54,8 +56,8 @@ _SHARE, _DOPRI5_STEPS = 0.5, 224
 _LAYER_LEVELS, _EXTRA_STEPS = 2, 6
 
 # The quantities of a point of the history.
-_POINT = Layout((*POINT, "power{}"))
-_POINT_SIZE = len(_POINT.names) * LANES
+_POINT = (*POINT, "power{}")
+_POINTS, _POINT_SIZE = places(_POINT), len(_POINT) * LANES
 
 
 @cache
@@ -114,7 +116,7 @@ def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, leve
         for begin in range(0, len(cells), LANES)
     ]
     kept, begins = layout(form), np.concatenate([starts, constants], axis=1)
-    ended, history = np.empty((len(step), len(kept.names))), np.empty((len(step), HISTORY, len(_POINT.names)))
+    ended, history = np.empty((len(step), len(kept.names))), np.empty((len(step), HISTORY, len(_POINT)))
 
     def take(cells: Array) -> None:
         """Take the cells of one group through start-up; lanes that would stay empty repeat the last of them."""
@@ -123,7 +125,7 @@ def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, leve
         group[: begins.shape[1]] = begins[lanes].T
         group[kept.index("spacing")] = step[lanes] / 2.0 ** len(steps)
         group[kept.index("h")] = 0.5 * group[kept.index("spacing")]
-        points = np.zeros((HISTORY + steps.max(), len(_POINT.names), LANES))
+        points = np.zeros((HISTORY + steps.max(), len(_POINT), LANES))
         run(group.ravel(), points.ravel(), steps)
         ended[cells] = group[:, : len(cells)].T
         history[cells] = np.moveaxis(points[:HISTORY, :, : len(cells)], -1, 0)
@@ -145,14 +147,6 @@ def _places(form: StiffForm) -> At:
         return f"group[{kept.at(name)} + lane]"
 
     return at
-
-
-_POINTS = {
-    pattern.format(slot): slot * _POINT_SIZE + _POINT.at(pattern)
-    for slot in range(HISTORY + 1)
-    for pattern in _POINT.names
-}
-"""Where the lanes of each quantity of a point begin."""
 
 
 @cache
@@ -217,12 +211,12 @@ def _set_step(form: StiffForm, at: At) -> list[str]:
 
 
 def _advance(form: StiffForm, at: At) -> list[str]:
-    """Steps from points 0 … 7 to point 8; the work follows from the Adams-Moulton formula of order four."""
+    """Steps from points 0 … 7 to point 8."""
     return [
         *_begin_step(form, at),
         *advance_lines(form, at),
         f"{at('power8')} = power",
-        f"done = h / 24.0 * (9.0 * power + 19.0 * {at('power7')} - 5.0 * {at('power6')} + {at('power5')})",
+        f"done = {WORK.format('power', at('power7'), at('power6'), at('power5'))}",
         *_end_step(at, "ticks"),
     ]
 
@@ -258,4 +252,4 @@ def compiled_start_up(form: StiffForm) -> Cached:
                 for i in range(size):
                     points[j * size + i] = points[(steps[level] - HISTORY + 1 + 2 * j) * size + i]
 
-    return serial(run, f"start-up-{form.full.name}")
+    return serial(run, "(f8[::1], f8[::1], i8[::1])", f"start-up-{form.full.name}")

@@ -6,11 +6,12 @@ generated as text, because the places of the points have to be known when the co
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from sweep.jit import inline
 from sweep.kernels.codegen import tuple_of
+from sweep.kernels.layout import LANES
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
 from sweep.models.stiff.form import StiffForm
 
@@ -34,11 +35,21 @@ SLIPS = tuple(f"v{{}}_{i}" for i in range(2))
 POINT = (*SLOPES, *SLIPS)
 """Quantities of a point of the history, to be formatted with its slot: the slopes of (u, M), and the slip."""
 
+WORK = "h / 24.0 * (9.0 * {} + 19.0 * {} - 5.0 * {} + {})"
+"""The work of friction in a step by the Adams-Moulton formula of order four, to be formatted with its power at four
+points, newest first."""
+
 MATRIX = tuple(f"P{i}{j}" for i in range(4) for j in range(4))
 """Elements of P, the implicit part of the corrector (see `sweep.models.theory.rocking.implicit`)."""
 
 At = Callable[[str], str]
 """Tells where a quantity of one lane is kept: (name) -> an expression that can be read and assigned to."""
+
+
+def places(point: Sequence[str]) -> dict[str, int]:
+    """Where the lanes of each quantity begin in a history of nine points with the quantities `point`."""
+    filled = [name.format(slot) for slot in range(HISTORY + 1) for name in point]
+    return {name: i * LANES for i, name in enumerate(filled)}
 
 
 @inline

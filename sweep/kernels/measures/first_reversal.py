@@ -26,7 +26,7 @@ class FirstReversal(Measurement):
         )
     }
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"first_reversal": np.nan}
 
     def make_at_reversal(self, layout: Layout) -> Any:

@@ -28,6 +28,8 @@ from sweep.models.model import SPIN, Array, Columns, Model
 BINS = 32
 """Even; the exponent is the mean over 8 to 16 of them."""
 
+_BIN_NAMES = tuple(f"bin{k}" for k in range(BINS))
+
 _FEWEST = 8
 """Full bins below which there is no exponent: the trajectory has ended after fewer looks."""
 
@@ -36,7 +38,9 @@ class Lyapunov(Measurement):
     name = "lyapunov"
     summary = "largest Lyapunov exponent, with its statistical error, at three times the cost; with dopri5 alone"
     asks = SPIN
+    cost = 3.0
     follows_tangent = every_step = True
+    quantities = ("bin_width", "bin_looks", "bin_growth", "full_bins", *_BIN_NAMES)
 
     variables = {
         "lyapunov": measured(
@@ -46,43 +50,30 @@ class Lyapunov(Measurement):
         "lyapunov_error": measured("float64", "standard error of the largest Lyapunov exponent, in 1/sqrt(c/g)"),
     }  # fmt: skip
 
-    @property
-    def cost(self) -> float:
-        return 3.0
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        return ("bin_width", "bin_looks", "bin_growth", "full_bins", *self._bins)
-
-    @property
-    def _bins(self) -> tuple[str, ...]:
-        return tuple(f"bin{k}" for k in range(BINS))
-
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"bin_width": 1.0}
 
     def make_look(self, layout: Layout) -> Any:
         WIDTH, LOOKS, SUM, FULL, FIRST, GREW, DONE = map(
             layout.at, ("bin_width", "bin_looks", "bin_growth", "full_bins", "bin0", GROWTH, "done")
         )
-        lanes, bins, block = LANES, BINS, BLOCK
 
         @inline
         def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
             # A block that the end has cut short does not count.
-            if running & (group[DONE + lane] % block == 0.0):
+            if running & (group[DONE + lane] % BLOCK == 0.0):
                 group[SUM + lane] += group[GREW + lane]
                 group[LOOKS + lane] += 1.0
                 if group[LOOKS + lane] == group[WIDTH + lane]:
                     full = int(group[FULL + lane])
-                    group[FIRST + full * lanes + lane] = group[SUM + lane]
+                    group[FIRST + full * LANES + lane] = group[SUM + lane]
                     group[SUM + lane] = group[LOOKS + lane] = 0.0
-                    if full + 1 == bins:
-                        for k in range(bins // 2):
-                            pair = FIRST + 2 * k * lanes + lane
-                            group[FIRST + k * lanes + lane] = group[pair] + group[pair + lanes]
+                    if full + 1 == BINS:
+                        for k in range(BINS // 2):
+                            pair = FIRST + 2 * k * LANES + lane
+                            group[FIRST + k * LANES + lane] = group[pair] + group[pair + LANES]
                         group[WIDTH + lane] *= 2.0
-                        full = bins // 2 - 1
+                        full = BINS // 2 - 1
                     group[FULL + lane] = full + 1.0
 
         return look
@@ -90,7 +81,7 @@ class Lyapunov(Measurement):
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
         full = table["full_bins"][:, None]
         length = table["bin_width"] * BLOCK * table["step"]
-        rates = table.columns(self._bins) / length[:, None]
+        rates = table.columns(_BIN_NAMES) / length[:, None]
         place = np.arange(BINS)
         used = (place >= full - full // 2) & (place < full)
         number = used.sum(axis=1)

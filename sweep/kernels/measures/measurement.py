@@ -125,14 +125,13 @@ class Measurement:
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
         return bool(self.quantities) or own or self.follows_work or self.follows_ripple or self.follows_tangent
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.
 
         Parameters
         ----------
         model : the model of the kernel
         columns : physical parameters by name, each of shape (cells,)
-        step : length of the steps, shape (cells,)
         rattle : energy of the rattle at t = 0, shape (cells,)
         """
         return {}

@@ -29,6 +29,8 @@ POINTS = 8
 _BEFORE = POINTS - 1
 """Spins that are kept from one look to the next."""
 
+_SPINS = tuple(f"spin{k}" for k in range(_BEFORE + BLOCK + 1))
+
 _SLACK = 1e-9
 """Share of a step by which an instant at the end may lie beyond it, by round-off."""
 
@@ -74,33 +76,22 @@ class Film:
 
 @dataclass(frozen=True)
 class Misfit(Measurement):
-    name = "misfit"
+    name = spec = "misfit"
     summary = (
         "sum of squares of (spin - film) / error over the instants of a film: {misfit: film.csv}; with dopri5 alone"
     )
     asks = SPIN
     every_step = True
+    quantities = ("film_end", "noted_spin", "compared", "next_instant", "misfit", *_SPINS)
     variables = {"misfit": measured("float64", "sum of squares of (spin - film) / error over the instants of the film")}
     film: Film | None = None
     """None where the kernel is only compiled."""
 
     @property
-    def spec(self) -> str:
-        return self.name
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        return ("film_end", "noted_spin", "compared", "next_instant", "misfit", *self._spins)
-
-    @property
-    def _spins(self) -> tuple[str, ...]:
-        return tuple(f"spin{k}" for k in range(_BEFORE + BLOCK + 1))
-
-    @property
     def shared(self) -> Array:
         return self.film.rows if self.film else super().shared
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"film_end": self.film.time[-1] if self.film else 0.0}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:
@@ -113,7 +104,7 @@ class Misfit(Measurement):
         return step
 
     def make_note(self, layout: Layout) -> Any:
-        NOTED, FIRST, lanes = layout.at("noted_spin"), layout.at(self._spins[_BEFORE]), LANES
+        NOTED, FIRST, lanes = layout.at("noted_spin"), layout.at(_SPINS[_BEFORE]), LANES
 
         @inline
         def note(group: Any, number: int) -> None:
@@ -142,7 +133,7 @@ class Misfit(Measurement):
 
     def make_compare(self, layout: Layout) -> Any:
         DONE, STEP, GOAL, STATUS = map(layout.at, ("done", "step", "goal", "status"))
-        NOTED, COMPARED, NEXT, MISFIT, FIRST = map(layout.at, (*self.quantities[1:5], self._spins[0]))
+        NOTED, COMPARED, NEXT, MISFIT, FIRST = map(layout.at, (*self.quantities[1:5], _SPINS[0]))
         lanes, before, points, slack, half = LANES, _BEFORE, POINTS, _SLACK, POINTS // 2
 
         @inline

@@ -58,7 +58,7 @@ class NoiseLimited(Measurement):
         )
     }
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         shares = _shares(columns)
         logs = [0.5 * np.log(np.maximum(share * rattle, _ZERO)) for share in shares]
         rates = growth_coefficients(columns).reshape(len(_RATES), -1)

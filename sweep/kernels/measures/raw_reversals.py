@@ -19,7 +19,7 @@ class RawReversals(Measurement):
 
     variables = {"raw_reversals": measured("int16", "sign changes of the spin, ripple included")}
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         spin, _, _ = model.energy(model.start(columns), model.constants.of(columns))
         return {"earlier_spin": spin}
 

@@ -41,7 +41,7 @@ class ReversalTimes(Measurement):
     def quantities(self) -> tuple[str, ...]:
         return (*LATEST, "recorded", *self.times)
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return dict.fromkeys((*LATEST, *self.times), np.nan)
 
     def make_at_reversal(self, layout: Layout) -> Any:

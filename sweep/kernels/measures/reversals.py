@@ -47,7 +47,7 @@ class Reversals(Measurement):
         ),
     }  # fmt: skip
 
-    def start(self, model: Model, columns: Columns, step: Array, rattle: Array) -> Mapping[str, Array | float]:
+    def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"period": model.slower_period(columns), "shifted": 1.0, "last_reversal": np.nan}
 
     def make_step(self, layout: Layout, at_reversal: Any) -> Any:

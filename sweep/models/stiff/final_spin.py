@@ -154,10 +154,4 @@ def _follow(spin: Array, log_e: Array, rates: Array, slopes: Array, endings: Arr
 @cache
 def compiled_following() -> Cached:
     """`_follow`, compiled."""
-    return serial(_follow, "slow-equations")
-
-
-def compile_following() -> None:
-    """Compile `_follow`, or load it from disk."""
-    nothing = np.empty((0, 5, 2))
-    compiled_following()(np.empty(0), np.empty((0, 2)), nothing, nothing, np.empty((0, 4)))
+    return serial(_follow, "(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1])", "slow-equations")
