@@ -155,6 +155,14 @@ def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None
     assert (len(lines), lines[-1]) == (21, f"{file}: 36 more faults")
 
 
+def test_faults_of_settings_without_lines_are_told_in_the_order_of_the_laws() -> None:
+    """Not in that of a set of strings, which changes from process to process."""
+    foreign = ["speed", "mu_static", "speed_stick", "mu_viscous", "radius_contact"]
+    with pytest.raises(ConfigError) as error:
+        load_config({"model": "slip", "friction": {"mu": 5, **dict.fromkeys(foreign, 1)}})
+    assert [line.split(":")[0] for line in str(error.value).splitlines()] == [f"friction.{name}" for name in foreign]
+
+
 def test_another_process_is_told_of_faults() -> None:
     error = fault_of("wrong", "body", "a", file="small.yaml", line=3)
     again = pickle.loads(pickle.dumps(error))

@@ -69,8 +69,10 @@ class Physics:
             found |= dict.fromkeys(("mass", "gravity"), "is 1 in the paper's units; leave it out, or set units: SI")
         known = {*self.law.parameters, "mu"}  # one file with mu serves every law
         takes = ", ".join((*self.law.parameters, *(name for couple in COUPLES.values() for name in couple.parameters)))
-        for name in {name for law in LAWS.values() for name in law.parameters} - known:
-            found[name] = f"does not belong to the law {self.law.name}; leave it out (friction takes {takes})"
+        # In the order of the laws: that of a set would change from process to process.
+        for name in dict.fromkeys(name for law in LAWS.values() for name in law.parameters):
+            if name not in known:
+                found[name] = f"does not belong to the law {self.law.name}; leave it out (friction takes {takes})"
         return {name: words for name, words in found.items() if name in self.names}
 
 
