@@ -92,6 +92,9 @@ BROKEN = {
     "no period": after(PENDULUM, "    slower_period=", "    # ", "give it slower_period, or do not offer COUNT"),
     "no motion": (PENDULUM.replace("2 + columns", "0 * columns").replace("0.5 + 0 * columns", "np.inf + columns"),
                   line_of(PENDULUM, "    fastest_motion"), "the fastest motion is 0, from which steps follow"),
+    "no motion at the end": (
+        PENDULUM.replace("2 + columns", "1.5 - columns").replace("0.5 + 0 * columns", "np.inf + columns"),
+        line_of(PENDULUM, "    fastest_motion"), "the fastest motion is 0, from which steps follow"),
     "decided": (PENDULUM.replace("MODEL =", "@inline\ndef decided(y, p):\n    return y[1]\n\n\nMODEL =")
                 .replace("spin_state=1,", "spin_state=1, decided=decided,"), line_of(PENDULUM, "MODEL ="),
                 "decided is neither true nor false; it has to be comparisons, joined by & and |"),

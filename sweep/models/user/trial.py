@@ -133,9 +133,10 @@ def _values(model: Model, columns: Columns) -> Faults:
         if function := getattr(model, name):
             yield from one_a_cell(function, name, function(columns))
     fastest = np.asarray(fastest_motion(model, columns))
-    if not ((fastest > 0) & np.isfinite(fastest) | np.isfinite(model.slower_period(columns))).all():
+    fine = (fastest > 0) & np.isfinite(fastest) | np.isfinite(model.slower_period(columns))
+    if not fine.all():
         where = model.fastest_motion or model.slower_period
-        yield where, f"the fastest motion is {fastest[0]:g}, from which steps follow; it has to be a number > 0"
+        yield where, f"the fastest motion is {fastest[~fine][0]:g}, from which steps follow; it has to be a number > 0"
 
 
 def _settling_too_early(model: Model, columns: Columns, law: Law | None) -> Faults:
