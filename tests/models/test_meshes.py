@@ -79,7 +79,10 @@ def test_what_is_no_standing_solid_is_refused(words: str) -> None:
         meshes.mesh(WRONG[words])
 
 
-@pytest.mark.parametrize("data", [b"", b"hello", b"vertex 1 2 3", b"vertex 1 2 nan\n" * 3, b"vertex 1 2 1e200\n" * 3])
+NO_STL = [b"", b"hello", b"vertex 1 2 3", *(b"vertex 1 2 %s\n" % z * 3 for z in (b"nan", b"1e200", b"1,5", b"\xb5"))]
+
+
+@pytest.mark.parametrize("data", NO_STL)
 def test_other_files_are_no_stl(data: bytes) -> None:
     with pytest.raises(ValueError, match="not an STL file"):
         meshes.triangles(data)

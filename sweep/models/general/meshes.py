@@ -24,7 +24,10 @@ def triangles(stl: bytes) -> NDArray[np.float64]:
         found = np.frombuffer(stl, _RECORD, offset=_HEADER)["corners"].astype(float)
     else:
         words = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", stl)
-        found = np.array(words[: len(words) // 3 * 3]).astype(float).reshape(-1, 3, 3)
+        try:
+            found = np.array(words[: len(words) // 3 * 3]).astype(float).reshape(-1, 3, 3)
+        except ValueError:  # NumPy's words would be of bytes
+            found = np.empty(0)
     if not len(found) or not (np.abs(found) < _LARGEST).all():
         raise ValueError("not an STL file")
     return found
