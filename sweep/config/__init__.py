@@ -26,8 +26,8 @@ from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
 from sweep.models.general.laws import LAWS
-from sweep.models.general.selection import PAPER_LAW, Physics
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
+from sweep.models.general.variants import PAPER_LAW, Physics
 from sweep.models.model import MODES, Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading

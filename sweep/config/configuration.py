@@ -22,9 +22,8 @@ from sweep.grid import CASE, SAMPLE, Grid
 from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.models import TIERS
 from sweep.models.general import laws
-from sweep.models.general.selection import PAPER_LAW, Physics
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.models.general.variants import BASES
+from sweep.models.general.variants import BASES, PAPER_LAW, Physics
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading

@@ -20,9 +20,8 @@ from sweep.kernels import measures, methods
 from sweep.kernels.differentiate import undifferentiable
 from sweep.kernels.measures import misfit
 from sweep.models.general import starts, validity
-from sweep.models.general.selection import INERTIA, Physics
 from sweep.models.general.surfaces import SURFACES
-from sweep.models.general.variants import BASES
+from sweep.models.general.variants import BASES, INERTIA, Physics
 from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.models.user import loading

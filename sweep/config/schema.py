@@ -19,8 +19,8 @@ from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
 from sweep.models.general.laws import LAWS
-from sweep.models.general.selection import PAPER_LAW
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
+from sweep.models.general.variants import PAPER_LAW
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.parameters import PAPER_UNITS, PARAMETERS, SI, Parameter, sections

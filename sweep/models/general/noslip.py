@@ -1,7 +1,7 @@
 """Any body that rolls on the plane without slip.
 
-The notation is that of `general_slip`.  With v_p = 0, v_g = v_0, and the contact force is g u + v_g' + ω × v_g,
-whatever it has to be.  Its torque gives
+The notation is that of `sweep.models.general.slip`.  With v_p = 0, v_g = v_0, and the contact force is
+g u + v_g' + ω × v_g, whatever it has to be.  Its torque gives
 
     (J + |x_p|² - x_p x_pᵀ) ω' = x_p × (g u + ω × (v_0 - x_p')) + τ0 + R τ1 - ω × J ω,
     R = g + u · (ω × (v_0 - x_p')) + q · ω'.

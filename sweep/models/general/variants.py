@@ -3,15 +3,17 @@
 A model made here is a *variant* of `slip` or `noslip`, specialised for a law of friction and for couples, whose
 names make up its own: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`, and for a surface that is no ellipsoid
 `slip+viscous+paraboloid`.  What a variant does not name leaves no instruction in its kernel.  The states are those of
-`slip` and `noslip`, in the axes of the surface; the equations are those of `general_slip` and `general_noslip`.
+`slip` and `noslip`, in the axes of the surface; the equations are those of `sweep.models.general.slip` and `noslip`.
+
+The `Physics` of a configuration chooses the variant that runs it, where it names what the paper's models do not know.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
+from sweep.models.general import rigid_body, starts
 from sweep.models.general.couples import COUPLES, Couple
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.noslip import rolling
@@ -19,9 +21,13 @@ from sweep.models.general.slip import slipping
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES, Surface
 from sweep.models.model import Model
 from sweep.models.origin import Origin
-from sweep.parameters import Parameter
+from sweep.parameters import PAPER_PARAMETERS, PAPER_UNITS, PARAMETERS, SI, Parameter
 
 BASES = ("slip", "noslip")
+
+PAPER_LAW = "viscous"
+
+INERTIA = (*rigid_body.MOMENTS, *rigid_body.PRODUCTS)
 
 SOLID = "solid"
 """Stands in place of the law in the names of variants without slip."""
@@ -78,7 +84,66 @@ def parts(name: str) -> tuple[str, str, list[Couple], Surface]:
     return base, law, [COUPLES[couple] for couple in more], surface
 
 
-def name_of(base: str, law: str, couples: Sequence[str], surface: str = ELLIPSOID.name) -> str:
-    """The name of a variant; of a model without slip whatever the law is."""
-    shape = [surface] if surface != ELLIPSOID.name else []
-    return "+".join([base, law if base == "slip" else SOLID, *couples, *shape])
+@dataclass(frozen=True)
+class Physics:
+    """The physics that a configuration describes, beside its numbers: of bodies, friction and starts."""
+
+    units: str
+    """`PAPER_UNITS` or `SI`."""
+    law: Law
+    """The law of slip friction: one of `LAWS`, or a user's."""
+    surface: Surface
+    names: frozenset[str]
+    """The parameters that the configuration names."""
+
+    @property
+    def beyond(self) -> list[str]:
+        """List what the paper's models do not know of it."""
+        found = sorted(self.names - PAPER_PARAMETERS.keys())
+        found += [f"law: {self.law.name}"] if self.law.name != PAPER_LAW else []
+        found += [f"units: {self.units}"] if self.units != PAPER_UNITS else []
+        return found + ([f"surface: {self.surface.name}"] if self.surface != ELLIPSOID else [])
+
+    @property
+    def required(self) -> frozenset[Parameter]:
+        """The parameters that have to be given, because their defaults are of other bodies."""
+        names = PAPER_PARAMETERS if self.units == SI else self.surface.required
+        return frozenset(PARAMETERS[name] for name in names)
+
+    def variant(self, base: str) -> Model:
+        """The variant of `slip` or `noslip` for it, whose parameters are those that follow from what is named."""
+        homogeneous = self.surface.homogeneous and not self.names & {*INERTIA}
+        moments = ("delta",) if homogeneous else INERTIA
+        system = ("mass", "gravity") if self.units == SI else ()
+        by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
+        start = by_angles if self.names & {*starts.ANGLES, *starts.SLIP} else starts.POINT
+        couples = [name for name, couple in COUPLES.items() if self.names & {*couple.parameters}]
+        parameters = ("a", "b", "c", "offset", *moments, *system, *start)
+        shape = [self.surface.name] if self.surface != ELLIPSOID else []
+        name = "+".join([base, self.law.name if base == "slip" else SOLID, *couples, *shape])
+        return variant(name, parameters, None if self.law.name in LAWS else self.law)
+
+    def misfits(self) -> dict[str, str]:
+        """List the named parameters that do not go with the rest, and what to do about each."""
+        inertia, angles = self.names & {*INERTIA}, self.names & {*starts.ANGLES, *starts.SLIP}
+        found: dict[str, str] = {}
+        if inertia:
+            found["delta"] = f"cannot be combined with {_some(inertia)}; leave out either"
+        elif not self.surface.homogeneous:
+            found["delta"] = f"means nothing with surface: {self.surface.name}; give the elements of inertia instead"
+        if angles:
+            ways = f"either {', '.join(starts.POINT)} or angles, omega1 … omega3 and slip"
+            found |= dict.fromkeys(starts.POINT, f"cannot be combined with {_some(angles)}; give {ways}")
+        if self.units == PAPER_UNITS:
+            found |= dict.fromkeys(("mass", "gravity"), "is 1 in the paper's units; leave it out, or set units: SI")
+        known = {*self.law.parameters, "mu"}  # one file with mu serves every law
+        takes = ", ".join((*self.law.parameters, *(name for couple in COUPLES.values() for name in couple.parameters)))
+        # In the order of the laws: that of a set would change from process to process.
+        for name in dict.fromkeys(name for law in LAWS.values() for name in law.parameters):
+            if name not in known:
+                found[name] = f"does not belong to the law {self.law.name}; leave it out (friction takes {takes})"
+        return {name: words for name, words in found.items() if name in self.names}
+
+
+def _some(names: frozenset[str]) -> str:
+    return ", ".join(sorted(names))

@@ -16,8 +16,7 @@ from typing import Any
 from sweep.faults import fault_of
 from sweep.models.general import variants
 from sweep.models.general.laws import Law
-from sweep.models.general.selection import Physics
-from sweep.models.general.variants import SlipWith
+from sweep.models.general.variants import Physics, SlipWith
 from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.models.user import trial
