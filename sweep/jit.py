@@ -93,6 +93,12 @@ def _marked(function: Callable[..., Any], inlined: bool) -> Callable[..., Any]:
     return function
 
 
+@inline
+def nothing(*_: Any) -> float:
+    """The literal 0.0, for what a kernel does without: a sum with it leaves no instruction."""
+    return 0.0
+
+
 def compiled(function: Callable[..., Any]) -> Any:
     """`function`, to be compiled when it is first called, or as part of the compiled function that calls it."""
     return load_numba().njit(function, **OPTIONS)

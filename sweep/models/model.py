@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.jit import inline
+from sweep.jit import inline, nothing
 from sweep.models.origin import Origin
 from sweep.parameters import Parameter
 
@@ -75,19 +75,8 @@ class Ripple:
     """Inline, (states, constants, coefficients) -> n - n*, in sqrt(g/c)."""
 
 
-@inline
-def _no_ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
-    return 0.0
-
-
-NO_RIPPLE = Ripple((), lambda columns: (), _no_ripple)  # noqa: ARG005
+NO_RIPPLE = Ripple((), lambda columns: (), nothing)  # noqa: ARG005
 """For a model whose spin does not ripple."""
-
-
-@inline
-def never_tilts(y: Any) -> float:  # noqa: ARG001
-    """The default `tilt`: the equations know of no right angle."""
-    return 0.0
 
 
 @inline
@@ -148,9 +137,9 @@ class Equations:
     """Inline, (states, constants) -> (spin n, energy of the rattle, moment of inertia J of the spin).  Rattle + J n²/2
     is the energy above rest, which only friction changes.  Every term must keep its relative precision however
     small the rattle is: no difference of numbers of order one may be taken."""
-    tilt: Callable[..., Any] = never_tilts
+    tilt: Callable[..., Any] = nothing
     """Inline, (states) -> sin² of the angle by which the body is tilted from upright spin.  The variables of a model
-    that has it end at a right angle, where the body has toppled."""
+    that has it end at a right angle, where the body has toppled; by default the equations know of none."""
     impossible: Callable[[Columns], Array] = lambda columns: zeros(columns).astype(bool)
     """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
     function is called for such a body."""

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import inline
+from sweep.jit import inline, nothing
 from sweep.models.general.laws import Law, rounded
 from sweep.models.general.rigid_body import mass
 from sweep.models.model import Array, Columns
@@ -52,12 +52,6 @@ def _spinning(square: Any, p: Any) -> Any:
     return p.arm_spinning / rounded(np.sqrt(square), p.speed_spinning)
 
 
-@inline
-def no_resistance(square: Any, p: Any) -> Any:  # noqa: ARG001
-    """The resistance of no couple."""
-    return 0.0
-
-
 COUPLES: dict[str, Couple] = {
     couple.name: couple
     for couple in (
@@ -85,7 +79,7 @@ def damping_of(couples: Sequence[Couple]) -> Any:
     """Inline, (ω, constants) -> the couple by itself, τ0, and the power that it takes."""
     resistance = _resistance([couple for couple in couples if not couple.needs_normal_force])
     # A product with 0.0 would remain: the compiler has to allow for infinity.  A sum with it does not.
-    damps = resistance is not no_resistance
+    damps = resistance is not nothing
 
     @inline
     def damping(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
@@ -104,12 +98,12 @@ def friction_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
 
     The power is that of the couple.
     """
-    of_slip = (law and law.coupled) or _without_couple(law.resistance if law else no_resistance)
+    of_slip = (law and law.coupled) or _without_couple(law.resistance if law else nothing)
     rolling, spinning = (
         _resistance([couple for couple in couples if couple.needs_normal_force and couple.about_normal == about_normal])
         for about_normal in (False, True)
     )
-    rolls, spins = rolling is not no_resistance, spinning is not no_resistance or bool(law and law.coupled)
+    rolls, spins = rolling is not nothing, spinning is not nothing or bool(law and law.coupled)
 
     @inline
     def friction(square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
@@ -129,7 +123,7 @@ def friction_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
 
 
 def _resistance(couples: Sequence[Couple]) -> Any:
-    return couples[0].resistance if couples else no_resistance
+    return couples[0].resistance if couples else nothing
 
 
 def _without_couple(resistance: Any) -> Any:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import inline
+from sweep.jit import inline, nothing
 from sweep.models.model import Array, Columns
 
 
@@ -77,11 +77,6 @@ def rounded(x: Any, width: Any) -> Any:
 @inline
 def _viscous(square: Any, p: Any) -> Any:  # noqa: ARG001
     return p.mu
-
-
-@inline
-def _none(square: Any, p: Any) -> Any:  # noqa: ARG001
-    return 0.0
 
 
 @inline
@@ -168,7 +163,7 @@ LAWS: dict[str, Law] = {
     law.name: law
     for law in (
         Law("viscous", ("mu",), _viscous, lambda columns: columns["mu"]),
-        Law("none", (), _none, lambda columns: np.zeros_like(columns["a"])),
+        Law("none", (), nothing, lambda columns: np.zeros_like(columns["a"])),
         _coulomb("sqrt", _sqrt, 1.0),
         _coulomb("tanh", _tanh, 1.0),
         _coulomb("cubic", _cubic, 3.0),

@@ -17,7 +17,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models.model import COUNT, FORMULAS, LINEAR, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
-from sweep.models.theory.ripple import FORM, ripple
+from sweep.models.theory.ripple import FORM, ripple_of_states
 from sweep.models.theory.rocking import slower_period
 
 _CONSTANTS = "rate1_squared rate2_squared k1 k2 k3 k4 m1 m2 m3 m4 nu1_squared nu2_squared root_J slip gravity I3"
@@ -84,12 +84,6 @@ def ripple_coefficients(columns: Columns) -> tuple[Array, ...]:
     return tuple(kappa / k.I3 for kappa in (first, mixed, -mixed, second))
 
 
-@inline
-def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
-    X, Y, dX, dY, _ = y
-    return ripple(X, Y, dX, dY, k)
-
-
 MODEL = Model(
     name="effective",
     summary="two coupled oscillators and the spin, slip eliminated (Takano 2011, eqx, eqy, eqn)",
@@ -104,6 +98,6 @@ MODEL = Model(
     upright=lambda spin: (0.0, 0.0, 0.0, 0.0, spin),
     rhs=rhs,
     energy=energy,
-    ripple=Ripple(FORM, ripple_coefficients, _ripple),
+    ripple=Ripple(FORM, ripple_coefficients, ripple_of_states),
     observe=lambda y, p: {"mode_1": y[0], "mode_2": y[1]},  # noqa: ARG005
 )

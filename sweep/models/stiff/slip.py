@@ -28,7 +28,7 @@ from sweep.models import ellipsoid
 from sweep.models.ladder import slip
 from sweep.models.model import Array, Columns, Ripple, named, zeros
 from sweep.models.stiff.form import StiffForm, in_momentum, newton_step, slopes
-from sweep.models.theory.ripple import FORM, form, ripple
+from sweep.models.theory.ripple import FORM, form, ripple_of_states
 from sweep.models.theory.rocking import rocking
 
 
@@ -109,12 +109,7 @@ def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
     return slip.dissipation(R, v1, v2, v3, p)
 
 
-@inline
-def _ripple(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
-    return ripple(y[0], y[1], y[2], y[3], k)
-
-
-STIFF_MODEL = in_momentum(slip.MODEL, Constants, momentum, slow, Ripple(FORM, form, _ripple))
+STIFF_MODEL = in_momentum(slip.MODEL, Constants, momentum, slow, Ripple(FORM, form, ripple_of_states))
 """The slip model in these variables, for methods that use `slow` and `newton` in place of a right-hand side."""
 
 

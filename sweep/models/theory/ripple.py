@@ -91,3 +91,9 @@ def matrix(first: Any, second: Any, third: Any, fourth: Any) -> Array:
 def ripple(u1: Any, u2: Any, M1: Any, M2: Any, k: Any) -> Any:
     """Σ K_ij u_i M_j; `k` begins with the coefficients of `FORM`."""
     return (k[0] * u1 + k[2] * u2) * M1 + (k[1] * u1 + k[3] * u2) * M2
+
+
+@inline
+def ripple_of_states(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
+    """`ripple` of a model whose first states are two coordinates and their momenta, or rates of unit mass."""
+    return ripple(y[0], y[1], y[2], y[3], k)
