@@ -46,8 +46,8 @@ from sweep.kernels.layout import BLOCK, LANES, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch
 from sweep.kernels.method import Method
 from sweep.kernels.status import DIVERGED, RUNNING
-from sweep.models.model import Array, Columns, Model, stack
-from sweep.models.stiff.form import StiffForm
+from sweep.models.model import MODES, Array, Columns, Model, stack
+from sweep.models.stiff.form import StiffForm, velocities
 from sweep.models.stiff.general import form_of
 from sweep.models.stiff.modes import bending
 from sweep.models.theory import linear
@@ -60,7 +60,7 @@ class AdamsKernel(Kernel):
     """The `Kernel` of this method; its states contain M in place of ω.
 
     Where the rattle is so small that its linear modes describe it to within `tolerance` in spin, these
-    carry the trajectory on, without steps (`sweep.kernels.adams.stretches`), if they are known (`resolves_modes`).
+    carry the trajectory on, without steps (`sweep.kernels.adams.stretches`), if they are known (`MODES`).
     """
 
     method = "adams"
@@ -73,7 +73,7 @@ class AdamsKernel(Kernel):
     def __init__(self, form: StiffForm, measurements: Sequence[Measurement], tolerance: float) -> None:
         self.form, self.tolerance = form, tolerance
         powers = stretches.POWERS if any(each.follows_work for each in measurements) else ()
-        looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if form.resolves_modes else ()
+        looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if MODES in form.full.offers else ()
         method = ("gamma", "per_weight", *PREDICT, *CORRECT, *MATRIX)
         self._lay_out(form.model, measurements, (*looks, "begin", "spin", *powers, *method, *_HISTORY))
         self._compile_with(self._make_run_block())
@@ -90,7 +90,7 @@ class AdamsKernel(Kernel):
         constants = table.columns(self.constants)
         starts = stack(self.form.full.start(columns)).T
         self._set_started(table, *start_up.start_up(self.form, step, constants, starts, levels))
-        if self.form.resolves_modes:
+        if MODES in self.form.full.offers:
             self._set_looks(table, columns)
         return images
 
@@ -98,7 +98,7 @@ class AdamsKernel(Kernel):
         return (start_up.compiled_start_up(self.form),)
 
     def model_states(self, images: Array) -> Array:
-        return self.form.velocities(*self.unpack(images))
+        return velocities(self.form.slow, *self.unpack(images))
 
     def _reached(self, table: Table, t_end: float | Array) -> Array:
         reached = table["begin"] + table["done"] * table["step"]

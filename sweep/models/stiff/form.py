@@ -54,12 +54,6 @@ class StiffForm:
     """(columns) -> share by which the rattle may raise the decay rate of the slip, shape (cells,)."""
     damping: Callable[[Columns], Array]
     """(columns) -> bound on the rate at which couples damp the angular velocity, shape (cells,)."""
-    resolves_modes: bool
-    """Whether `sweep.models.stiff.modes` can resolve a small rattle of it into its modes."""
-
-    def velocities(self, y: Array, p: Any) -> Array:
-        """The states of `full` from these, shape (7, cells): the inverse of `momentum`."""
-        return _velocities(self.slow, y, p)
 
 
 @inline
@@ -130,7 +124,7 @@ def in_momentum(full: Model, constants: type[Any], momentum: Any, slow: Any, rip
         return states
 
     def observe(y: Array, p: Any) -> dict[str, Array]:
-        return full.observe(_velocities(slow, y, p), subset(full.constants, p))
+        return full.observe(velocities(slow, y, p), subset(full.constants, p))
 
     full_energy = full.energy
 
@@ -145,6 +139,7 @@ def in_momentum(full: Model, constants: type[Any], momentum: Any, slow: Any, rip
     )  # fmt: skip
 
 
-def _velocities(slow: Any, y: Array, p: Any) -> Array:
+def velocities(slow: Any, y: Array, p: Any) -> Array:
+    """The states of the full model, shape (7, cells), from the `STATES` y: the inverse of `StiffForm.momentum`."""
     _, geometry = slow(*y, p)
     return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))

@@ -23,13 +23,12 @@ from sweep.jit import inline
 from sweep.models.general import rigid_body, variants
 from sweep.models.general.bounds import couples_decay, strongest_grip
 from sweep.models.general.couples import Couple, damping_of
-from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.rigid_body import about_centre, about_contact, gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.ladder import slip
 from sweep.models.model import Array, Columns, Model, named
 from sweep.models.stiff.form import StiffForm, in_momentum, newton_step, slopes
-from sweep.models.stiff.slip import PAPER_FORM
+from sweep.models.stiff.slip import PAPER_FORM, power
 from sweep.models.theory.ripple import ripple as rippling
 from sweep.models.theory.rocking import Rocking
 
@@ -51,12 +50,12 @@ def form_of(model: Model) -> StiffForm | None:
     base, law, couples, surface = variants.parts(model.name)
     if (base, law) != ("slip", "viscous") or any(couple.needs_normal_force for couple in couples):
         return None
-    return _form_of(model, LAWS[law], tuple(couples), surface)
+    return _form_of(model, tuple(couples), surface)
 
 
 @cache
-def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surface) -> StiffForm:
-    resistance, contact, damping = law.resistance, surface.contact, damping_of(couples)
+def _form_of(full: Model, couples: tuple[Couple, ...], surface: Surface) -> StiffForm:
+    contact, damping = surface.contact, damping_of(couples)
     fields = (*full.constants._fields, *ROCKING)
 
     class Constants(named(*fields)):  # type: ignore[misc]
@@ -93,19 +92,16 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
 
     @inline
     def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
-        w1, w2, w3, v3 = geometry.w1, geometry.w2, geometry.w3, geometry.v3
+        w1, w2, w3 = geometry.w1, geometry.w2, geometry.w3
         (m1, m2, m3), ((c1, c2, c3), _) = gyroscopic(w1, w2, w3, p), damping(w1, w2, w3, p)
         alpha = about_centre(m1 + c1, m2 + c2, m3 + c3, p)
         T = _compliance(geometry.x, geometry.y, geometry.z, p)
-        k = resistance(v1 * v1 + v2 * v2 + v3 * v3, p)
-        return newton_step(u1, u2, v1, v2, geometry, alpha, T, k, p.g, gamma, b1, b2)
+        return newton_step(u1, u2, v1, v2, geometry, alpha, T, p.mu, p.g, gamma, b1, b2)
 
     @inline
-    def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
-        v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
-        slip_square = v1 * v1 + v2 * v2 + v3 * v3
+    def with_couples(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
         _, lost = damping(geometry.w1, geometry.w2, geometry.w3, p)
-        return R * resistance(slip_square, p) * slip_square + lost
+        return power(R, v1, v2, geometry, p) + lost
 
     ripple = replace(full.ripple, value=_ripple)
     return StiffForm(
@@ -114,13 +110,12 @@ def _form_of(full: Model, law: Law, couples: tuple[Couple, ...], surface: Surfac
         momentum=momentum,
         slow=slow,
         newton=newton,
-        power=power,
+        power=with_couples,
         rocking=_rocking,
         time_unit=lambda columns: 1 / rigid_body.spin_unit(columns),
         slip_decay=lambda columns: full.fastest_decay(columns) + 2.2 * rigid_body.spin_unit(columns),
         rise=lambda columns: _rise(columns, surface),
         damping=lambda columns: couples_decay(couples, columns, surface),
-        resolves_modes=False,
     )
 
 

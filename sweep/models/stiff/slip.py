@@ -130,5 +130,4 @@ PAPER_FORM = StiffForm(
     slip_decay=lambda columns: 2.2 * columns["mu"] + 2.2,
     rise=_rise,
     damping=zeros,
-    resolves_modes=True,
 )
