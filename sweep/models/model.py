@@ -9,10 +9,10 @@ Kernels, executor, store and plots then work with it.  `noslip` is a short examp
 2. Compute the coefficients and the starts of many cells at once, from arrays of parameters (`constants`, `start`).
 3. Write `rhs` and `energy` for one trajectory, on scalars.
 4. Say what the model depends on and what can be asked of it (`parameters`, `offers`).
-5. Add what the `Theory` needs for it: `slower_period` for counts, `upright` or `fastest_motion` for steps, and
+5. Say how fast it moves: by `slower_period` for counts, by `upright` or `fastest_motion` for steps, and by
    `fastest_decay` if friction or anything else makes the model stiff.
 
-The other groups, `Settling` and `Shown`, have defaults that leave no instruction in a kernel.
+When it settles and what is shown of it have defaults that leave no instruction in a kernel.
 
 A model of a user (`sweep.models.user`) may be of any body.  Where that has no upright spin, no state need vanish: the
 model does not offer `LINEAR`, tells its `fastest_motion`, and settles where it says that its spin is `decided`.
@@ -112,8 +112,8 @@ class Tier:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Equations:
-    """The equations of motion, which every model has.
+class Model(Tier):
+    """A rung that is simulated: its equations of motion, and what else is known of it, which may be left out.
 
     The functions called "inline" are marked `sweep.jit.inline`.  They become part of the kernel, where they work on
     the scalars of one trajectory.  Called from Python they also take arrays, real or complex, so that energies and
@@ -121,6 +121,7 @@ class Equations:
     that the loop over lanes can be vectorised.
     """
 
+    # The equations, which every model has.
     states: tuple[str, ...]
     """Names of the states, in the order in which all functions take and return them."""
     spin_state: int
@@ -144,11 +145,7 @@ class Equations:
     """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
     function is called for such a body."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Theory:
-    """How fast a model moves, rocks and decays: steps, the average of the spin, and predictions follow from it."""
-
+    # How fast it moves, rocks and decays: steps, the average of the spin, and predictions follow from it.
     slower_period: Callable[[Columns], Array] = never_rocks
     """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none.  The
     spin is averaged over it before its changes of sign are counted."""
@@ -170,11 +167,7 @@ class Theory:
     ripple: Ripple = NO_RIPPLE
     """How the spin ripples with the rattle, for the ripple-free spin whose changes of sign are counted."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Settling:
-    """When a trajectory may end because its spin can reverse no more, beside what the linear theory tells."""
-
+    # When a trajectory may end because its spin can reverse no more, beside what the linear theory tells.
     decided: Callable[..., Any] = never_decided
     """Inline, (states, constants) -> whether the spin can reverse no more, so that the trajectory settles, whatever the
     linear theory says; by default it leaves no instruction.  It is asked at every look."""
@@ -182,11 +175,7 @@ class Settling:
     """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
     rattle below it may settle."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Shown:
-    """What trajectories and labels show of a model, and in which units."""
-
+    # What trajectories and labels show of it, and in which units.
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
     shows beside spin and energy, by names that `sweep.studies.trajectory` or `series` explains."""
@@ -205,11 +194,7 @@ class Shown:
     units: str = OWN
     """What the numbers of a model that a user brings are in, for the labels: "paper", "SI" or "own"."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Model(Shown, Settling, Theory, Equations, Tier):
-    """A rung that is simulated: its `Equations`, and what else is known of it, by groups that may be left out."""
-
+    # What a user brings with it.
     own_parameters: tuple[Parameter, ...] = ()
     """Parameters that are not in `sweep.parameters`, of a model that a user brings."""
     origin: Origin | None = None
