@@ -109,16 +109,15 @@ def exactly_compiled(function: Callable[..., Any]) -> Any:
     return load_numba().njit(function, error_model=OPTIONS["error_model"])
 
 
-def parallel(function: Callable[..., Any], types: str, specialisation: str, *modules: str) -> Cached:
+def parallel(function: Callable[..., Any], types: str, specialisation: str) -> Cached:
     """`function`, with prange, from the cache on disk, or compiled when it is first called.
 
     Parameters
     ----------
     types : of its arguments, as Numba writes a signature
     specialisation : tells apart what is made from the same function; one of them has one signature only
-    modules : files of models from outside the package
     """
-    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), types, specialisation, *modules)
+    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), types, specialisation)
 
 
 def serial(function: Callable[..., Any], types: str, specialisation: str) -> Cached:
@@ -190,16 +189,15 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
-def fingerprint(*modules: str) -> str:
+def fingerprint() -> str:
     """Hash of all sources from which a kernel can be built, and of the versions of what compiles them."""
     from importlib import metadata  # which takes as long to import as all else here
 
     root = Path(__file__).parent
     files = [path for pattern in _NUMERIC_SOURCES for path in sorted(root.glob(pattern))]
     digest = hashlib.sha256(b"interpreted" if INTERPRETED else b"")
-    for path in [*files, *map(Path, modules)]:
-        name = path.relative_to(root) if path.is_relative_to(root) else Path(path.name)
-        digest.update(name.as_posix().encode() + b"\0" + path.read_bytes())
+    for path in files:
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     for version in (platform.python_version(), *map(metadata.version, ("numba", "llvmlite", "numpy"))):
         digest.update(version.encode())
     return digest.hexdigest()[:16]
@@ -234,13 +232,12 @@ class Cached:
     specialisation and of the hash of all numeric sources and of the libraries that compile them.
     """
 
-    def __init__(self, dispatcher: Any, types: str, specialisation: str, *modules: str) -> None:
+    def __init__(self, dispatcher: Any, types: str, specialisation: str) -> None:
         self._dispatcher, self._types, self._cache, self._found = dispatcher, types, None, False
         if INTERPRETED:  # Numba has returned the function as it was
             return
         with suppress(RuntimeError):  # Numba finds no folder to write to: each process compiles for itself
-            sources = fingerprint(*modules)
-            self._cache = dispatcher._cache = _disk_cache()(dispatcher.py_func, specialisation, sources)
+            self._cache = dispatcher._cache = _disk_cache()(dispatcher.py_func, specialisation, fingerprint())
 
     def __call__(self, *arguments: Any) -> None:
         if not self.is_ready():

@@ -72,7 +72,7 @@ def compiled_approach(model: Model) -> Cached:
         for i in prange(len(rows)):
             status[i], time[i] = follow(load(rows, i), load_constants(rows, i), stretch[i])
 
-    return parallel(run, "(f8[:, ::1], f8[::1], f8[::1], f8[::1])", f"approach-{model.key}", *model.files)
+    return parallel(run, "(f8[:, ::1], f8[::1], f8[::1], f8[::1])", f"approach-{model.key}")
 
 
 def _make_follow(model: Model) -> Any:

@@ -113,7 +113,7 @@ class Kernel:
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
         types = "(f8[:, ::1], i8[::1], i8, b1, i8, f8[:, ::1])"
-        self.advancing = parallel(advance, types, name, *self.model.files)
+        self.advancing = parallel(advance, types, name)
 
     def table(self, images: Array) -> Table:
         """`images`, accessed by the names of their quantities."""

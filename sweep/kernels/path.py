@@ -78,4 +78,4 @@ def compiled_path(model: Model) -> Cached:
         for g in prange(len(groups)):
             follow(groups[g], steps[g])
 
-    return parallel(run, "(f8[:, ::1], i8[::1])", f"path-{model.key}", *model.files)
+    return parallel(run, "(f8[:, ::1], i8[::1])", f"path-{model.key}")

@@ -106,4 +106,4 @@ def _compiled(model: Model, seen: Any) -> Cached:
             follow(groups[g], h[g], steps[g], spins[g])
 
     types = "(f8[:, ::1], f8[::1], i8[::1], f8[:, :, ::1])"
-    return parallel(run, types, f"samples-{seen.__name__}-{model.key}", *model.files)
+    return parallel(run, types, f"samples-{seen.__name__}-{model.key}")

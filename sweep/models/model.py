@@ -30,7 +30,6 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from inspect import getfile
 from typing import Any
 
 import numpy as np
@@ -204,11 +203,6 @@ class Model(Tier):
     def key(self) -> str:
         """Name its compiled code, apart from that of other models."""
         return f"{self.name}@{self.origin.digest}" if self.origin else self.name
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """Files beside those of the package on which its compiled code depends and that `key` does not tell."""
-        return () if self.origin else (getfile(self.rhs),)
 
 
 def named(*fields: str) -> Any:

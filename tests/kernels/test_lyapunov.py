@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from sweep.kernels.runge_kutta import RungeKuttaKernel
 from sweep.kernels.tableau import DOPRI5
 from sweep.models.ladder import noslip
 from sweep.models.model import SPIN, Model, stack, take
+from sweep.models.origin import Origin
 
 
 class Constants(NamedTuple):
@@ -57,6 +59,7 @@ LORENZ = Model(
     upright=lambda spin: (spin, 0.0, 0.0),
     rhs=lorenz,
     energy=no_energy,
+    origin=Origin.of_file("lorenz", __file__, Path(__file__).read_text(encoding="utf-8")),
 )
 
 
