@@ -36,10 +36,9 @@ import csv
 import math
 import os
 import statistics
-import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache, partial
@@ -59,6 +58,7 @@ from sweep.models.model import Array, stack
 numba = load_numba()
 
 THREADS = 2
+POOL = ThreadPoolExecutor(THREADS)
 T_END = 400.0
 
 SLOW_SECONDS, SLOW_REPEATS = 2.0, 3
@@ -82,12 +82,6 @@ RTOL_TO_ATOL = 1e-3
 """Absolute over relative tolerance: the rattle's states are of order 1e-3."""
 
 FIXED = {"a": 10.0, "c": 1.0, "delta": 0.03, "n0": 0.05, "x0": 0.01, "y0": 0.01}
-CONFIGURATION = """
-body: {a: 10.0, b: 3.0, delta: 0.03}
-friction: {mu: 60.0}
-start: {n0: 0.05, x0: 0.01, y0: 0.01}
-integrator: {stop_when_settled: false}
-"""
 
 Answer = tuple[Array, Array | None]
 """Spins at T, and counts of reversals if the tool counts them, each of shape (bodies,)."""
@@ -146,15 +140,6 @@ def count_constants() -> int:
     return len(MODEL.constants._fields)
 
 
-def in_threads(run: Callable[[Any], Array], items: Iterable[Any]) -> list[Array]:
-    return list(thread_pool().map(run, items))
-
-
-@cache
-def thread_pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(THREADS)
-
-
 # --- ours -------------------------------------------------------------------------------------
 
 
@@ -168,15 +153,8 @@ def our_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
 
 
 def our_run(more: dict[str, Any], problem: Problem) -> Answer:
-    found = sweep.run(configuration(), b=problem.b, mu=problem.mu, **more)
+    found = sweep.run({}, **FIXED, b=problem.b, mu=problem.mu, stop_when_settled=False, **more)
     return found["spin_final"].values, found["reversals"].values
-
-
-@cache
-def configuration() -> Path:
-    path = Path(tempfile.mkdtemp()) / "peers.yaml"
-    path.write_text(CONFIGURATION, encoding="utf-8")
-    return path
 
 
 # --- heyoka.py --------------------------------------------------------------------------------
@@ -279,7 +257,7 @@ class Batches:
             return results
 
         found: list[Any] = [None] * len(batches)
-        for share, results in enumerate(in_threads(run_share, range(THREADS))):
+        for share, results in enumerate(POOL.map(run_share, range(THREADS))):
             found[share::THREADS] = results
         ends = np.concatenate([state for state, _ in found], axis=1)[:, : problem.size]
         counts = np.concatenate([crossings for _, crossings in found])[: problem.size]
@@ -352,7 +330,7 @@ def taylor_reference(problem: Problem) -> Array:
             own.propagate_until(real(T_END))
             states[:, i] = own.state
 
-    in_threads(run_share, range(THREADS))
+    list(POOL.map(run_share, range(THREADS)))  # which raises what a thread has raised
     return spin(states, constants)
 
 
