@@ -48,7 +48,7 @@ from typing import Any
 
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
-from tracing import traced_rhs
+from tracing import taylor_system, traced_rhs
 
 import sweep
 from sweep.jit import load_numba
@@ -163,23 +163,14 @@ def our_run(more: dict[str, Any], problem: Problem) -> Answer:
 def heyoka_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
     import heyoka
 
-    size, written = heyoka.recommended_simd_size(), textbook_system()
+    size, written, (ours, _) = heyoka.recommended_simd_size(), textbook_system(), taylor_system(MODEL)
     for tolerance in HEYOKA:
         setting = f"tol={tolerance:g} batch={size}"
         yield BATCH, setting, Batches(written, size, tolerance).in_shares
-        yield "heyoka batch, our algebra", setting, Batches(heyoka_system(), size, tolerance).in_shares
+        yield "heyoka batch, our algebra", setting, Batches(ours, size, tolerance).in_shares
     setting = f"tol={HEYOKA[1]:g} batch={size}"
     yield "heyoka ensemble of batches", setting, Batches(written, size, HEYOKA[1]).in_ensemble
     yield "heyoka batch, counting", setting, Batches(written, size, HEYOKA[1], counting=True).in_shares
-
-
-def heyoka_system() -> list[tuple[Any, Any]]:
-    import heyoka
-
-    states = heyoka.make_vars(*MODEL.states)
-    parameters = tuple(heyoka.par[i] for i in range(count_constants()))
-    slopes, _ = traced_rhs(MODEL, heyoka.sqrt)(tuple(states), parameters)
-    return list(zip(states, slopes, strict=True))
 
 
 def textbook_system() -> list[tuple[Any, Any]]:
@@ -232,6 +223,7 @@ class Batches:
         import heyoka
 
         self.size, self.counting = size, counting
+        _, (spin_expression, *_) = taylor_system(MODEL)
         # compact_mode=True takes three times as long here; force_avx512 and slp_vectorize change nothing.
         original = heyoka.taylor_adaptive_batch(
             system,
@@ -239,7 +231,7 @@ class Batches:
             pars=np.ones((count_constants(), size)),
             tol=tolerance,
             fast_math=True,
-            nt_events=[heyoka.nt_event_batch(spin_expression(), count_crossing)] if counting else [],
+            nt_events=[heyoka.nt_event_batch(spin_expression, count_crossing)] if counting else [],
         )
         self.integrators = [original] + [copy.copy(original) for _ in range(THREADS - 1)]
 
@@ -298,14 +290,6 @@ def count_crossing(_integrator: Any, _time: float, _sign: int, member: int) -> N
     COUNTING[id_of_thread()][member] += 1
 
 
-def spin_expression() -> Any:
-    import heyoka
-
-    parameters = tuple(heyoka.par[i] for i in range(count_constants()))
-    _, others = traced_rhs(MODEL, heyoka.sqrt)(tuple(heyoka.make_vars(*MODEL.states)), parameters)
-    return others[0]
-
-
 def taylor_reference(problem: Problem) -> Array:
     """Spins at T from Taylor series in extended precision (80 bits on x86)."""
     import heyoka
@@ -313,7 +297,7 @@ def taylor_reference(problem: Problem) -> Array:
     real = np.longdouble
     states, constants = problem.start()
     integrator = heyoka.taylor_adaptive(
-        heyoka_system(),
+        taylor_system(MODEL)[0],
         state=list(states[:, 0].astype(real)),
         pars=list(constants[:, 0].astype(real)),
         fp_type=real,

@@ -21,7 +21,7 @@ from typing import Any
 import heyoka
 import numpy as np
 from numpy.typing import NDArray
-from tracing import traced_rhs
+from tracing import taylor_system
 
 from sweep.models.ladder import slip
 
@@ -222,14 +222,10 @@ def least(times: Array, values: Array) -> float:
 
 def traced_integrator(tolerance: float) -> Any:
     """Integrator of the package's slip model in multiples of `OTHER_SCALE`."""
-    symbols = heyoka.make_vars(*slip.MODEL.states)
-    states = tuple(symbol * unit for symbol, unit in zip(symbols, OTHER_SCALE, strict=True))
-    count = len(slip.Constants._fields)
-    slopes, _ = traced_rhs(slip.MODEL, heyoka.sqrt)(states, tuple(heyoka.par[i] for i in range(count)))
     return heyoka.taylor_adaptive(
-        [(symbol, slope * (1 / unit)) for symbol, slope, unit in zip(symbols, slopes, OTHER_SCALE, strict=True)],
+        taylor_system(slip.MODEL, OTHER_SCALE)[0],
         state=np.zeros(7),
-        pars=np.ones(count),
+        pars=np.ones(len(slip.Constants._fields)),
         tol=tolerance,
     )
 
