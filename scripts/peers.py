@@ -176,18 +176,7 @@ def heyoka_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
 def textbook_system() -> list[tuple[Any, Any]]:
     """The equations as a user would copy them from the paper, vector by vector, without our algebra."""
     import heyoka
-
-    def cross(a: Any, b: Any) -> list[Any]:
-        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-    def dot(a: Any, b: Any) -> Any:
-        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-    def total(*vectors: Any) -> list[Any]:
-        return [sum(parts[1:], parts[0]) for parts in zip(*vectors, strict=True)]
-
-    def scaled(factor: Any, v: Any) -> list[Any]:
-        return [factor * x for x in v]
+    from benchmark_references import example
 
     states = heyoka.make_vars(*MODEL.states)
     u1, u2, *omega, v1, v2 = states
@@ -195,13 +184,8 @@ def textbook_system() -> list[tuple[Any, Any]]:
     u = [u1, u2, -heyoka.sqrt(1.0 - u1 * u1 - u2 * u2)]
     v = [v1, v2, -(v1 * u1 + v2 * u2) / u[2]]
 
-    def shape(w: Any) -> list[Any]:
-        return [A11 * w[0] + A12 * w[1], A12 * w[0] + A22 * w[1], A33 * w[2]]
-
-    r = heyoka.sqrt(dot(u, shape(u)))
-    x_p = scaled(-1.0 / r, shape(u))
-    du = cross(u, omega)
-    dx_p = total(scaled(-1.0 / r, shape(du)), scaled(dot(du, shape(u)) / r**3, shape(u)))
+    cross, dot, scaled, total = example.cross, example.dot, example.scaled, example.add
+    du, x_p, dx_p = example.contact(u, omega, (A11, A22, A33, A12), heyoka)
     spinning = [w / i for w, i in zip(omega, inverse, strict=True)]
     alpha0 = [-i * g for i, g in zip(inverse, cross(omega, spinning), strict=True)]
     force = total(u, scaled(-1.0 * mu, v))
