@@ -9,7 +9,7 @@ the normal force N into the equations
     F_r + F_r* = 0,   r = 1 … 6.
 
 They are linear in ω', s' and N.  Without slip s1 and s2 are zero as well, and only the equations of ω and of s3 are
-taken.  Friction is -N k s and the couple is -(σ + N κ) ω.
+taken.  Friction is -N k s, by the laws of `tests/support/newton.py`, and the couple is -(σ + N κ) ω.
 
     python scripts/derive_general.py
 
@@ -20,9 +20,11 @@ states of random bodies.  It needs SymPy, of the extra `test`.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from functools import cache
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import sympy as sp
@@ -30,6 +32,9 @@ import sympy as sp
 from sweep.models import find
 from sweep.models.model import take
 from sweep.parameters import PARAMETERS
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from support.newton import LAWS
 
 Array = np.ndarray
 
@@ -41,26 +46,8 @@ TRIALS = 40
 """Random states and bodies for each variant."""
 
 
-def rounded(x: float, p: Mapping[str, float], width: str) -> float:
-    s = p[width]
+def rounded(x: float, s: float) -> float:
     return x if x >= s else x**2 / s * (1 - x / (3 * s)) + s / 3
-
-
-def stribeck(x: float, p: Mapping[str, float]) -> float:
-    t = min(x / p["speed"], 1.0)
-    mu = p["mu_static"] - (p["mu_static"] - p["mu"]) * (10 * t**3 - 15 * t**4 + 6 * t**5)
-    return mu / np.hypot(x, p["speed_stick"]) + p["mu_viscous"]
-
-
-RESISTANCES: dict[str, Callable[[float, Mapping[str, float]], float]] = {
-    "viscous": lambda x, p: p["mu"],  # noqa: ARG005
-    "none": lambda x, p: 0.0,  # noqa: ARG005
-    "coulomb-sqrt": lambda x, p: p["mu"] / np.hypot(x, p["speed"]),
-    "coulomb-tanh": lambda x, p: p["mu"] * np.tanh(x / p["speed"]) / x,
-    "coulomb-cubic": lambda x, p: p["mu"] / rounded(x, p, "speed"),
-    "stribeck": stribeck,
-}
-"""k at the slip velocity x > 0."""
 
 
 @cache
@@ -120,7 +107,7 @@ def slopes(y: Array, p: Mapping[str, float], law: str | None, rolling: bool, dam
     pitch = np.arctan2(y[0], -u3)
     speed = np.linalg.norm(y[2:5])
     body = [p[name] for name in BODY]
-    kappa = p["mu_rolling"] * p["radius"] / rounded(speed, p, "speed_rolling") if rolling else 0.0
+    kappa = p["mu_rolling"] * p["radius"] / rounded(speed, p["speed_rolling"]) if rolling else 0.0
     sigma = p["sigma"] if damped else 0.0
 
     def at(s: Array, k: float) -> tuple[Array, ...]:
@@ -132,8 +119,9 @@ def slopes(y: Array, p: Mapping[str, float], law: str | None, rolling: bool, dam
         x = np.linalg.solve(matrix[np.ix_([0, 1, 2, 5], [0, 1, 2, 5])], rest[[0, 1, 2, 5], 0])
         return np.array([*du[:2, 0], *x[:3]]), x[3]
     v = np.array([y[5], y[6], -(y[0] * y[5] + y[1] * y[6]) / u3])
+    size = np.linalg.norm(v)
     s = at(np.zeros(2), 0.0)[3].T @ v
-    matrix, rest, du, along, along_rate = at(s, RESISTANCES[law](np.linalg.norm(v), p))
+    matrix, rest, du, along, along_rate = at(s, LAWS[law](size, p) / size)
     x = np.linalg.solve(matrix, rest[:, 0])
     return np.array([*du[:2, 0], *x[:3], *(along @ x[3:5] + along_rate @ s)[:2]]), x[5]
 
@@ -168,7 +156,7 @@ def difference(law: str | None, couples: tuple[str, ...], trials: int = TRIALS) 
 
 
 def main() -> None:
-    for law, couples in product((*RESISTANCES, None), ((), ("sigma",), ("rolling",), ("sigma", "rolling"))):
+    for law, couples in product((*LAWS, None), ((), ("sigma",), ("rolling",), ("sigma", "rolling"))):
         name = "+".join(["slip", law, *couples] if law else ["noslip", "solid", *couples])
         print(f"{name:36} {difference(law, couples):.1e}")
 

@@ -36,10 +36,9 @@ import csv
 import math
 import os
 import statistics
-import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache, partial
@@ -49,7 +48,7 @@ from typing import Any
 
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
-from tracing import traced_rhs
+from tracing import taylor_system, traced_rhs
 
 import sweep
 from sweep.jit import load_numba
@@ -59,6 +58,7 @@ from sweep.models.model import Array, stack
 numba = load_numba()
 
 THREADS = 2
+POOL = ThreadPoolExecutor(THREADS)
 T_END = 400.0
 
 SLOW_SECONDS, SLOW_REPEATS = 2.0, 3
@@ -82,12 +82,6 @@ RTOL_TO_ATOL = 1e-3
 """Absolute over relative tolerance: the rattle's states are of order 1e-3."""
 
 FIXED = {"a": 10.0, "c": 1.0, "delta": 0.03, "n0": 0.05, "x0": 0.01, "y0": 0.01}
-CONFIGURATION = """
-body: {a: 10.0, b: 3.0, delta: 0.03}
-friction: {mu: 60.0}
-start: {n0: 0.05, x0: 0.01, y0: 0.01}
-integrator: {stop_when_settled: false}
-"""
 
 Answer = tuple[Array, Array | None]
 """Spins at T, and counts of reversals if the tool counts them, each of shape (bodies,)."""
@@ -146,15 +140,6 @@ def count_constants() -> int:
     return len(MODEL.constants._fields)
 
 
-def in_threads(run: Callable[[Any], Array], items: Iterable[Any]) -> list[Array]:
-    return list(thread_pool().map(run, items))
-
-
-@cache
-def thread_pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(THREADS)
-
-
 # --- ours -------------------------------------------------------------------------------------
 
 
@@ -168,15 +153,8 @@ def our_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
 
 
 def our_run(more: dict[str, Any], problem: Problem) -> Answer:
-    found = sweep.run(configuration(), b=problem.b, mu=problem.mu, **more)
+    found = sweep.run({}, **FIXED, b=problem.b, mu=problem.mu, stop_when_settled=False, **more)
     return found["spin_final"].values, found["reversals"].values
-
-
-@cache
-def configuration() -> Path:
-    path = Path(tempfile.mkdtemp()) / "peers.yaml"
-    path.write_text(CONFIGURATION, encoding="utf-8")
-    return path
 
 
 # --- heyoka.py --------------------------------------------------------------------------------
@@ -185,40 +163,20 @@ def configuration() -> Path:
 def heyoka_entries() -> Iterator[tuple[str, str, Callable[[Problem], Answer]]]:
     import heyoka
 
-    size, written = heyoka.recommended_simd_size(), textbook_system()
+    size, written, (ours, _) = heyoka.recommended_simd_size(), textbook_system(), taylor_system(MODEL)
     for tolerance in HEYOKA:
         setting = f"tol={tolerance:g} batch={size}"
         yield BATCH, setting, Batches(written, size, tolerance).in_shares
-        yield "heyoka batch, our algebra", setting, Batches(heyoka_system(), size, tolerance).in_shares
+        yield "heyoka batch, our algebra", setting, Batches(ours, size, tolerance).in_shares
     setting = f"tol={HEYOKA[1]:g} batch={size}"
     yield "heyoka ensemble of batches", setting, Batches(written, size, HEYOKA[1]).in_ensemble
     yield "heyoka batch, counting", setting, Batches(written, size, HEYOKA[1], counting=True).in_shares
 
 
-def heyoka_system() -> list[tuple[Any, Any]]:
-    import heyoka
-
-    states = heyoka.make_vars(*MODEL.states)
-    parameters = tuple(heyoka.par[i] for i in range(count_constants()))
-    slopes, _ = traced_rhs(MODEL, heyoka.sqrt)(tuple(states), parameters)
-    return list(zip(states, slopes, strict=True))
-
-
 def textbook_system() -> list[tuple[Any, Any]]:
     """The equations as a user would copy them from the paper, vector by vector, without our algebra."""
     import heyoka
-
-    def cross(a: Any, b: Any) -> list[Any]:
-        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-    def dot(a: Any, b: Any) -> Any:
-        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-    def total(*vectors: Any) -> list[Any]:
-        return [sum(parts[1:], parts[0]) for parts in zip(*vectors, strict=True)]
-
-    def scaled(factor: Any, v: Any) -> list[Any]:
-        return [factor * x for x in v]
+    from benchmark_references import example
 
     states = heyoka.make_vars(*MODEL.states)
     u1, u2, *omega, v1, v2 = states
@@ -226,13 +184,8 @@ def textbook_system() -> list[tuple[Any, Any]]:
     u = [u1, u2, -heyoka.sqrt(1.0 - u1 * u1 - u2 * u2)]
     v = [v1, v2, -(v1 * u1 + v2 * u2) / u[2]]
 
-    def shape(w: Any) -> list[Any]:
-        return [A11 * w[0] + A12 * w[1], A12 * w[0] + A22 * w[1], A33 * w[2]]
-
-    r = heyoka.sqrt(dot(u, shape(u)))
-    x_p = scaled(-1.0 / r, shape(u))
-    du = cross(u, omega)
-    dx_p = total(scaled(-1.0 / r, shape(du)), scaled(dot(du, shape(u)) / r**3, shape(u)))
+    cross, dot, scaled, total = example.cross, example.dot, example.scaled, example.add
+    du, x_p, dx_p = example.contact(u, omega, (A11, A22, A33, A12), heyoka)
     spinning = [w / i for w, i in zip(omega, inverse, strict=True)]
     alpha0 = [-i * g for i, g in zip(inverse, cross(omega, spinning), strict=True)]
     force = total(u, scaled(-1.0 * mu, v))
@@ -254,6 +207,7 @@ class Batches:
         import heyoka
 
         self.size, self.counting = size, counting
+        _, (spin_expression, *_) = taylor_system(MODEL)
         # compact_mode=True takes three times as long here; force_avx512 and slp_vectorize change nothing.
         original = heyoka.taylor_adaptive_batch(
             system,
@@ -261,7 +215,7 @@ class Batches:
             pars=np.ones((count_constants(), size)),
             tol=tolerance,
             fast_math=True,
-            nt_events=[heyoka.nt_event_batch(spin_expression(), count_crossing)] if counting else [],
+            nt_events=[heyoka.nt_event_batch(spin_expression, count_crossing)] if counting else [],
         )
         self.integrators = [original] + [copy.copy(original) for _ in range(THREADS - 1)]
 
@@ -279,7 +233,7 @@ class Batches:
             return results
 
         found: list[Any] = [None] * len(batches)
-        for share, results in enumerate(in_threads(run_share, range(THREADS))):
+        for share, results in enumerate(POOL.map(run_share, range(THREADS))):
             found[share::THREADS] = results
         ends = np.concatenate([state for state, _ in found], axis=1)[:, : problem.size]
         counts = np.concatenate([crossings for _, crossings in found])[: problem.size]
@@ -320,14 +274,6 @@ def count_crossing(_integrator: Any, _time: float, _sign: int, member: int) -> N
     COUNTING[id_of_thread()][member] += 1
 
 
-def spin_expression() -> Any:
-    import heyoka
-
-    parameters = tuple(heyoka.par[i] for i in range(count_constants()))
-    _, others = traced_rhs(MODEL, heyoka.sqrt)(tuple(heyoka.make_vars(*MODEL.states)), parameters)
-    return others[0]
-
-
 def taylor_reference(problem: Problem) -> Array:
     """Spins at T from Taylor series in extended precision (80 bits on x86)."""
     import heyoka
@@ -335,7 +281,7 @@ def taylor_reference(problem: Problem) -> Array:
     real = np.longdouble
     states, constants = problem.start()
     integrator = heyoka.taylor_adaptive(
-        heyoka_system(),
+        taylor_system(MODEL)[0],
         state=list(states[:, 0].astype(real)),
         pars=list(constants[:, 0].astype(real)),
         fp_type=real,
@@ -352,7 +298,7 @@ def taylor_reference(problem: Problem) -> Array:
             own.propagate_until(real(T_END))
             states[:, i] = own.state
 
-    in_threads(run_share, range(THREADS))
+    list(POOL.map(run_share, range(THREADS)))  # which raises what a thread has raised
     return spin(states, constants)
 
 

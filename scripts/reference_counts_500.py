@@ -26,7 +26,7 @@ from typing import Any
 import heyoka
 import numpy as np
 from reversals import last_reversal, sign_changes, window_and_ripple
-from tracing import traced_rhs
+from tracing import taylor_system
 
 from sweep.models import ellipsoid
 from sweep.models.ladder import slip
@@ -83,15 +83,12 @@ def draw() -> dict[str, Array]:
 
 def system() -> list[tuple[Any, Any]]:
     """Equations of the slip model in multiples of `SCALE`, and of the integral of n*."""
-    *states, integral = heyoka.make_vars(*slip.MODEL.states, "integral")
-    constants = tuple(heyoka.par[i] for i in range(CONSTANTS))
-    unscaled = tuple(state * k for state, k in zip(states, SCALE, strict=True))
-    slopes, (spin, *_) = traced_rhs(slip.MODEL, heyoka.sqrt)(unscaled, constants)
-    scaled = [slope * (1 / k) for slope, k in zip(slopes, SCALE, strict=True)]
-    K11, K12, K21, K22 = (heyoka.par[CONSTANTS + i] for i in range(4))
+    equations, (spin, *_) = taylor_system(slip.MODEL, SCALE)
+    unscaled = tuple(state * k for (state, _), k in zip(equations, SCALE, strict=True))
+    *constants, K11, K12, K21, K22 = (heyoka.par[i] for i in range(CONSTANTS + 4))
     M1, M2 = momentum(unscaled, slip.Constants(*constants))
     ripple = unscaled[0] * (K11 * M1 + K12 * M2) + unscaled[1] * (K21 * M1 + K22 * M2)
-    return list(zip([*states, integral], [*scaled, spin - ripple], strict=True))
+    return [*equations, (heyoka.make_vars("integral"), spin - ripple)]
 
 
 def momentum(states: tuple[Any, ...], p: slip.Constants) -> tuple[Any, Any]:

@@ -29,7 +29,7 @@ from unittest import mock
 import heyoka
 import numpy as np
 from numpy.polynomial import legendre
-from tracing import traced_rhs
+from tracing import taylor_system
 
 from sweep.models import MODELS
 from sweep.models.ladder import slip
@@ -107,10 +107,8 @@ def check_contact(model: Model, states: Any, constants: Any) -> Any:
 def taylor_spins(model: Model, case: Case, real: Any, tolerance: float) -> list[Any]:
     """Spins at `TIMES`."""
     states, constants = problem(model, case, real)
-    symbols = heyoka.make_vars(*model.states)
-    slopes, _ = traced_rhs(model, heyoka.sqrt)(tuple(symbols), tuple(heyoka.par[i] for i in range(len(constants))))
     integrator = heyoka.taylor_adaptive(
-        list(zip(symbols, slopes, strict=True)),
+        taylor_system(model)[0],
         state=states,
         pars=constants,
         fp_type=real,

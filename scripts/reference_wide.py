@@ -2,9 +2,9 @@
 
 Two derivations of the equations, both integrated as Taylor series by heyoka.py:
 
-* nine body components of the upward normal u, the angular velocity ω and the velocity v_g of the centre of mass, with
-  the normal force R from v_p · u = 0 (`slopes_and_force`).  With u3 as a state they are smooth at u3 = 0, where the
-  body topples.  They give the spins of the table, and the events that end a motion;
+* that of `data/benchmark/example_scipy.py`: nine body components of the upward normal u, the angular velocity ω and the
+  velocity v_g of the centre of mass, with the normal force R from v_p · u = 0.  With u3 as a state they are smooth at
+  u3 = 0, where the body topples.  They give the spins of the table, and the events that end a motion;
 * the package's own seven equations, traced.  The difference of the two is the uncertainty of the spins.
 
     python scripts/reference_wide.py data/reference_wide.csv [SEED]
@@ -20,8 +20,9 @@ from typing import Any
 
 import heyoka
 import numpy as np
+from benchmark_references import UNIT, example, fastest_period
 from numpy.typing import NDArray
-from tracing import traced_rhs
+from tracing import taylor_system
 
 from sweep.models.ladder import slip
 
@@ -35,16 +36,12 @@ TOLERANCE, OTHER_TOLERANCE = 1e-16, 1e-15
 SAMPLES = 64
 """Samples of the normal force in a period of the fastest rocking."""
 
-UNIT = 2.0**-100
-"""All states that vanish in upright spin are integrated in these units.  heyoka's tolerance is relative to the largest
-state, and so it is relative to the rattle, however small that gets."""
-
 U3, OMEGA3 = 2, 5
 SCALE = np.array([1.0 if i in (U3, OMEGA3) else UNIT for i in range(9)])
 OTHER_SCALE = np.array([1.0 if i == slip.MODEL.spin_state else UNIT for i in range(7)])
 
 ENDS = ("lift_off", "paradox", "toppled")
-"""The events that end a motion, in the order in which `own_system` lists them."""
+"""The events that end a motion, in the order in which `own_integrator` lists them."""
 
 SAME_END = 1e-6
 """Largest difference allowed between the two runs' times of the end."""
@@ -82,95 +79,20 @@ def draw(seed: int) -> list[Cell]:
 # --- nine equations ---------------------------------------------------------------------------
 
 
-def body(cell: Cell) -> tuple[Array, Array]:
-    """The matrix A of the squared semi-axes in the axes of inertia, and the principal moments."""
-    a2, b2, c2 = cell["a"] ** 2, cell["b"] ** 2, cell["c"] ** 2
-    cos, sin = np.cos(cell["delta"]), np.sin(cell["delta"])
-    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    return turn.T @ np.diag([a2, b2, c2]) @ turn, np.array([b2 + c2, a2 + c2, a2 + b2]) / 5
-
-
 def height_squared(cell: Cell) -> float:
     """(z/c)² of the contact point at the start; negative if (x0, y0) lies outside the body."""
-    A, _ = body(cell)
-    flat = np.array([cell["x0"], cell["y0"]])
-    return float(1 - flat @ np.linalg.inv(A)[:2, :2] @ flat)
-
-
-def constants(cell: Cell) -> list[float]:
-    """A11, A12, A22, A33, I1, I2, I3, μ."""
-    A, inertia = body(cell)
-    return [A[0, 0], A[0, 1], A[1, 1], A[2, 2], *inertia, cell["mu"]]
-
-
-def start(cell: Cell) -> Array:
-    """Contact at (x0, y0), ω = n0 u, no slip velocity."""
-    A, _ = body(cell)
-    x_p = np.array([cell["x0"], cell["y0"], cell["c"] * np.sqrt(height_squared(cell))])
-    u = -np.linalg.inv(A) @ x_p
-    u /= np.linalg.norm(u)
-    return np.concatenate([u, cell["n0"] * u, np.cross(x_p, cell["n0"] * u)])
-
-
-def fastest_period(cell: Cell) -> float:
-    """Period of the faster rocking about upright rest without slip."""
-    A, inertia = body(cell)
-    c = cell["c"]
-    # A tilt φ about the x and y axes raises the centre of mass by φᵀ stiffness φ / 2; the inertia is I + c².
-    stiffness = (np.array([[A[1, 1], -A[0, 1]], [-A[0, 1], A[0, 0]]]) - c**2 * np.eye(2)) / c
-    squares = np.linalg.eigvals(stiffness / (inertia[:2, None] + c**2))
-    return float(2 * np.pi / np.sqrt(squares.real.max()))
-
-
-def cross(a: Any, b: Any) -> list[Any]:
-    """a × b."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def dot(a: Any, b: Any) -> Any:
-    """a · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def slopes_and_force(state: Any, p: Any, sqrt: Any) -> tuple[list[Any], Any, Any]:
-    """Derivatives of (u, ω, v_g), and numerator and Painlevé denominator of R; of numbers, arrays or symbols.
-
-    With the force R g, g = u - μ v_p, Newton's and Euler's equations are v_g' = R g - u - ω × v_g and
-    ω' = R β + α.  They enter (v_p · u)' = 0 with v_p = v_g - x_p × ω, which is linear in R.
-    """
-    u, omega, v_g = state[0:3], state[3:6], state[6:9]
-    A11, A12, A22, A33, *inertia, mu = p
-
-    def shape(w: Any) -> list[Any]:
-        return [A11 * w[0] + A12 * w[1], A12 * w[0] + A22 * w[1], A33 * w[2]]
-
-    of_u = shape(u)
-    height = sqrt(dot(u, of_u))
-    x_p = [-component / height for component in of_u]
-    du = cross(u, omega)
-    along = dot(x_p, du)
-    dx_p = [(x * along - s) / height for x, s in zip(x_p, shape(du), strict=True)]
-    v_p = [v - w for v, w in zip(v_g, cross(x_p, omega), strict=True)]
-
-    g = [n - mu * v for n, v in zip(u, v_p, strict=True)]
-    spin = [moment * w for moment, w in zip(inertia, omega, strict=True)]
-    alpha = [torque / moment for torque, moment in zip(cross(spin, omega), inertia, strict=True)]
-    beta = [torque / moment for torque, moment in zip(cross(x_p, g), inertia, strict=True)]
-    drift = [-n - w for n, w in zip(u, cross(omega, v_g), strict=True)]
-    lever = cross(u, x_p)
-    numerator = dot(cross(dx_p, omega), u) - dot(v_p, du) - dot(drift, u) + dot(lever, alpha)
-    denominator = dot(g, u) - dot(lever, beta)
-    R = numerator / denominator
-    d_omega = [al + R * be for al, be in zip(alpha, beta, strict=True)]
-    dv_g = [R * push + d for push, d in zip(g, drift, strict=True)]
-    return [*du, *d_omega, *dv_g], numerator, denominator
+    (A11, A22, _, A12), *_ = example.slipping_body(cell)
+    x, y = cell["x0"], cell["y0"]
+    return float(1 - (A22 * x * x - 2 * A12 * x * y + A11 * y * y) / (A11 * A22 - A12 * A12))
 
 
 def own_integrator(tolerance: float) -> Any:
     """Integrator of the nine equations in multiples of `SCALE`; R = 0, its pole and u3 = 0 stop it."""
     symbols = heyoka.make_vars("u1", "u2", "u3", "w1", "w2", "w3", "v1", "v2", "v3")
     states = [symbol * unit for symbol, unit in zip(symbols, SCALE, strict=True)]
-    slopes, numerator, denominator = slopes_and_force(states, [heyoka.par[i] for i in range(8)], heyoka.sqrt)
+    par = heyoka.par
+    body = [par[i] for i in range(4)], [par[i] for i in range(4, 7)], par[7]
+    slopes, numerator, denominator = example.pressed(states, body, heyoka)
     return heyoka.taylor_adaptive(
         [(symbol, slope * (1 / unit)) for symbol, slope, unit in zip(symbols, slopes, SCALE, strict=True)],
         state=np.zeros(9),
@@ -189,17 +111,19 @@ def sample_times(cell: Cell) -> Array:
 
 def own_run(cell: Cell, integrator: Any) -> tuple[Array, float, str, float]:
     """Spins at `TIMES` (NaN after the end), the least normal force seen, the end and its time."""
-    times, p = sample_times(cell), constants(cell)
+    times, body = sample_times(cell), example.slipping_body(cell)
+    shape, inertia, mu = body
     integrator.time = 0.0
     integrator.reset_cooldowns()
-    integrator.state[:], integrator.pars[:] = start(cell) / SCALE, p
+    integrator.state[:] = np.array(example.slipping_start(cell, body)) / SCALE
+    integrator.pars[:] = [*shape, *inertia, mu]
     outcome, *_, states = integrator.propagate_grid(times)
     states = (states * SCALE).T
-    _, numerator, denominator = slopes_and_force(states, p, np.sqrt)
+    _, numerator, denominator = example.pressed(states, body, np)
     at = np.searchsorted(times, TIMES)
     spins = np.full(len(TIMES), np.nan)
     reached = at < states.shape[1]
-    spins[reached] = dot(states[:3], states[3:6])[at[reached]]
+    spins[reached] = example.dot(states[:3], states[3:6])[at[reached]]
     ends = dict(enumerate(ENDS)) | {-int(heyoka.taylor_outcome.time_limit.value) - 1: "time_limit"}
     # Where R has a pole just ahead, its states may become infinite before the event is found.
     end = ends.get(-int(outcome.value) - 1, "singular")
@@ -222,14 +146,10 @@ def least(times: Array, values: Array) -> float:
 
 def traced_integrator(tolerance: float) -> Any:
     """Integrator of the package's slip model in multiples of `OTHER_SCALE`."""
-    symbols = heyoka.make_vars(*slip.MODEL.states)
-    states = tuple(symbol * unit for symbol, unit in zip(symbols, OTHER_SCALE, strict=True))
-    count = len(slip.Constants._fields)
-    slopes, _ = traced_rhs(slip.MODEL, heyoka.sqrt)(states, tuple(heyoka.par[i] for i in range(count)))
     return heyoka.taylor_adaptive(
-        [(symbol, slope * (1 / unit)) for symbol, slope, unit in zip(symbols, slopes, OTHER_SCALE, strict=True)],
+        taylor_system(slip.MODEL, OTHER_SCALE)[0],
         state=np.zeros(7),
-        pars=np.ones(count),
+        pars=np.ones(len(slip.Constants._fields)),
         tol=tolerance,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
@@ -15,6 +15,21 @@ def traced_rhs(model: Model, sqrt: Callable[[Any], Any]) -> Callable[..., Any]:
     """The right-hand side of `model`, with `sqrt` in the place of numpy's; its constants are a tuple in their order."""
     rhs = _traced(model.rhs, SimpleNamespace(sqrt=sqrt))
     return lambda y, p: rhs(y, model.constants(*p))
+
+
+def taylor_system(model: Model, scale: Sequence[float] | None = None) -> tuple[list[tuple[Any, Any]], tuple[Any, ...]]:
+    """The equations of `model` for heyoka, and what else its right-hand side tells, as symbols.
+
+    Its constants are heyoka's parameters, in their order; its states are in multiples of `scale`, by default of one.
+    """
+    import heyoka
+
+    symbols, units = heyoka.make_vars(*model.states), scale if scale is not None else [1.0] * len(model.states)
+    states = tuple(symbol * unit for symbol, unit in zip(symbols, units, strict=True))
+    constants = tuple(heyoka.par[i] for i in range(len(model.constants._fields)))
+    slopes, others = traced_rhs(model, heyoka.sqrt)(states, constants)
+    scaled = [slope * (1 / unit) for slope, unit in zip(slopes, units, strict=True)]
+    return list(zip(symbols, scaled, strict=True)), others
 
 
 def _traced(function: Any, numbers: Any) -> Any:

@@ -106,6 +106,11 @@ def slipping_start(case, body, numbers=math):
 
 def slipping(state, body, numbers=math):
     """The derivatives of u, ω and v_g."""
+    return pressed(state, body, numbers)[0]
+
+
+def pressed(state, body, numbers=math):
+    """The derivatives of u, ω and v_g; and the numerator and the denominator of the normal force R."""
     u, omega, v_g = state[0:3], state[3:6], state[6:9]
     shape, inertia, mu = body
     du, x_p, dx_p = contact(u, omega, shape, numbers)
@@ -117,8 +122,9 @@ def slipping(state, body, numbers=math):
     # (v_p · u)' = 0 with ω' = turning + R pushed, v_g' = falling + R force
     without = add(falling, scaled(-1, cross(dx_p, omega)), scaled(-1, cross(x_p, turning)))
     by_force = add(force, scaled(-1, cross(x_p, pushed)))
-    R = -(dot(without, u) + dot(v_p, du)) / dot(by_force, u)
-    return [*du, *add(turning, scaled(R, pushed)), *add(falling, scaled(R, force))]
+    numerator, denominator = -(dot(without, u) + dot(v_p, du)), dot(by_force, u)
+    R = numerator / denominator
+    return [*du, *add(turning, scaled(R, pushed)), *add(falling, scaled(R, force))], numerator, denominator
 
 
 def moment_of(omega, inertia):

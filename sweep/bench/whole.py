@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -44,7 +42,7 @@ PLACES: dict[Place, str] = {
 COMPARED = 16
 """Cells of a run that are compared with a tight one."""
 
-BASE = "friction: {mu: 60.0}\n"
+BASE = {"friction": {"mu": 60.0}}
 """The configuration of all runs, whose other values are the paper's; what differs is given beside it."""
 
 REFERENCE = {"mu": np.linspace(20, 200, 46), "b": np.linspace(1.2, 9.8, 44), "n0": np.array([0.02, 0.05, 0.1])}
@@ -55,9 +53,8 @@ REFERENCE = {"mu": np.linspace(20, 200, 46), "b": np.linspace(1.2, 9.8, 44), "n0
 class WholeRun:
     """Runs of one configuration, and where their time went."""
 
-    file: Path
     settings: dict[str, Any]
-    """What replaces values of the file: the axes as arrays, and method and t_end among others."""
+    """What replaces values of `BASE`: the axes as arrays, and method and t_end among others."""
     shares: list[dict[str, float]] = field(default_factory=list)
     """Seconds by share, one entry for each run."""
     dataset: xr.Dataset | None = None
@@ -70,7 +67,7 @@ class WholeRun:
 
     def __call__(self) -> None:
         with stopwatch(PLACES) as seconds:
-            self.dataset = run(self.file, **self.settings, verify=0.0)
+            self.dataset = run(BASE, **self.settings, verify=0.0)
         self.shares.append(seconds)
 
     def share(self, *names: str) -> Spread:
@@ -92,22 +89,19 @@ class WholeRun:
 def whole(effort: Effort) -> BenchSection:
     """Time of whole runs beside that of their kernels, and what takes the rest."""
     section = BenchSection("Whole runs", name="whole")
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "bench.yaml"
-        file.write_text(BASE, encoding="utf-8")
-        runs = list(_runs(file, effort))
-        some = REFERENCE | {"mu": REFERENCE["mu"][: effort.reference_frictions]}
-        reference = WholeRun(file, some | {"method": AUTO, "t_end": LONGEST})
-        for settings in (*({"method": method} for method in METHODS), reference.settings):
-            run(file, **settings | {"t_end": 1.0})  # compiles the kernels
-        times = list(in_turn(dict(enumerate(runs)), effort).values())
-        total = in_turn({AUTO: reference}, Effort(repeats=1))[AUTO]
+    runs = list(_runs(effort))
+    some = REFERENCE | {"mu": REFERENCE["mu"][: effort.reference_frictions]}
+    reference = WholeRun(some | {"method": AUTO, "t_end": LONGEST})
+    for settings in (*({"method": method} for method in METHODS), reference.settings):
+        run(BASE, **settings | {"t_end": 1.0})  # compiles the kernels
+    times = list(in_turn(dict(enumerate(runs)), effort).values())
+    total = in_turn({AUTO: reference}, Effort(repeats=1))[AUTO]
     section.tables += [_beside_kernel(runs, times, section), _by_share(reference, total.median, section)]
     section.panels.append(partial(_draw, runs=runs, times=times))
     return section
 
 
-def _runs(file: Path, effort: Effort) -> Iterator[WholeRun]:
+def _runs(effort: Effort) -> Iterator[WholeRun]:
     """Runs of squares of distinct bodies, to `T_END` and to the end."""
     for name, method in METHODS.items():
         # A method whose stability limits the step takes too long for more than a few to the end.
@@ -116,7 +110,7 @@ def _runs(file: Path, effort: Effort) -> Iterator[WholeRun]:
             for cells in sizes:
                 side = round(cells**0.5)
                 mu, b = np.linspace(20, 200, side), np.linspace(1.2, 9.8, side)
-                yield WholeRun(file, {"mu": mu, "b": b, "method": name, "t_end": t_end})
+                yield WholeRun({"mu": mu, "b": b, "method": name, "t_end": t_end})
 
 
 def _beside_kernel(runs: list[WholeRun], times: list[Spread], section: BenchSection) -> Table:

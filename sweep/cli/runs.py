@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from sweep.config import Config
     from sweep.results.folder import RunFiles
+    from sweep.studies.kept import Task
 
 
 def _either(context: click.Context, parameter: click.Parameter, value: Any) -> Any:  # noqa: ARG001
@@ -69,7 +70,7 @@ def _resumed(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--rerun", type=click.Choice(["failed", "limit"]),
               help="Simulate again only those cells of the dataset that failed, or that reached t_end.")  # fmt: skip
 @_resumed
-def run(config: Config, rerun: str | None, fresh: bool, **how: Any) -> None:
+def run(config: Config, rerun: str | None, **how: Any) -> None:
     """Run the sweep that CONFIG describes.
 
     Writes NAME.nc (the dataset) and NAME.png (its maps), where NAME is the name of the run, and a
@@ -81,8 +82,8 @@ def run(config: Config, rerun: str | None, fresh: bool, **how: Any) -> None:
     from sweep.engine.run import run as run_sweep
     from sweep.results.summary import failed_fraction
 
-    work = partial(run_sweep, config, fresh=fresh, rerun=rerun)
-    if (result := _written(config, "run", work, lambda: estimate(config), **how)) is None:
+    work = partial(run_sweep, config, rerun=rerun)
+    if (result := _written(config, "run", work, partial(estimate, config), **how)) is None:
         return
     failed = failed_fraction(result)
     if failed > config.max_failed_fraction:
@@ -165,21 +166,16 @@ def animate(
 @click.option("--deviation", type=click.FloatRange(1e-9), default=BOUNDARY_DEVIATION, show_default=True,
               help="Distance of a curve from its boundary between two points, in lengths of the axes.")  # fmt: skip
 @_resumed
-def boundaries(
-    config: Config, x: str | None, y: str | None, width: float, deviation: float, fresh: bool, **how: Any
-) -> None:
+def boundaries(config: Config, x: str | None, y: str | None, width: float, deviation: float, **how: Any) -> None:
     """Find the curves over two axes of CONFIG on which the number of reversals changes.
 
     The cells of the grid tell where the curves pass, and further simulations how exactly: each point lies between
     two simulated cells.  Writes NAME_boundaries.nc and .png.  If it is interrupted, finished simulations are kept,
     and the same command resumes the search.
     """
-    from sweep.studies import estimates
     from sweep.studies.boundaries import boundaries as search
-    from sweep.studies.kept import kept
 
-    work = partial(kept, search(config, x, y, width, deviation), fresh=fresh)
-    _written(config, "boundaries", work, lambda: estimates.of_boundaries(config, x, y), **how)
+    _studied(search(config, x, y, width, deviation), **how)
 
 
 @click.command()
@@ -187,37 +183,31 @@ def boundaries(
 @click.option("--width", type=click.FloatRange(1e-12, 0.5), default=SPIN_WIDTH, show_default=True,
               help="Relative width of the brackets of n_c2.")  # fmt: skip
 @_resumed
-def critical(config: Config, width: float, fresh: bool, **how: Any) -> None:
+def critical(config: Config, width: float, **how: Any) -> None:
     """Find the critical spins over all axes of CONFIG but n0.
 
     They come from the paper's formulas, n_c1 also from the model's eigenvalues, and n_c2 from simulation.
     Writes NAME_critical.nc and .png.  If it is interrupted, finished simulations are kept, and the
     same command resumes the search.
     """
-    from sweep.studies import estimates
     from sweep.studies.critical import critical as search
-    from sweep.studies.kept import kept
 
-    work = partial(kept, search(config, width), fresh=fresh)
-    _written(config, "critical", work, lambda: estimates.of_critical(config), **how)
+    _studied(search(config, width), **how)
 
 
 @click.command()
 @configured
 @_resumed
-def indices(config: Config, fresh: bool, **how: Any) -> None:
+def indices(config: Config, **how: Any) -> None:
     """Tell on which of the uncertain parameters of CONFIG its results depend.
 
     CONFIG is of one scene, with a distribution for each parameter that is uncertain.  Sobol indices say how much of the
     variance of counts and times comes from each.  Writes NAME_indices.nc and .png.  If it is interrupted, finished
     simulations are kept, and the same command resumes.
     """
-    from sweep.engine.estimate import estimate
     from sweep.studies.indices import indices as find
-    from sweep.studies.kept import kept
 
-    task = find(config)
-    _written(config, "indices", partial(kept, task, fresh=fresh), lambda: estimate(task.config), **how)
+    _studied(find(config), **how)
 
 
 @click.command()
@@ -272,9 +262,17 @@ def _save(config: Config, verb: str, result: xr.Dataset, output: Path | None) ->
     return files
 
 
+def _studied(task: Task, **how: Any) -> None:
+    """Carry out a study, as `_written`."""
+    from sweep.studies import estimates
+    from sweep.studies.kept import kept
+
+    _written(task.config, task.verb, partial(kept, task), partial(estimates.of, task), **how)
+
+
 def _written(
     config: Config, verb: str, work: Callable[..., xr.Dataset], estimate: Callable[[], str], *,
-    dry_run: bool, output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
+    fresh: bool, dry_run: bool, output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
 ) -> xr.Dataset | None:  # fmt: skip
     """Carry out `work`, show its progress, and say what it found and wrote; of a dry run, only the estimate."""
     if dry_run:
@@ -289,10 +287,11 @@ def _written(
     with Terminal(quiet) as terminal:
         try:
             with connected(workers, scheduler) as cluster:
-                result = work(output=folder, reporter=terminal, cluster=cluster)
+                result = work(output=folder, fresh=fresh, reporter=terminal, cluster=cluster)
         except KeyboardInterrupt:
             done = f"{terminal.last.done:.0f} of {terminal.last.cells} cells" if terminal.last else "no cells"
-            kept = f"the same command resumes the {'run' if verb == 'run' else 'search'}"
+            command = "the same command without --fresh" if fresh else "the same command"
+            kept = f"{command} resumes the {'run' if verb == 'run' else 'search'}"
             terminal.note(f"interrupted: {done} finished and kept; {kept}")
             sys.exit(INTERRUPTED)
     if not quiet:

@@ -15,7 +15,7 @@ from sweep.plots import labels, lines, scales
 from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
 from sweep.plots.panels import MAX_PANELS
 from sweep.plots.theory import Line
-from sweep.results.margins import OPEN, smoothed
+from sweep.results.margins import OPEN, distinct, smoothed
 
 _OPEN: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "markeredgecolor": "0.3"}
 """How points are drawn at which no boundary was found."""
@@ -57,9 +57,9 @@ def curves(dataset: xr.Dataset, x: str, y: str) -> Iterator[tuple[int, Array, Ar
         part = dataset.isel(point=((dataset["curve"] == number) & (dataset["outcome"] != OPEN)).values)
         if not part.sizes["point"]:
             continue
-        places = [axis.straight(part[axis.name].values) / span for axis, span in zip(axes, spans, strict=True)]
+        places = np.array([axis.straight(part[axis.name].values) / s for axis, s in zip(axes, spans, strict=True)])
         closed = bool((part["closed"] == 1).all()) and len(part.point) == int((dataset["curve"] == number).sum())
-        xs, ys = smoothed(*places, closed=closed)
+        xs, ys = smoothed(*places[:, distinct(*places, closed=closed)], closed=closed)
         yield int(part["level"][0]), axes[0].bent(xs * spans[0]), axes[1].bent(ys * spans[1])
 
 

@@ -22,6 +22,9 @@ FOUND, OPEN, UNCERTAIN = range(3)
 # by 0.174 with 0.9 here, by 0.175 with 0.999, and by 0.213 if all margins are taken for distances.
 _NO_DIP = 0.98
 
+# Points of a curve that are nearer to each other than this, in lengths of the axes, are one.
+_SAME = 1e-9
+
 POINTS = {
     "level": Variable("int16", "1", "number of spin reversals that begins at the point"),
     "curve": Variable("int32", "1", "number of the curve to which the point belongs; points are in order along it"),
@@ -113,12 +116,22 @@ class Counts:
         return range(int(found.min()) + 1, int(found.max()) + 1) if found.size else range(0)
 
 
+def distinct(x: Array, y: Array, *, closed: bool) -> Array:
+    """Tell which points of a curve do not lie on the next one; parameters as of `smoothed`.
+
+    Points coincide where a cell of the grid lies on the boundary itself: they are found on several of its edges.
+    """
+    apart = np.hypot(np.roll(x, -1) - x, np.roll(y, -1) - y) > _SAME
+    apart[-1:] |= not closed
+    return np.asarray(apart)
+
+
 def smoothed(x: Array, y: Array, *, closed: bool, parts: int = 8) -> tuple[Array, Array]:
     """A smooth curve through points in order: cubic between two points, with the slopes of parabolas at them.
 
     Parameters
     ----------
-    x, y : in units in which the distances of points across and upwards can be compared, shape (points,)
+    x, y : in lengths of the axes, of `distinct` points, shape (points,)
     closed : whether the curve goes on from the last point to the first
     parts : straight lines that are drawn between two points
     """
@@ -128,7 +141,6 @@ def smoothed(x: Array, y: Array, *, closed: bool, parts: int = 8) -> tuple[Array
     if closed:
         points = np.concatenate([points[-2:], points, points[:3]])
     steps = np.hypot(*np.diff(points, axis=0).T)
-    points, steps = points[np.append(True, steps > 0)], steps[steps > 0]
     along = np.append(0.0, np.cumsum(steps))
     spline = CubicHermiteSpline(
         along, points, np.gradient(points, along, axis=0, edge_order=2 if len(points) > 2 else 1)

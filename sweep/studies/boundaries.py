@@ -36,7 +36,7 @@ def boundaries(config: Config, x: str | None, y: str | None, width: float, devia
     across = chosen_axes(config, x, y)
     words = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
     make = partial(Boundaries, across=across, width=width, deviation=deviation)
-    return Task(measuring(config), __name__, words, make)
+    return Task(measuring(config), "boundaries", words, make)
 
 
 def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]:

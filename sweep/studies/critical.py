@@ -39,7 +39,7 @@ _FARTHEST = 8.0
 def critical(config: Config, width: float) -> Task:
     """What `sweep.api.critical` asks for."""
     words = f"width of the brackets: {width!r}"
-    return Task(searchable(config), __name__, words, partial(CriticalSpins, width=width))
+    return Task(searchable(config), "critical", words, partial(CriticalSpins, width=width))
 
 
 def searchable(config: Config) -> Config:

@@ -16,7 +16,7 @@ import numpy as np
 
 from sweep.axis import Axis
 from sweep.grid import Array
-from sweep.results.margins import FOUND, OPEN, UNCERTAIN, smoothed
+from sweep.results.margins import FOUND, OPEN, UNCERTAIN, distinct, smoothed
 from sweep.studies.roots import Root
 
 # How much farther from an expected place the next two cells are, where the last two lie on one side of the curve.
@@ -207,8 +207,8 @@ class Curve:
         """Take in the middles of which new cells are known, and look at those between points that have been found."""
         settled = {before: middle.settled(deviation) for before, middle in self.middles.items()}
         self._insert({before: point for before, point in settled.items() if isinstance(point, Point)})
-        rank = {id(point): i for i, point in enumerate(self.points)}
         found, places = self._found()
+        rank = self._ranks(found)
         if len(found) < (3 if self.closed else 2):
             return
         after = np.roll(places, -1, axis=0)[: None if self.closed else -1]
@@ -220,7 +220,7 @@ class Curve:
         new = {}
         for i in np.flatnonzero(long > _FARTHER * deviation).tolist():
             this, following = found[i], found[(i + 1) % len(found)]
-            if (rank[id(following)] - rank[id(this)]) % len(self.points) != 1:
+            if (rank[id(following)] - rank[id(this)]) % len(rank) != 1:
                 continue  # a point between them is being looked for
             if (middle := self.middles.get(id(this))) is None:
                 middle = self._middle(this, expected[i], (places[i], after[i]), deviation)
@@ -246,11 +246,20 @@ class Curve:
         self.middles = {before: middle for before, middle in self.middles.items() if before not in after}
 
     def _found(self) -> tuple[list[Point], Array]:
-        """The points that have been found, each once, and their places, shape (points, 2), in lengths of the axes."""
+        """The points that have been found, of those at one place the last, and their places, shape (points, 2).
+
+        Places are in lengths of the axes.
+        """
         found = [point for point in self.points if point.found]
         places = np.array([self._place(point) for point in found]).reshape(-1, 2)
-        apart = np.append(True, np.hypot(*np.diff(places, axis=0).T) > 0)[: len(found)]
-        return [point for point, here in zip(found, apart, strict=True) if here], places[apart]
+        apart = distinct(*places.T, closed=self.closed)
+        return [point for point, last in zip(found, apart, strict=True) if last], places[apart]
+
+    def _ranks(self, found: list[Point]) -> dict[int, int]:
+        """How many points come before each of `found` and of those being looked for, by `id`."""
+        kept = {*map(id, found)}
+        counted = (point for point in self.points if id(point) in kept or not point.found)
+        return {id(point): i for i, point in enumerate(counted)}
 
     def _place(self, point: Point) -> Array:
         middle = point.parameters(point.root.expected)

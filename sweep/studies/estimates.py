@@ -1,12 +1,12 @@
-"""Says what a search would take, from the cells of its first round, before anything is computed."""
+"""Says what a study would take, from the cells of its first round, before anything is computed."""
 
 from __future__ import annotations
 
-from sweep.config import Config
 from sweep.engine.estimate import estimate as of_run
 from sweep.results.store import Store
-from sweep.studies import SPIN_WIDTH, boundaries, critical
-from sweep.studies.search import measuring
+from sweep.studies.boundaries import Boundaries
+from sweep.studies.critical import CriticalSpins
+from sweep.studies.kept import Task
 
 _A_POINT = 8
 """Simulations that narrow a bracket of a boundary to the usual width, as a rule."""
@@ -15,33 +15,26 @@ _A_SPIN = 4
 """Simulations that narrow the bracket of a critical spin to the usual width, as a rule."""
 
 
-def of_boundaries(config: Config, x: str | None = None, y: str | None = None) -> str:
-    """Cells, steps, memory and time of the grid of a search for boundaries, a line each; what comes then.
+def of(task: Task) -> str:
+    """Cells, steps, memory and time of the first round of a study, a line each, and what comes then."""
+    study = task.make(task.config, Store())
+    if isinstance(study, Boundaries):
+        return _of_boundaries(study)
+    return _of_critical(study) if isinstance(study, CriticalSpins) else of_run(study.config)
 
-    Raises
-    ------
-    ConfigError
-        as `boundaries`.
-    """
-    across = boundaries.chosen_axes(config, x, y)
+
+def _of_boundaries(search: Boundaries) -> str:
+    """The grid of a search for boundaries; what comes then."""
     words = f"then:   about {_A_POINT} simulations for each point where a curve crosses a line of the grid, "
-    words += f"over {across[0]} and {across[1]}, and 2 or more between two points"
-    return f"{of_run(measuring(config))}\n{words}"
+    words += f"over {search.across[0]} and {search.across[1]}, and 2 or more between two points"
+    return f"{of_run(search.config)}\n{words}"
 
 
-def of_critical(config: Config) -> str:
-    """Bodies of a search for critical spins; cells, steps, memory and time of its first round; what comes then.
-
-    Raises
-    ------
-    ConfigError
-        as `critical`.
-    """
-    config = critical.searchable(config)
-    grid = config.grid
+def _of_critical(search: CriticalSpins) -> str:
+    """Bodies of a search for critical spins; its first round; what comes then."""
+    grid = search.grid
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one body"
     bodies = f"bodies: {grid.size} ({axes}), each with spins of both signs"
-    search = critical.CriticalSpins(config, Store(), SPIN_WIDTH)
     if not search.spins:
         return f"{bodies}; none has an n_c1 from which to search"
     search.rounds.append(search.ask())

@@ -40,7 +40,7 @@ VARIABLES = {
 
 def indices(config: Config) -> Task:
     """What `sweep.api.indices` asks for."""
-    return Task(designed(config), __name__, "Sobol indices", Indices)
+    return Task(designed(config), "indices", "Sobol indices", Indices)
 
 
 def designed(config: Config) -> Config:

@@ -28,8 +28,8 @@ class Task(NamedTuple):
     """A study that is asked for."""
 
     config: Config
-    maker: str
-    """Its module, by which it is identified beside the configuration, and after which files are named."""
+    verb: str
+    """Its command, after which its files and its module in `sweep.studies` are named."""
     settings: str
     """Its own settings, in words."""
     make: Callable[[Config, Store], Study]
@@ -40,8 +40,8 @@ def kept(
     task: Task, output: str | Path | None, *, fresh: bool, reporter: Reporter, cluster: Cluster | None
 ) -> xr.Dataset:
     """The dataset that a study finds, or what an earlier one of the same identity has left in the folder `output`."""
-    config, maker, settings, make = task
-    run = identify(config, maker)
+    config, verb, settings, make = task
+    run = identify(config, f"sweep.studies.{verb}")
     identity = replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
 
     def search(store: Store) -> xr.Dataset:
@@ -52,7 +52,7 @@ def kept(
 
     if output is None:
         return search(Store())
-    files = RunFiles(Path(output), f"{config.name}_{maker.rpartition('.')[2]}")
+    files = RunFiles(Path(output), f"{config.name}_{verb}")
     with files.locked():
         if fresh:
             files.discard()

@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from itertools import product
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -20,17 +18,17 @@ from sweep.engine import executor, final
 from sweep.engine.checks import results
 from sweep.engine.errors import keep_tolerance
 from sweep.engine.executor import UNTIL_ALL_STOP, Work, nominal_seconds
-from sweep.engine.plan import plan
+from sweep.engine.plan import plan, steps_of
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.faults import fault_of, suggestion
-from sweep.grid import SAMPLE, Array
+from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
 from sweep.kernels import path
 from sweep.kernels.build import PATH
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK
-from sweep.kernels.methods import METHODS, PLAIN, automatic_step
+from sweep.kernels.methods import METHODS, PLAIN
 from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
 from sweep.models.model import OWN, Columns, Model, take
@@ -191,10 +189,8 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
     """Trajectories, steps, samples and time, a line each; parameters and errors as of `trajectory`."""
     chosen = choose(config, at, samples)
     columns, integrator = chosen.grid.columns(), chosen.integrator
-    model, step = chosen.equations, integrator.step
-    steps = np.full(chosen.grid.size, integrator.t_end)
-    steps /= automatic_step(integrator.method, model, columns, integrator.tolerance)[0] if step == "auto" else step
-    samples = (integrator.t_end / _intervals(model, columns)).sum()
+    steps = integrator.t_end / steps_of(integrator.method, chosen, columns)[0]
+    samples = (integrator.t_end / _intervals(chosen.equations, columns)).sum()
     seconds = _PASSES * nominal_seconds(steps) + samples * _SAMPLE_SECONDS
     return "\n".join(
         [
@@ -220,17 +216,16 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
         plain = config.integrator.model_copy(update={"method": PLAIN, "step": "auto"})
         config = replace(config, integrator=plain)
     dataset.check_names(config, SERIES)
-    wanted = _numbers(config, at)
-    table = {name: values for name, values in config.cases.items() if samples and name not in wanted}
-    drawn = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)] or [{}]
-    if (count := prod(map(len, wanted.values())) * len(drawn)) > MAX_TRAJECTORIES:
-        raise fault_of(f"{count} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")
+    wanted = {name: np.array(values) for name, values in _numbers(config, at).items()}
+    drawn = {name: np.array(values) for name, values in config.cases.items() if samples and name not in wanted}
     config = config.at_medians
-    constants = {name: v.numbers[0] for name, v in config.parameters.items()}
-    constants |= {name: column[0] for name, column in config.cases.items()}
-    cells = [dict(zip(wanted, values, strict=True)) | row for values in product(*wanted.values()) for row in drawn]
-    cases = {name: tuple(cell.get(name, constant) for cell in cells) for name, constant in constants.items()}
-    chosen = replace(config, parameters={}, cases=cases)
+    firsts = {name: v.numbers[0] for name, v in config.parameters.items()}
+    firsts |= {name: column[0] for name, column in config.cases.items()}
+    grid = Grid(wanted, {name: v for name, v in firsts.items() if name not in {*wanted, *drawn}}, drawn)
+    if grid.size > MAX_TRAJECTORIES:
+        raise fault_of(f"{grid.size} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")
+    columns = grid.columns()
+    chosen = replace(config, parameters={}, cases={name: tuple(columns[name].tolist()) for name in firsts})
     if beyond := unfit(chosen) or misplaced(chosen):
         raise fault_of(beyond)
     return chosen

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import netCDF4
 import pytest
@@ -62,6 +63,21 @@ def test_dry_run_computes_and_writes_nothing(write: Write, tmp_path: Path) -> No
     assert result.exit_code == 0
     assert [line.split(":")[0] for line in result.stdout.splitlines()] == ["cells", "steps", "memory", "time"]
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("command", "what"), [("run", "run"), ("critical", "search")])
+@pytest.mark.parametrize(("options", "again"), [([], ""), (["--fresh"], " without --fresh")])
+def test_the_command_that_resumes_is_told(
+    command: str, what: str, options: list[str], again: str, write: Write, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sweep.engine.cluster.connected", interrupt)
+    result = invoke(command, write(), "--output", tmp_path, *options)
+    assert result.exit_code == 130
+    assert result.stderr == f"interrupted: no cells finished and kept; the same command{again} resumes the {what}\n"
 
 
 def test_too_many_failures(write: Write, tmp_path: Path) -> None:

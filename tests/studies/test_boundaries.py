@@ -20,7 +20,7 @@ from sweep.grid import Array
 from sweep.kernels.status import SETTLED
 from sweep.plots import levels as drawn
 from sweep.plots import picture
-from sweep.results.margins import FOUND, OPEN, Counts, smoothed
+from sweep.results.margins import FOUND, OPEN, Counts, distinct, smoothed
 from sweep.results.store import Store
 from sweep.studies.boundaries import Boundaries
 from sweep.studies.curve import Cell, Curve, Point
@@ -135,28 +135,51 @@ def test_a_spin_that_comes_no_nearer_to_zero_tells_no_distance_from_the_next_cou
     np.testing.assert_allclose(expected, begins, atol=0.03)  # 0.13 to 0.25 off if margins were distances
 
 
-@pytest.mark.parametrize("width", [1e-6, 0.1])
-def test_both_ends_of_each_bracket_are_simulated_with_their_errors(width: float) -> None:
-    """With simulations that a formula replaces: one reversal begins where mu = 70 + b."""
+def searched(
+    distance: Callable[[Array, Array], Array], axes: Mapping[str, list[float]], width: float
+) -> tuple[Boundaries, set[tuple[float, float]]]:
+    """A search whose simulations a formula of mu and b replaces, and the places with their errors, as (mu, b)."""
 
     class Formula(Store):
         def load(self, tile: int) -> dict[str, Array]:
-            cells = search.rounds[tile]
-            distance = cells["mu"] - 70 - cells["b"]
-            more, fewer = np.where(distance > 0, np.nan, -distance), np.where(distance > 0, distance, np.nan)
-            found = {"status": np.full(len(more), SETTLED), "reversals": (distance > 0) * 1.0}
-            return found | {"margin_more": more, "margin_fewer": fewer, "seconds": np.array(0.0), "cpu": np.array("x")}
+            found = distance(search.rounds[tile]["mu"], search.rounds[tile]["b"])
+            more, fewer = np.where(found > 0, np.nan, -found), np.where(found > 0, found, np.nan)
+            cells = {"status": np.full(len(more), SETTLED), "reversals": (found > 0) * 1.0}
+            return cells | {"margin_more": more, "margin_fewer": fewer, "seconds": np.array(0.0), "cpu": np.array("x")}
 
-    config = measuring(sweep.load_config(SCENE, AXES))
-    search = Boundaries(config, Formula(), ("b", "mu"), width, 0.01)
+    search = Boundaries(measuring(sweep.load_config(SCENE, axes)), Formula(), ("b", "mu"), width, 0.01)
     sure: set[tuple[float, float]] = set()
     while search.grow(lambda _: 1000):
         if search.estimates:
-            sure |= set(zip(search.rounds[-1]["b"].tolist(), search.rounds[-1]["mu"].tolist(), strict=True))
+            sure |= set(zip(search.rounds[-1]["mu"].tolist(), search.rounds[-1]["b"].tolist(), strict=True))
+    return search, sure
+
+
+@pytest.mark.parametrize("width", [1e-6, 0.1])
+def test_both_ends_of_each_bracket_are_simulated_with_their_errors(width: float) -> None:
+    search, sure = searched(lambda mu, b: mu - 70 - b, AXES, width)
     points = [point for curve in search.curves for point in curve.points]
     assert len(points) == 2
     for point in points:
-        assert {(p["b"], p["mu"]) for p in map(point.parameters, (point.root.low, point.root.high))} <= sure
+        assert {(p["mu"], p["b"]) for p in map(point.parameters, (point.root.low, point.root.high))} <= sure
+
+
+@pytest.mark.parametrize(("sign", "size", "length"), [(1, 1.2, 0.2), (1, 4.0, 1.0), (-1, 2.0, 1.0)])
+def test_a_curve_through_cells_of_the_grid_is_followed_all_around(sign: int, size: float, length: float) -> None:
+    """Points on two edges that meet in such a cell are the same, or differ by rounding."""
+
+    def distance(mu: Array, b: Array) -> Array:
+        u, v = (mu - 60) / 10, b - 4
+        return np.asarray(sign * (size - (u - v) ** 2 - length * (u + v) ** 2))
+
+    axes = {"mu": [40.0, 50.0, 60.0, 70.0, 80.0], "b": [2.0, 3.0, 4.0, 5.0, 6.0]}
+    (curve,) = searched(distance, axes, 1e-6)[0].curves
+    places = np.array([[point.parameters(point.root.expected)[name] for name in axes] for point in curve.points])
+    np.testing.assert_allclose(distance(*places.T), 0, atol=1e-4)
+    ways = np.hypot(*((np.roll(places, -1, axis=0) - places) / [40, 4]).T)
+    long = [point for point, way in zip(curve.points, ways, strict=True) if way > 0.1]
+    assert len(long) >= 8
+    assert all(curve.middles[id(point)].confirmed for point in long)
 
 
 @pytest.mark.parametrize("closed", [False, True])
@@ -167,6 +190,15 @@ def test_smooth_curves_pass_through_their_points_and_near_a_circle(closed: bool)
     np.testing.assert_allclose(np.hypot(x, y)[inner], 1, atol=3e-4)
     assert min(np.hypot(x - 1, y)) < 1e-12
     assert np.hypot(x[-1] - x[0], y[-1] - y[0]) < (1e-9 if closed else 0.3)
+
+
+@pytest.mark.parametrize(("closed", "kept"), [(False, [1, 2, 4, 5]), (True, [1, 2, 4])])
+def test_of_points_at_one_place_a_curve_takes_the_last(closed: bool, kept: list[int]) -> None:
+    """The first two differ by rounding, and the last one lies on the first where the curve is closed."""
+    x, y = np.array([[0.0, 1e-16, 1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0, 1.0, 0.0]])
+    last = distinct(x, y, closed=closed)
+    assert np.flatnonzero(last).tolist() == kept
+    assert len(smoothed(x[last], y[last], closed=closed, parts=2)[0]) == 2 * (len(kept) - (not closed)) + 1
 
 
 def test_both_ends_of_each_bracket_count_what_another_method_counts(found: xr.Dataset) -> None:
