@@ -140,7 +140,7 @@ def trajectory(
     chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_when_settled": stops}))
     with blamed(chosen.origin):
         found = _followed(chosen, every, reporter or Reporter())
-    if not samples:
+    if not samples or not load_config(config).distributions.keys() - at.keys():
         return found
     numbers = np.arange(found.sizes["trajectory"]) % samples
     return found.assign_coords({SAMPLE: ("trajectory", numbers, {"long_name": dataset.ROWS[SAMPLE]})})

@@ -174,6 +174,8 @@ def test_trajectories_of_samples_are_those_of_the_run_and_drawn_as_bands(write: 
         "b = 2, median of 5 samples", "b = 3, median of 5 samples", "95% of them", "68% of them",
     ]  # fmt: skip
     assert sweep.trajectory(scene, samples=3, n0=0.05, t_end=10).n0.values.tolist() == [0.05] * 3
+    named = {"samples": 3, "t_end": 10, **dict.fromkeys(sweep.load_config(scene).distributions, 0.02)}
+    assert "sample" not in sweep.trajectory(scene, **named).coords
     with pytest.raises(sweep.ConfigError, match="samples: needs a parameter that is a distribution"):
         sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, samples=3)
 
