@@ -17,7 +17,7 @@ import distributed
 import psutil
 import pytest
 import xarray as xr
-from support import ROOT
+from support import ROOT, Write
 from support.cli import invoke
 from support.kernels import threads
 from support.runs import Stop, same_numbers
@@ -50,10 +50,8 @@ def _two_threads() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("config") / "tiles.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return path
+def config(kept: Write) -> Path:
+    return kept(TEXT, "tiles.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ import numba
 import numpy as np
 import pytest
 from click.testing import Result
-from support import SMALL
+from support import SMALL, Write
 from support.cli import invoke, refused
 from support.same import contents
 
@@ -44,10 +44,8 @@ def _many_tiles() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("config") / "small.yaml"
-    path.write_text(SMALL + "verify: 0.3\n", encoding="utf-8")
-    return path
+def config(kept: Write) -> Path:
+    return kept(SMALL + "verify: 0.3\n")
 
 
 @pytest.fixture(scope="module")

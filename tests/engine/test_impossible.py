@@ -38,10 +38,8 @@ def swept(*given: Any, **settings: Any) -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def edge(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    path = tmp_path_factory.mktemp("edge") / "small.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return swept(path)
+def edge(kept: Write) -> xr.Dataset:
+    return swept(kept(TEXT))
 
 
 def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> None:

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, to_rgb
 from matplotlib.figure import Figure
+from support import Write
 from support.cli import invoke, refused
 from support.figures import constants, entries, made
 
@@ -335,11 +336,10 @@ def test_numbers_along_a_further_dimension_get_panels() -> None:
     assert len(maps(picture.plot(more, "reversal_times"))) == 2
 
 
-def test_a_sweep_of_too_many_panels_is_not_drawn(tmp_path: Path) -> None:
+def test_a_sweep_of_too_many_panels_is_not_drawn(write: Write, tmp_path: Path) -> None:
     axes = ["b=2..2.4:5", "mu=40..44:5", "n0=0.01..0.03:3", "delta=0.01..0.03:3", "t_end=5"]
-    (tmp_path / "many.yaml").write_text("friction: {mu: 60}\n", encoding="utf-8")
     settings = [part for axis in axes for part in ("--set", axis)]
-    result = invoke("run", tmp_path / "many.yaml", "--output", tmp_path / "out", *settings)
+    result = invoke("run", write("friction: {mu: 60}\n", "many.yaml"), "--output", tmp_path / "out", *settings)
     assert result.exit_code == 0
     assert "no picture: 9 panels" in result.stderr
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["many.nc"]

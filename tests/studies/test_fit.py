@@ -59,11 +59,9 @@ def heading(body: Mapping[str, np.ndarray], law: str, start: np.ndarray, times: 
 
 
 @pytest.fixture(scope="module")
-def found(seen: tuple[np.ndarray, ...], tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    path = tmp_path_factory.mktemp("film") / "scene.yaml"
-    path.write_text(SCENE, encoding="utf-8")
+def found(seen: tuple[np.ndarray, ...], kept: Write) -> xr.Dataset:
     times, spins, _ = seen
-    return sweep.fit(path, Film(times, spins), ["mu", "n0"])
+    return sweep.fit(kept(SCENE), Film(times, spins), ["mu", "n0"])
 
 
 def test_samples_are_those_of_a_trajectory() -> None:
