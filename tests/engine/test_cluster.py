@@ -20,12 +20,11 @@ import xarray as xr
 from support import ROOT, Write
 from support.cli import invoke
 from support.kernels import threads
-from support.runs import Stop, same_numbers
+from support.runs import Heard, Stop, same_numbers
 from support.same import contents
 
 import sweep
 from sweep.engine.cluster import AHEAD, Cluster, connected
-from sweep.engine.reporter import Progress, Reporter
 from sweep.results.provenance import sources
 from sweep.results.store import StoreError
 
@@ -94,19 +93,6 @@ def completed(local: distributed.LocalCluster) -> int:
     return moves.count(("processing", "memory"))
 
 
-class AtFirst(Reporter):
-    """When the first tile is back, does something."""
-
-    def __init__(self, act: Callable[[], object]) -> None:
-        self.act, self.done = act, False
-
-    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
-        if not self.done:
-            self.done = True
-            time.sleep(0.1)  # into the next
-            self.act()
-
-
 def signal_busiest(number: int) -> Fault:
     """A fault that sends a signal to the worker that has most of the tiles."""
 
@@ -151,9 +137,15 @@ def test_workers_that_come_go_hang_and_lag_cost_only_their_tiles(
     ):
         client.wait_for_workers(2)
         client.run(slow_down, workers=list(client.scheduler_info(n_workers=-1)["workers"])[:1])
-        reporter = AtFirst(lambda: fault(client, local))
-        found = sweep.run(config, tmp_path, reporter=reporter, cluster=Cluster(client))
-        assert reporter.done
+
+        def when_the_first_is_back() -> None:
+            if len(heard.seen) == 1:
+                time.sleep(0.1)  # into the next
+                fault(client, local)
+
+        heard = Heard(when_the_first_is_back)
+        found = sweep.run(config, tmp_path, reporter=heard, cluster=Cluster(client))
+        assert heard.seen
         assert SMALL_TILES <= completed(local) <= SMALL_TILES + lost
     same_numbers(found, expected)
 

@@ -19,11 +19,11 @@ import pytest
 from click.testing import Result
 from support import SMALL, Write
 from support.cli import invoke, refused
+from support.runs import Heard, interrupt
 from support.same import contents
 
 import sweep
 from sweep.engine import executor, local
-from sweep.engine.reporter import Progress, Reporter
 from sweep.results import provenance
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.identity import Identity
@@ -55,26 +55,20 @@ def undisturbed(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[
     return contents(out)
 
 
-class StopInTheSecondGroup(Reporter):
-    """Interrupts once a group of tiles is finished and images of the next are saved."""
-
-    def __init__(self, checkpoint: Path) -> None:
-        self.running, self.last_of_first = checkpoint / "running.npz", checkpoint / "000002.npz"
-
-    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
-        if self.last_of_first.exists() and 3 in np.load(self.running)["tiles"]:
-            raise KeyboardInterrupt
-
-
 @pytest.fixture(scope="module")
 def half(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What an interrupted run leaves: three finished tiles, images of the three others."""
     out = tmp_path_factory.mktemp("half")
-    stop = StopInTheSecondGroup(out / "small.checkpoint")
+    running, last_of_first = (out / "small.checkpoint" / name for name in ("running.npz", "000002.npz"))
+
+    def stop_in_the_second_group() -> None:
+        if last_of_first.exists() and 3 in np.load(running)["tiles"]:
+            interrupt()
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(executor, "_rescale", lambda *_: 20)
         with pytest.raises(KeyboardInterrupt):
-            sweep.run(config, out, reporter=stop)
+            sweep.run(config, out, reporter=Heard(stop_in_the_second_group))
     return out
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import ROOT, Write
-from support.runs import Stop, same_numbers
+from support.runs import Heard, Stop, same_numbers
 
 import sweep
 from sweep import StoreError
@@ -28,7 +28,7 @@ CASES = BODY.replace("b: [2.0, 3.0, 5.0], ", "") + "cases: cases.csv\nstart: {x0
 def grown(write: Write, output: Path, *texts: str, **options: Any) -> tuple[xr.Dataset, list[str]]:
     """The dataset after runs of these configurations in one folder, and what the last of them says."""
     for text in texts:
-        reporter = Stop(10**6)
+        reporter = Heard()
         found = sweep.run(write(text), output, reporter=reporter, **options)
     return found, reporter.notes
 

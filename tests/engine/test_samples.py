@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 from support import Write
 from support.cli import invoke, refused
-from support.runs import Stop, same_numbers
+from support.runs import Heard, Stop, same_numbers
 
 import sweep
 from sweep.config.distributions import Distribution, drawn
@@ -111,7 +111,7 @@ def test_intervals_of_random_samples_hold_as_often_as_they_say() -> None:
 
 @pytest.mark.usefixtures("no_pictures")
 def test_more_samples_take_over_the_fewer(write: Write, tmp_path: Path) -> None:
-    more, reporter = SCENE.replace("32", "48"), Stop(10**6)
+    more, reporter = SCENE.replace("32", "48"), Heard()
     sweep.run(write(SCENE), tmp_path)
     found = sweep.run(write(more), tmp_path, reporter=reporter)
     assert reporter.notes[0].startswith("64 of 96 cells are taken over")
@@ -125,7 +125,7 @@ def widest(dataset: xr.Dataset) -> float:
 
 
 def test_sampling_stops_when_every_probability_is_known_so_closely(write: Write, tmp_path: Path) -> None:
-    sparing, reporter = write(SCENE.replace("samples: 32", "until: 0.1\nverify: 0.05")), Stop(10**6)
+    sparing, reporter = write(SCENE.replace("samples: 32", "until: 0.1\nverify: 0.05")), Heard()
     found = sweep.run(sparing, tmp_path, reporter=reporter)
     assert found.sizes["sample"] == 128
     assert widest(found) <= 0.1 < widest(sweep.run(sparing, until=None, samples=64))

@@ -16,7 +16,7 @@ import xarray as xr
 from support import Write
 from support.cli import invoke
 from support.nursery import Runs
-from support.runs import Stop, same_numbers
+from support.runs import Heard, same_numbers
 
 import sweep
 
@@ -117,7 +117,7 @@ def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkey
 
 
 def test_progress_is_told(config: Path) -> None:
-    following = Stop(10**9)
+    following = Heard()
     sweep.trajectory(config, mu=[60, 75], t_end=3000, reporter=following)
     done = [progress.done for progress in following.seen]
     assert done == sorted(done)
