@@ -179,13 +179,11 @@ def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
     assert abs(found.value.values[1] - 0.05) < 1e-3
 
 
-UPRIGHT: dict[str, Any] = {"x0": 0.0, "y0": 0.0, "mu": 0.3, "speed": 0.5}
-
-
 def test_a_steady_spin_cannot_be_told_from_the_bias_of_a_gyroscope(write: Write) -> None:
     times = np.arange(0, 2, 1 / 60)
     film = Film(times, noisy(np.full(len(times), 5.3), 0.02), what="gyroscope")
-    found = sweep.fit(write(STONE), film, ["n0", "film_bias"], n0=[4.5, 5.5], **UPRIGHT)
+    upright = {"n0": [4.5, 5.5], "x0": 0.0, "y0": 0.0, "mu": 0.3, "speed": 0.5}
+    found = sweep.fit(write(STONE), film, ["n0", "film_bias"], **upright)
     assert "film_bias and n0 are known only together" in found.attrs["undetermined"]
     assert found.value.sum().item() == pytest.approx(5.3, abs=0.01)
 
