@@ -15,8 +15,6 @@ from support import ENDS, ROOT, Write
 from support.kernels import kernel, threads
 from support.runs import run_cells
 
-import sweep
-from sweep.engine.estimate import estimate
 from sweep.jit import Cached, showing
 from sweep.kernels import build as builder
 from sweep.kernels.build import build
@@ -89,16 +87,6 @@ def test_what_is_compiled_is_shown(started: list[tuple[str, ...]]) -> None:
         build([kernel()])
     build([kernel()])
     assert told == ["begins", 2]
-
-
-def test_an_estimate_compiles_nothing(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
-        raise AssertionError("compiled")
-
-    monkeypatch.setattr(Cached, "__call__", refuse)
-    monkeypatch.setattr(builder, "_start", refuse)
-    told = estimate(sweep.load_config(write(AUTO)))
-    assert [line.split(":")[0] for line in told.splitlines()] == ["cells", "steps", "memory", "time"]
 
 
 def test_measurements_without_a_place_in_the_kernel_share_it() -> None:

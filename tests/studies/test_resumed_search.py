@@ -9,7 +9,6 @@ import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 import xarray as xr
@@ -96,24 +95,6 @@ def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_
     assert invoke(*command, "--width", "0.01", "--fresh").exit_code == 0
     assert xr.load_dataset(tmp_path / "standard_critical.nc").relative_width == 0.01
     assert invoke(*command, "--set", "n0=0.3", "--width", "0.01").exit_code == 0  # no critical spin depends on it
-
-
-def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: Any, **__: Any) -> None:
-        raise AssertionError("computed")
-
-    monkeypatch.setattr("sweep.kernels.kernel.Kernel.advance", fail)
-    out = tmp_path / "out"
-    told = invoke("critical", config, "--dry-run", "--output", out)
-    assert told.exit_code == 0
-    words = [line.split(":")[0] for line in told.stdout.splitlines()]
-    assert words == ["bodies", "cells", "steps", "memory", "time", "then"]
-    assert "6 (mu 3 × b 2)" in told.stdout
-    told = invoke("trajectory", config, "--at", "mu=60", "--at", "mu=75", "--dry-run", "--output", out)
-    assert told.exit_code == 0
-    assert [line.split(":")[0] for line in told.stdout.splitlines()] == ["trajectories", "steps", "samples", "time"]
-    assert "2" in told.stdout.splitlines()[0]
-    assert not out.exists()
 
 
 def test_progress_is_told(config: Path) -> None:
