@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -97,61 +97,46 @@ def _listed(folder: Path) -> list[Path]:
         return []
 
 
-class Moments:
-    """When to strike, told from the names of the files: each method says whether it is now."""
+def moments(watch: Watch) -> dict[str, Callable[[], bool]]:
+    """When to strike, told from the names of the files."""
 
-    def __init__(self, watch: Watch) -> None:
-        self.watch = watch
-        self.before = self._images()
-        self.tiles = len(self._tiles())
-
-    def _images(self) -> int:
+    def images() -> int:
         try:
-            return (self.watch.folder / "small.checkpoint" / "running.npz").stat().st_mtime_ns
+            return (watch.folder / "small.checkpoint" / "running.npz").stat().st_mtime_ns
         except FileNotFoundError:
             return 0
 
-    def _tiles(self) -> list[str]:
-        return [name for name in self.watch.names if name.startswith("0")]
+    def tiles() -> int:
+        return sum(name.startswith("0") for name in watch.names)
 
-    def _unfinished(self, *names: str) -> bool:
-        return any(name.endswith(".part") and name.startswith(names) for name in self.watch.names)
+    def unfinished(*names: str) -> bool:
+        return any(name.endswith(".part") and name.startswith(names) for name in watch.names)
 
-    def start(self) -> bool:
-        """The lock is taken, no chunk is done."""
-        return ".small.lock" in self.watch.names
-
-    def kernel(self) -> bool:
-        """A chunk is done and saved, the next one is at work."""
-        return self._images() != self.before and not self._unfinished(".")
-
-    def checkpoint(self) -> bool:
-        return self._images() != self.before and self._unfinished(".running", ".0")
-
-    def tile(self) -> bool:
-        """A tile is saved, others of its group are not."""
-        return len(self._tiles()) > self.tiles
-
-    def dataset(self) -> bool:
-        return self._unfinished(".small.nc")
-
-    def files(self) -> bool:
-        """The dataset is there, its picture is not."""
-        return "small.nc" in self.watch.names and "small.png" not in self.watch.names
-
-    def picture(self) -> bool:
-        return self._unfinished(".small.png")
+    images_before, tiles_before = images(), tiles()
+    return {
+        # The lock is taken, no chunk is done.
+        "start": lambda: ".small.lock" in watch.names,
+        # A chunk is done and saved, the next one is at work.
+        "kernel": lambda: images() != images_before and not unfinished("."),
+        "checkpoint": lambda: images() != images_before and unfinished(".running", ".0"),
+        # A tile is saved, others of its group are not.
+        "tile": lambda: tiles() > tiles_before,
+        "dataset": lambda: unfinished(".small.nc"),
+        # The dataset is there, its picture is not.
+        "files": lambda: "small.nc" in watch.names and "small.png" not in watch.names,
+        "picture": lambda: unfinished(".small.png"),
+    }
 
 
 def strike(runs: Runs, undisturbed: dict[str, bytes], moment: str, with_signal: int, delay: float = 0.0) -> Any:
     """Send the signal to the command at the moment, and look at its files until then and after."""
     watch = Watch(runs.out, undisturbed)
     watch.look()
-    it_is = getattr(Moments(watch), moment)
+    it_is = moments(watch)[moment]
 
     def now() -> bool:
         watch.look()
-        return bool(it_is())
+        return it_is()
 
     process = runs.strike(now, with_signal, delay=delay)
     watch.look()
@@ -222,7 +207,7 @@ def test_killed_at_any_moment(write: Write, tmp_path: Path, text: str, wanted: C
 
 
 @pytest.mark.parametrize(
-    "moments",
+    "when",
     [
         ("kernel", "dataset"),
         pytest.param(("kernel", "checkpoint", "kernel", "dataset"), marks=pytest.mark.campaign),
@@ -230,8 +215,8 @@ def test_killed_at_any_moment(write: Write, tmp_path: Path, text: str, wanted: C
     ],
     ids=["some", "many", "late"],
 )
-def test_interrupted(runs: Runs, undisturbed: dict[str, bytes], moments: tuple[str, ...]) -> None:
-    for moment in moments:
+def test_interrupted(runs: Runs, undisturbed: dict[str, bytes], when: tuple[str, ...]) -> None:
+    for moment in when:
         process = strike(runs, undisturbed, moment, signal.SIGINT)
         assert process is not None
         said = process.log.read_text()
@@ -325,7 +310,7 @@ def test_a_read_only_folder_is_reported(runs: Runs, undisturbed: dict[str, bytes
 
 def test_two_processes_at_once(runs: Runs, undisturbed: dict[str, bytes]) -> None:
     watch = Watch(runs.out, undisturbed)
-    now = Moments(watch).kernel
+    now = moments(watch)["kernel"]
     first = runs.start()
     while not now():
         assert first.is_alive()
