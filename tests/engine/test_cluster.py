@@ -1,6 +1,5 @@
 """Runs in other processes: the same files as by threads, whatever happens to the workers."""
 
-import importlib
 import os
 import signal
 import subprocess
@@ -11,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import dask
 import distributed
@@ -61,21 +61,11 @@ def by_threads(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 
 
 @contextmanager
-def patched(client: distributed.Client, module: str, name: str, value: Any) -> Iterator[None]:
-    """Another `module.name` in workers; those that are started anew meanwhile have their own."""
-
-    def put() -> None:
-        there = importlib.import_module(module)
-        there.kept = getattr(there, name)
-        setattr(there, name, value)
-
-    def put_back() -> None:
-        there = importlib.import_module(module)
-        setattr(there, name, getattr(there, "kept", getattr(there, name)))
-
-    client.run(put)
+def patched(client: distributed.Client, target: str, value: Any) -> Iterator[None]:
+    """Another `target` in workers; those that are started anew meanwhile have their own."""
+    client.run(lambda: mock.patch(target, value).start())
     yield
-    client.run(put_back)
+    client.run(mock.patch.stopall)
 
 
 def test_workers_of_a_scheduler_give_the_same_files(
@@ -183,7 +173,7 @@ def test_a_run_resumed_on_a_cluster_computes_what_is_missing(
 def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> None:
     # One worker may take all tiles, so each says both.
     types = iter(["one", "another"] * TILES)
-    with patched(client, "sweep.engine.local", "this_cpu", lambda: next(types)):
+    with patched(client, "sweep.engine.local.this_cpu", lambda: next(types)):
         dataset = sweep.run(config, cluster=Cluster(client), t_end=20)
     assert dataset.attrs["cpu"] == "another, one"
 
@@ -198,7 +188,7 @@ def test_another_program_in_a_worker_is_refused(
     own = list(sources())
     own[changed[0]] = changed[1]
     with (
-        patched(client, "sweep.engine.cluster", "sources", lambda: tuple(own)),
+        patched(client, "sweep.engine.cluster.sources", lambda: tuple(own)),
         pytest.raises(StoreError, match=f"tcp://.*: the worker has {said}"),
     ):
         sweep.run(config, cluster=Cluster(client))
@@ -208,7 +198,7 @@ def test_a_tile_that_kills_its_workers_is_reported(
     config: Path, client: distributed.Client, local: distributed.LocalCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(local.scheduler, "allowed_failures", 0)
-    with patched(client, "sweep.engine.cluster", "run_batch", lambda *_: os._exit(1)):
+    with patched(client, "sweep.engine.cluster.run_batch", lambda *_: os._exit(1)):
         with pytest.raises(StoreError, match="workers died computing it"):
             sweep.run(config, cluster=Cluster(client))
         client.wait_for_workers(2)
