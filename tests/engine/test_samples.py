@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 from support import Write
 from support.cli import invoke, refused
+from support.figures import maps
 from support.runs import Heard, Stop, same_numbers
 
 import sweep
@@ -262,8 +263,8 @@ def test_bars_curves_and_maps_of_probabilities(write: Write) -> None:
         expected = np.bincount(here, minlength=two.sizes["count"] + 1) / 32
         np.testing.assert_allclose([bar.get_height() for bar in axes.patches], expected, atol=1e-12)
     several = sweep.run(write(SCENE), t_end=300, b=np.linspace(2, 6, 5), mu=np.linspace(40, 200, 5), samples=4)
-    assert maps(sweep.plot(several)) == min(several.sizes["count"], 3)
-    assert maps(sweep.plot(several, sel={"count": 1})) == 1
+    assert len(maps(sweep.plot(several))) == min(several.sizes["count"], 3)
+    assert len(maps(sweep.plot(several, sel={"count": 1}))) == 1
     source = Source(several)
     shown = source.map("probability", "b", "mu", {"sample": 2, "count": 0})
     np.testing.assert_array_equal(shown.values, several["probability"].transpose("mu", "b", "count")[..., 0])
@@ -286,10 +287,3 @@ def test_the_probability_of_a_chosen_count(write: Write, given: bool) -> None:
     bars = drawn_of(two.isel(b=1))
     np.testing.assert_allclose([bar.get_height() for bar in bars.patches], [1 - shares[1], shares[1]], atol=1e-12)
     assert [text.get_text() for text in bars.get_xticklabels()] == ["fewer", "2 reversals or more"]
-
-
-def maps(figure: Figure) -> int:
-    return sum(
-        bool(axes.collections) and axes.get_label() != "<colorbar>" and len(axes.get_title()) > 0
-        for axes in figure.axes
-    )

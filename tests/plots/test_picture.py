@@ -9,10 +9,9 @@ import pytest
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, to_rgb
-from matplotlib.figure import Figure
 from support import Write
 from support.cli import invoke, refused
-from support.figures import constants, entries, made
+from support.figures import constants, entries, made, maps
 
 import sweep
 from sweep.kernels.status import DIVERGED, TIME_LIMIT
@@ -20,10 +19,6 @@ from sweep.plots import panels, picture, scales
 from sweep.plots.hatches import outline
 from sweep.results.dataset import VARIABLES, described
 from sweep.results.netcdf import open_dataset, write
-
-
-def maps(figure: Figure) -> list[Axes]:
-    return [axes for axes in figure.axes if axes.get_xlabel() or axes.get_title()]
 
 
 def mesh(axes: Axes) -> Any:
@@ -77,7 +72,7 @@ def test_the_lightness_of_colours_tells_values_apart() -> None:
     assert (steps * np.repeat([1, -1], 10) > 0.01).all()  # darker on both sides
 
 
-@pytest.mark.parametrize("top", [1, 6, 16, 33, 41, 200, 3000])
+@pytest.mark.parametrize("top", [1, 6, 16, 30, 33, 41, 60, 207, 3000])
 def test_every_count_has_a_colour_and_high_ones_are_told_apart(top: int) -> None:
     scale = scales.counts(np.arange(top + 1))
     assert isinstance(scale.norm, BoundaryNorm)
@@ -85,9 +80,12 @@ def test_every_count_has_a_colour_and_high_ones_are_told_apart(top: int) -> None
     assert scale.norm.boundaries[-1] > top
     assert scale.norm.extend == "neither"
     assert scale.norm.Ncmap <= 24
-    # No range is wider than four fifths of the count at which it begins.
-    first = scale.norm.boundaries[:-1] + 0.5
-    assert (np.diff(scale.norm.boundaries) <= np.maximum(1, 0.8 * first)).all()
+    # No range is wider than four fifths of the count at which it begins, and they become wider in round steps.
+    first, widths = scale.norm.boundaries[:-1] + 0.5, np.diff(scale.norm.boundaries).astype(int)
+    assert (widths <= np.maximum(1, 0.8 * first)).all()
+    assert (np.diff(widths) >= 0).all()
+    assert (first[widths > 1] % np.gcd(widths[widths > 1], 10) == 0).all()
+    assert all(words == f"{round(at)}" for at, words in (scale.ticks or {}).items())
     assert len({tuple(c) for c in scale.rgba(first)}) == len(first)
 
 
