@@ -6,6 +6,7 @@ import os
 import platform
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ import numba
 import pytest
 import xarray as xr
 from hypothesis import settings
-from support import SMALL
+from support import SMALL, Write
 from support.kernels import default_measures, kernel
 
 import sweep
@@ -69,11 +70,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session")
-def small(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+def small(kept: Write) -> xr.Dataset:
     """The dataset of the sweep of twelve cells."""
-    path = tmp_path_factory.mktemp("small") / "small.yaml"
-    path.write_text(SMALL, encoding="utf-8")
-    return sweep.run(path)
+    return sweep.run(kept())
 
 
 @pytest.fixture(scope="session")
@@ -120,12 +119,18 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Callable[..., Path]:
+def write(tmp_path: Path) -> Write:
     """Writes a configuration, by default a sweep of twelve cells, and returns its path."""
+    return partial(_written, lambda: tmp_path)
 
-    def write_config(text: str = SMALL, name: str = "small.yaml") -> Path:
-        path = tmp_path / name
-        path.write_text(text, encoding="utf-8")
-        return path
 
-    return write_config
+@pytest.fixture(scope="session")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Write:
+    """As `write`, for the fixtures of whole files: each configuration is in a folder of its own."""
+    return partial(_written, lambda: tmp_path_factory.mktemp("kept"))
+
+
+def _written(folder: Callable[[], Path], text: str = SMALL, name: str = "small.yaml") -> Path:
+    path = folder() / name
+    path.write_text(text, encoding="utf-8")
+    return path

@@ -58,10 +58,30 @@ def test_help_tells_every_verb_and_exit_code() -> None:
     assert "PATH=VALUE" in invoke("run", "--help").stdout
 
 
-def test_dry_run_computes_and_writes_nothing(write: Write, tmp_path: Path) -> None:
-    result = invoke("run", write(), "--output", tmp_path / "out", "--dry-run")
-    assert result.exit_code == 0
-    assert [line.split(":")[0] for line in result.stdout.splitlines()] == ["cells", "steps", "memory", "time"]
+DRY_RUNS = {
+    "run": ["cells:  12 (mu 2 × b 3 × n0 2)", "steps", "memory", "time"],
+    "run --set method=auto --set mu=[1,1000]": ["cells:  12", "steps", "memory", "time"],
+    "critical": ["bodies: 6 (mu 2 × b 3)", "cells", "steps", "memory", "time", "then"],
+    "boundaries": ["cells:  12", "steps", "memory", "time", "then:   about 8 simulations for each point"],
+    "trajectory --at mu=40 --at mu=60": ["trajectories: 2", "steps", "samples", "time"],
+}
+"""Commands, and how each of the lines that they say begins."""
+
+
+@pytest.mark.parametrize(("command", "words"), DRY_RUNS.items())
+def test_a_dry_run_compiles_computes_and_writes_nothing(
+    command: str, words: list[str], write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise AssertionError("compiled or computed")
+
+    for name in ("jit.Cached.__call__", "kernels.build._start", "kernels.kernel.Kernel.advance"):
+        monkeypatch.setattr(f"sweep.{name}", fail)
+    verb, *options = command.split()
+    result = invoke(verb, write(), *options, "--output", tmp_path / "out", "--dry-run")
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert [line[: len(word)] for line, word in zip(lines, words, strict=True)] == words
     assert not (tmp_path / "out").exists()
 
 

@@ -9,6 +9,7 @@ from support import ROOT
 from support.cli import invoke, refused
 
 import sweep
+from sweep.plots.quantities import check_pictures
 
 TOY = ("--mass", "30g", "--length", "12.0±0.1cm", "--width", "3 cm", "--height", "15mm", "--angle", "2.0 +- 0.5 deg")
 
@@ -130,13 +131,14 @@ def test_every_configuration_is_listed_with_its_first_line() -> None:
 
 
 @pytest.mark.parametrize("name", [path.stem for path in CONFIGS])
-def test_a_copied_example_loads_and_is_not_overwritten(name: str, tmp_path: Path) -> None:
+def test_a_copied_example_loads_measures_what_it_draws_and_is_not_overwritten(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "new"
     assert invoke("examples", name, "--output", folder).exit_code == 0
     for copy in folder.iterdir():
         assert copy.read_bytes() == (ROOT / "configs" / copy.name).read_bytes()
     config = sweep.load_config(folder / f"{name}.yaml")
     assert (config.name, config.grid.size > 1) == (name, True)
+    check_pictures(config)
     (folder / f"{name}.yaml").write_text("mine", encoding="utf-8")
     refused(invoke("examples", name, "--output", folder), f"{name}.yaml: exists already; choose another folder")
     assert (folder / f"{name}.yaml").read_text(encoding="utf-8") == "mine"

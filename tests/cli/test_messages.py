@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 from support import Write
 from support.cli import invoke
-from support.runs import Stop
+from support.runs import Heard, Stop
 
 import sweep
 from sweep.config import load_config
@@ -148,7 +148,7 @@ def test_a_resumed_run_tells_how_many_cells_are_kept(write: Write, tmp_path: Pat
     with pytest.raises(KeyboardInterrupt):
         sweep.run(write(), tmp_path / "out", reporter=stopped)
     assert not any("resuming" in note for note in stopped.notes)
-    again = Stop(1000)
+    again = Heard()
     sweep.run(write(), tmp_path / "out", reporter=again)
     assert again.notes == ["resuming an earlier run: 0 of 12 cells finished, 12 under way"]
 

@@ -9,11 +9,10 @@ import pandas
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from support import ROOT, SMALL, Write
+from support import SMALL, Write
 
 from sweep import ConfigError, load_config
 from sweep.config.values import Range
-from sweep.plots.quantities import check_pictures
 
 
 def test_settings_replace_the_files_values(write: Write) -> None:
@@ -61,13 +60,6 @@ def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
         assert load_config(write(), same).fingerprint() == first
     for other in ({"mu": [40, 61]}, {"t_end": 1501}, {"step": 0.01}, {"measure": ["reversals"]}, {"y0": 0.02}):
         assert load_config(write(), other).fingerprint() != first
-
-
-@pytest.mark.parametrize("path", sorted((ROOT / "configs").glob("*.yaml")), ids=lambda p: p.stem)
-def test_the_configurations_we_ship_load_and_measure_what_they_draw(path: Path) -> None:
-    config = load_config(path)
-    assert config.grid.size > 1
-    check_pictures(config)
 
 
 CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"

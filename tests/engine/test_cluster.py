@@ -1,6 +1,5 @@
 """Runs in other processes: the same files as by threads, whatever happens to the workers."""
 
-import importlib
 import os
 import signal
 import subprocess
@@ -11,21 +10,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import dask
 import distributed
 import psutil
 import pytest
 import xarray as xr
-from support import ROOT
+from support import ROOT, Write
 from support.cli import invoke
 from support.kernels import threads
-from support.runs import Stop, same_numbers
+from support.runs import Heard, Stop, same_numbers
 from support.same import contents
 
 import sweep
 from sweep.engine.cluster import AHEAD, Cluster, connected
-from sweep.engine.reporter import Progress, Reporter
 from sweep.results.provenance import sources
 from sweep.results.store import StoreError
 
@@ -50,10 +49,8 @@ def _two_threads() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("config") / "tiles.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return path
+def config(kept: Write) -> Path:
+    return kept(TEXT, "tiles.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -64,21 +61,11 @@ def by_threads(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 
 
 @contextmanager
-def patched(client: distributed.Client, module: str, name: str, value: Any) -> Iterator[None]:
-    """Another `module.name` in workers; those that are started anew meanwhile have their own."""
-
-    def put() -> None:
-        there = importlib.import_module(module)
-        there.kept = getattr(there, name)
-        setattr(there, name, value)
-
-    def put_back() -> None:
-        there = importlib.import_module(module)
-        setattr(there, name, getattr(there, "kept", getattr(there, name)))
-
-    client.run(put)
+def patched(client: distributed.Client, target: str, value: Any) -> Iterator[None]:
+    """Another `target` in workers; those that are started anew meanwhile have their own."""
+    client.run(lambda: mock.patch(target, value).start())
     yield
-    client.run(put_back)
+    client.run(mock.patch.stopall)
 
 
 def test_workers_of_a_scheduler_give_the_same_files(
@@ -94,19 +81,6 @@ def completed(local: distributed.LocalCluster) -> int:
     log = local.scheduler.transition_log
     moves = [(start, end) for key, start, end, *_ in log if str(key).startswith("_work")]
     return moves.count(("processing", "memory"))
-
-
-class AtFirst(Reporter):
-    """When the first tile is back, does something."""
-
-    def __init__(self, act: Callable[[], object]) -> None:
-        self.act, self.done = act, False
-
-    def chunk(self, progress: Progress) -> None:  # noqa: ARG002
-        if not self.done:
-            self.done = True
-            time.sleep(0.1)  # into the next
-            self.act()
 
 
 def signal_busiest(number: int) -> Fault:
@@ -153,9 +127,15 @@ def test_workers_that_come_go_hang_and_lag_cost_only_their_tiles(
     ):
         client.wait_for_workers(2)
         client.run(slow_down, workers=list(client.scheduler_info(n_workers=-1)["workers"])[:1])
-        reporter = AtFirst(lambda: fault(client, local))
-        found = sweep.run(config, tmp_path, reporter=reporter, cluster=Cluster(client))
-        assert reporter.done
+
+        def when_the_first_is_back() -> None:
+            if len(heard.seen) == 1:
+                time.sleep(0.1)  # into the next
+                fault(client, local)
+
+        heard = Heard(when_the_first_is_back)
+        found = sweep.run(config, tmp_path, reporter=heard, cluster=Cluster(client))
+        assert heard.seen
         assert SMALL_TILES <= completed(local) <= SMALL_TILES + lost
     same_numbers(found, expected)
 
@@ -193,7 +173,7 @@ def test_a_run_resumed_on_a_cluster_computes_what_is_missing(
 def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> None:
     # One worker may take all tiles, so each says both.
     types = iter(["one", "another"] * TILES)
-    with patched(client, "sweep.engine.local", "this_cpu", lambda: next(types)):
+    with patched(client, "sweep.engine.local.this_cpu", lambda: next(types)):
         dataset = sweep.run(config, cluster=Cluster(client), t_end=20)
     assert dataset.attrs["cpu"] == "another, one"
 
@@ -208,7 +188,7 @@ def test_another_program_in_a_worker_is_refused(
     own = list(sources())
     own[changed[0]] = changed[1]
     with (
-        patched(client, "sweep.engine.cluster", "sources", lambda: tuple(own)),
+        patched(client, "sweep.engine.cluster.sources", lambda: tuple(own)),
         pytest.raises(StoreError, match=f"tcp://.*: the worker has {said}"),
     ):
         sweep.run(config, cluster=Cluster(client))
@@ -218,7 +198,7 @@ def test_a_tile_that_kills_its_workers_is_reported(
     config: Path, client: distributed.Client, local: distributed.LocalCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(local.scheduler, "allowed_failures", 0)
-    with patched(client, "sweep.engine.cluster", "run_batch", lambda *_: os._exit(1)):
+    with patched(client, "sweep.engine.cluster.run_batch", lambda *_: os._exit(1)):
         with pytest.raises(StoreError, match="workers died computing it"):
             sweep.run(config, cluster=Cluster(client))
         client.wait_for_workers(2)

@@ -1,5 +1,6 @@
 """A run that has grown simulates only what is missing, and ends with the dataset of a run of all cells at once."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import ROOT, Write
-from support.runs import Stop, same_numbers
+from support.runs import Heard, Stop, same_numbers
 
 import sweep
 from sweep import StoreError
@@ -28,39 +29,58 @@ CASES = BODY.replace("b: [2.0, 3.0, 5.0], ", "") + "cases: cases.csv\nstart: {x0
 def grown(write: Write, output: Path, *texts: str, **options: Any) -> tuple[xr.Dataset, list[str]]:
     """The dataset after runs of these configurations in one folder, and what the last of them says."""
     for text in texts:
-        reporter = Stop(10**6)
+        reporter = Heard()
         found = sweep.run(write(text), output, reporter=reporter, **options)
     return found, reporter.notes
 
 
-@pytest.mark.parametrize("method", ["dopri5", "auto"])
-@pytest.mark.parametrize("text", [MORE, LATER, LATER + "verify: 0.3\n"], ids=["more", "later", "verified"])
-def test_a_grown_run_is_the_run_of_all_at_once(write: Write, tmp_path: Path, text: str, method: str) -> None:
-    first, text = (each.replace("{t_end", f"{{method: {method}, t_end") for each in (ONE, text))
-    found, (note,) = grown(write, tmp_path / "out", first, text)
-    taken = int(note.split()[0])
-    assert taken == (12 if "3000" in text else taken)
-    assert 3 <= taken <= 12
-    assert found.attrs["taken_over"] in note
-    same_numbers(found, sweep.run(write(text)))
+SCENE = """\
+name: small
+units: SI
+gravity: 9.81
+body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
+friction: {law: coulomb, mu: 0.3, regularisation: tanh, speed: 0.02, sigma: 1.0e-4}
+start: {roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5]}
+integrator: {t_end: 1}
+"""
 
 
+def by(method: str, text: str) -> str:
+    return text.replace("{t_end", f"{{method: {method}, t_end")
+
+
+ANY = "([3-9]|1[0-2]) of 24"
 MEASURED = "measure: [reversals, {reversal_times: 3}]\n"
+SINGLE = "name: small\nfriction: {mu: 60}\nintegrator: {method: dopri5, t_end: 100}\n"
+FEWER = by("dopri5", ONE) + "measure: [reversals]\n"
+GROWN = {
+    "more": (ONE, MORE, "12 of 24"),
+    "later": (ONE, LATER, ANY),
+    "verified": (ONE, LATER + "verify: 0.3\n", ANY),
+    "more, dopri5": (by("dopri5", ONE), by("dopri5", MORE), "12 of 24"),
+    "later, dopri5": (by("dopri5", ONE), by("dopri5", LATER), ANY),
+    "verified, dopri5": (by("dopri5", ONE), by("dopri5", LATER) + "verify: 0.3\n", ANY),
+    "measured": (by("adams", ONE) + MEASURED, by("adams", MORE) + MEASURED, "12 of 24"),
+    "measured further": (FEWER, FEWER.replace("[reversals]", "[reversals, first_reversal]"), "0 of 12"),
+    "single": (SINGLE, SINGLE.replace("100", "300"), "0 of 1"),
+    # Axes that the paper's models do not have, each from one value to several.
+    "gravity": (SCENE, SCENE.replace("gravity: 9.81", "gravity: [1.62, 9.81]"), "2 of 4"),
+    "speed": (SCENE, SCENE.replace("speed: 0.02", "speed: [0.01, 0.02, 0.04]"), "2 of 6"),
+    "sigma": (SCENE, SCENE.replace("sigma: 1.0e-4", "sigma: {start: 0, stop: 1.0e-4, num: 3}"), "2 of 6"),
+    "mass": (SCENE, SCENE.replace("mass: 1.0", "mass: [0.5, 1.0]"), "2 of 4"),
+    "roll": (SCENE, SCENE.replace("roll: 0.5 deg", "roll: [0.5 deg, 1 deg]"), "2 of 4"),
+}
+"""A configuration, what it becomes, and how many cells are taken over."""
 
 
-def test_a_run_grows_whose_measurement_has_a_setting(write: Write, tmp_path: Path) -> None:
-    first, more = (text.replace("{t_end", "{method: adams, t_end") + MEASURED for text in (ONE, MORE))
-    found, (note,) = grown(write, tmp_path / "out", first, more)
-    assert note.startswith("12 of 24 cells are taken over")
-    same_numbers(found, sweep.run(write(more)))
-
-
-def test_a_single_cell_runs_on(write: Write, tmp_path: Path) -> None:
-    short = "name: small\nfriction: {mu: 60}\nintegrator: {method: dopri5, t_end: 100}\n"
-    long = short.replace("100", "300")
-    found, (note,) = grown(write, tmp_path / "out", short, long)
-    assert note.startswith("0 of 1 cells are taken over")
-    same_numbers(found, sweep.run(write(long)))
+@pytest.mark.parametrize(("first", "later", "taken"), GROWN.values(), ids=GROWN)
+def test_a_grown_run_is_the_run_of_all_at_once(
+    write: Write, tmp_path: Path, first: str, later: str, taken: str
+) -> None:
+    found, (note,) = grown(write, tmp_path / "out", first, later)
+    assert re.match(f"{taken} cells are taken over", note)
+    assert found.attrs.get("taken_over", note) in note
+    same_numbers(found, sweep.run(write(later)))
 
 
 def test_a_finer_range(write: Write, tmp_path: Path) -> None:
@@ -104,7 +124,7 @@ def test_the_time_limit_leaves_no_trace(write: Write, t_end: int) -> None:
 
 def test_what_adams_foresaw_is_not_taken_over(write: Write) -> None:
     """Near the limit it takes short steps where it would have leapt on to a later one."""
-    text = MORE.replace("{t_end", "{method: adams, t_end")
+    text = by("adams", MORE)
     short, later = sweep.run(write(text)), sweep.load_config(write(text.replace("3000", "6000")))
     assert (taken_over(later, short, None).cells >= 0).sum() > 5
     short["t_stop"] = 3000 - 100 * short["step"]
@@ -169,33 +189,6 @@ def test_another_law_of_friction_is_another_run(write: Write) -> None:
     assert "tanh" in reason_against(other, identify(mine), identify(other), there, None)
 
 
-SCENE = """\
-name: small
-units: SI
-gravity: 9.81
-body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
-friction: {law: coulomb, mu: 0.3, regularisation: tanh, speed: 0.02, sigma: 1.0e-4}
-start: {roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5]}
-integrator: {t_end: 1}
-"""
-GROWTHS = {
-    "gravity": ("gravity: 9.81", "gravity: [1.62, 9.81]"),
-    "speed": ("speed: 0.02", "speed: [0.01, 0.02, 0.04]"),
-    "sigma": ("sigma: 1.0e-4", "sigma: {start: 0, stop: 1.0e-4, num: 3}"),
-    "mass": ("mass: 1.0", "mass: [0.5, 1.0]"),
-    "roll": ("roll: 0.5 deg", "roll: [0.5 deg, 1 deg]"),
-}
-"""Axes that the paper's models do not have, each from one value to several."""
-
-
-@pytest.mark.parametrize("axis", GROWTHS)
-def test_a_scene_grows_along_its_own_axes(write: Write, tmp_path: Path, axis: str) -> None:
-    wider = SCENE.replace(*GROWTHS[axis])
-    found, (note,) = grown(write, tmp_path / "out", SCENE, wider)
-    assert note.startswith(f"2 of {found['status'].size} cells are taken over")
-    same_numbers(found, sweep.run(write(wider)))
-
-
 def test_a_scene_does_not_grow_into_another(write: Write, tmp_path: Path) -> None:
     """Neither another value of an axis nor another law, couple or kind of start may take over a cell."""
     grown(write, tmp_path / "out", SCENE)
@@ -204,14 +197,6 @@ def test_a_scene_does_not_grow_into_another(write: Write, tmp_path: Path) -> Non
     for change in changes:
         with pytest.raises(StoreError, match="not resumed"):
             grown(write, tmp_path / "out", SCENE.replace(*change))
-
-
-def test_a_further_measurement_needs_all_cells(write: Write, tmp_path: Path) -> None:
-    text = ONE.replace("{t_end", "{method: dopri5, t_end")
-    fewer, more = (text + f"measure: [reversals{more}]\n" for more in ("", ", first_reversal"))
-    found, (note,) = grown(write, tmp_path / "out", fewer, more)
-    assert note.startswith("0 of 12 cells are taken over")
-    same_numbers(found, sweep.run(write(more)))
 
 
 def test_rerun_computes_just_those_cells(write: Write, tmp_path: Path) -> None:

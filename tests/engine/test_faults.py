@@ -14,73 +14,37 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import ROOT, SMALL, nursery
+from support import ROOT, SMALL, Write
+from support.nursery import Runs
 from support.runs import same_numbers
 from support.same import contents, without_clock
 
 TEXT = SMALL + "verify: 0.3\n"
 
-Start = Callable[..., Any]
-
 
 @pytest.fixture(scope="module")
-def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("config") / "small.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return path
-
-
-@dataclass
-class Runs:
-    """The command `run CONFIG --output OUT`, again and again."""
-
-    config: Path
-    out: Path
-    started: list[Any] = field(default_factory=list)
-
-    def start(self, *arguments: str, **settings: Any) -> Any:
-        """A process that runs it."""
-        asked = ["run", str(self.config), "--output", str(self.out), *arguments]
-        log = self.out.parent / f"{self.out.name}.log{len(self.started)}"
-        self.started.append(nursery.start(asked, log, **settings))
-        return self.started[-1]
-
-    def finish(self, *arguments: str, **settings: Any) -> tuple[int, str]:
-        """Exit code and output of a process that runs it."""
-        process = self.start(*arguments, **settings)
-        process.join(120)
-        return process.exitcode, process.log.read_text(encoding="utf-8")
-
-    def complete(self, **settings: Any) -> dict[str, bytes]:
-        """The files after a process that succeeds."""
-        code, said = self.finish(**settings)
-        assert code == 0, said
-        return contents(self.out)
+def config(kept: Write) -> Path:
+    return kept(TEXT)
 
 
 @pytest.fixture
 def runs(config: Path, tmp_path: Path) -> Iterator[Runs]:
-    runs = Runs(config, tmp_path / "out")
-    yield runs
-    for process in runs.started:
-        process.kill()
-        process.join()
-        process.close()
+    with Runs("run", config, tmp_path / "out") as runs:
+        yield runs
 
 
 @pytest.fixture(scope="module")
 def first(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run that nothing happened to."""
-    runs = Runs(config, tmp_path_factory.mktemp("undisturbed") / "out")
-    runs.complete()
-    return runs.out
+    out = tmp_path_factory.mktemp("undisturbed") / "out"
+    Runs("run", config, out).complete()
+    return out
 
 
 @pytest.fixture(scope="module")
@@ -133,69 +97,48 @@ def _listed(folder: Path) -> list[Path]:
         return []
 
 
-class Moments:
-    """When to strike, told from the names of the files: each method says whether it is now."""
+def moments(watch: Watch) -> dict[str, Callable[[], bool]]:
+    """When to strike, told from the names of the files."""
 
-    def __init__(self, watch: Watch) -> None:
-        self.watch = watch
-        self.before = self._images()
-        self.tiles = len(self._tiles())
-
-    def _images(self) -> int:
+    def images() -> int:
         try:
-            return (self.watch.folder / "small.checkpoint" / "running.npz").stat().st_mtime_ns
+            return (watch.folder / "small.checkpoint" / "running.npz").stat().st_mtime_ns
         except FileNotFoundError:
             return 0
 
-    def _tiles(self) -> list[str]:
-        return [name for name in self.watch.names if name.startswith("0")]
+    def tiles() -> int:
+        return sum(name.startswith("0") for name in watch.names)
 
-    def _unfinished(self, *names: str) -> bool:
-        return any(name.endswith(".part") and name.startswith(names) for name in self.watch.names)
+    def unfinished(*names: str) -> bool:
+        return any(name.endswith(".part") and name.startswith(names) for name in watch.names)
 
-    def start(self) -> bool:
-        """The lock is taken, no chunk is done."""
-        return ".small.lock" in self.watch.names
-
-    def kernel(self) -> bool:
-        """A chunk is done and saved, the next one is at work."""
-        return self._images() != self.before and not self._unfinished(".")
-
-    def checkpoint(self) -> bool:
-        return self._images() != self.before and self._unfinished(".running", ".0")
-
-    def tile(self) -> bool:
-        """A tile is saved, others of its group are not."""
-        return len(self._tiles()) > self.tiles
-
-    def dataset(self) -> bool:
-        return self._unfinished(".small.nc")
-
-    def files(self) -> bool:
-        """The dataset is there, its picture is not."""
-        return "small.nc" in self.watch.names and "small.png" not in self.watch.names
-
-    def picture(self) -> bool:
-        return self._unfinished(".small.png")
+    images_before, tiles_before = images(), tiles()
+    return {
+        # The lock is taken, no chunk is done.
+        "start": lambda: ".small.lock" in watch.names,
+        # A chunk is done and saved, the next one is at work.
+        "kernel": lambda: images() != images_before and not unfinished("."),
+        "checkpoint": lambda: images() != images_before and unfinished(".running", ".0"),
+        # A tile is saved, others of its group are not.
+        "tile": lambda: tiles() > tiles_before,
+        "dataset": lambda: unfinished(".small.nc"),
+        # The dataset is there, its picture is not.
+        "files": lambda: "small.nc" in watch.names and "small.png" not in watch.names,
+        "picture": lambda: unfinished(".small.png"),
+    }
 
 
-def strike(runs: Runs, undisturbed: dict[str, bytes], moment: str, delay: float, with_signal: int) -> Any:
-    """Start the command and send the signal at the moment; None where it ended before that came."""
+def strike(runs: Runs, undisturbed: dict[str, bytes], moment: str, with_signal: int, delay: float = 0.0) -> Any:
+    """Send the signal to the command at the moment, and look at its files until then and after."""
     watch = Watch(runs.out, undisturbed)
     watch.look()
-    now = getattr(Moments(watch), moment)
-    process = runs.start()
-    while not now():
-        if not process.is_alive():
-            return None
+    it_is = moments(watch)[moment]
+
+    def now() -> bool:
         watch.look()
-        time.sleep(2e-4)
-    time.sleep(delay)
-    os.kill(process.pid, with_signal)
-    process.join(60)
-    if process.is_alive():
-        os.kill(process.pid, signal.SIGABRT)  # to have its stacks in the log
-        process.join(60)
+        return it_is()
+
+    process = runs.strike(now, with_signal, delay=delay)
     watch.look()
     return process
 
@@ -239,18 +182,17 @@ integrator: {{t_end: 200}}
     ],
     ids=["some", "some-variant", "some-own", "many", "many-variant"],
 )
-def test_killed_at_any_moment(tmp_path: Path, text: str, wanted: Counter[str]) -> None:
-    config = tmp_path / "small.yaml"
-    config.write_text(text, encoding="utf-8")
-    undisturbed = Runs(config, tmp_path / "calm").complete()
+def test_killed_at_any_moment(write: Write, tmp_path: Path, text: str, wanted: Counter[str]) -> None:
+    config = write(text)
+    undisturbed = Runs("run", config, tmp_path / "calm").complete()
     rng = random.Random(1)
     survived: Counter[str] = Counter()
     for lane in range(40):
-        runs = Runs(config, tmp_path / f"{lane}")
+        runs = Runs("run", config, tmp_path / f"{lane}")
         for moment in sorted((m for m in MOMENTS for _ in range(3) if survived[m] < wanted[m]), key=MOMENTS.index):
             # Up to a whole chunk later where the moment lasts, at once where it is over soon.
             delay = rng.uniform(0, 0.03) if moment in ("start", "kernel", "files") else 0.0
-            process = strike(runs, undisturbed, moment, delay, signal.SIGKILL)
+            process = strike(runs, undisturbed, moment, signal.SIGKILL, delay)
             if process is None:
                 assert runs.started[-1].exitcode == 0, runs.started[-1].log.read_text()
                 break
@@ -265,7 +207,7 @@ def test_killed_at_any_moment(tmp_path: Path, text: str, wanted: Counter[str]) -
 
 
 @pytest.mark.parametrize(
-    "moments",
+    "when",
     [
         ("kernel", "dataset"),
         pytest.param(("kernel", "checkpoint", "kernel", "dataset"), marks=pytest.mark.campaign),
@@ -273,9 +215,9 @@ def test_killed_at_any_moment(tmp_path: Path, text: str, wanted: Counter[str]) -
     ],
     ids=["some", "many", "late"],
 )
-def test_interrupted(runs: Runs, undisturbed: dict[str, bytes], moments: tuple[str, ...]) -> None:
-    for moment in moments:
-        process = strike(runs, undisturbed, moment, 0.0, signal.SIGINT)
+def test_interrupted(runs: Runs, undisturbed: dict[str, bytes], when: tuple[str, ...]) -> None:
+    for moment in when:
+        process = strike(runs, undisturbed, moment, signal.SIGINT)
         assert process is not None
         said = process.log.read_text()
         assert (process.exitcode, "Traceback" in said) == (130, False), said
@@ -351,7 +293,7 @@ def test_a_full_disk_is_reported(runs: Runs, values: xr.Dataset) -> None:
     "what", ["folder", *(pytest.param(w, marks=pytest.mark.campaign) for w in ("parent", "checkpoint"))]
 )
 def test_a_read_only_folder_is_reported(runs: Runs, undisturbed: dict[str, bytes], what: str) -> None:
-    assert strike(runs, undisturbed, "kernel", 0.0, signal.SIGKILL)
+    assert strike(runs, undisturbed, "kernel", signal.SIGKILL)
     checkpoint = runs.out / "small.checkpoint"
     if what == "parent":
         shutil.rmtree(runs.out)
@@ -368,7 +310,7 @@ def test_a_read_only_folder_is_reported(runs: Runs, undisturbed: dict[str, bytes
 
 def test_two_processes_at_once(runs: Runs, undisturbed: dict[str, bytes]) -> None:
     watch = Watch(runs.out, undisturbed)
-    now = Moments(watch).kernel
+    now = moments(watch)["kernel"]
     first = runs.start()
     while not now():
         assert first.is_alive()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import Write
-from support.runs import Stop, same_numbers
+from support.runs import Heard, Stop, same_numbers
 
 import sweep
 from sweep import ConfigError
@@ -38,10 +38,8 @@ def swept(*given: Any, **settings: Any) -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def edge(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    path = tmp_path_factory.mktemp("edge") / "small.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return swept(path)
+def edge(kept: Write) -> xr.Dataset:
+    return swept(kept(TEXT))
 
 
 def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> None:
@@ -82,7 +80,7 @@ def test_tiles_of_impossible_bodies_and_a_resumed_run(
     monkeypatch.setattr(local, "BATCH", size)
     with pytest.raises(KeyboardInterrupt):
         sweep.run(write(TEXT), tmp_path, reporter=Stop(3))
-    reporter = Stop(10**6)
+    reporter = Heard()
     found = swept(write(TEXT), tmp_path, reporter=reporter)
     same_numbers(found, edge)
     assert (reporter.seen[-1].done, reporter.seen[-1].failed) == (18, 0)
@@ -90,7 +88,7 @@ def test_tiles_of_impossible_bodies_and_a_resumed_run(
 
 def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_path: Path) -> None:
     sweep.run(write(TEXT), tmp_path, offset=[0.0, 0.3])
-    reporter = Stop(10**6)
+    reporter = Heard()
     found = swept(write(TEXT), tmp_path, reporter=reporter)
     same_numbers(found, edge)
     assert "12 of 18 cells are taken over" in reporter.notes[0]

@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from support import newton, own
 from support.own import FADING, PENDULUM
-from support.runs import Stop, same_numbers
+from support.runs import Heard, same_numbers
 
 import sweep
 from sweep.config import ConfigError, load_config
@@ -94,7 +94,7 @@ def test_another_file_goes_on_with_nothing(folder: Path, more: dict[str, Any]) -
 def test_a_larger_run_of_the_same_file_takes_its_cells_over(few: xr.Dataset, folder: Path) -> None:
     (folder / "moved").mkdir()
     (folder / "pendulum.py").rename(folder / "moved" / "same.py")
-    reporter = Stop(10**9)
+    reporter = Heard()
     more = FEW | {"torque": [0.5, 1.0, 1.2, 1.4, 1.5]}
     larger = sweep.run(folder / "pendulum.yaml", folder, model="moved/same.py", reporter=reporter, **more)
     assert any(note.startswith("12 of 15 cells are taken over") for note in reporter.notes)
@@ -184,7 +184,7 @@ def test_a_law_of_ones_own_moves_the_body_as_newton_says(folder: Path, monkeypat
         return p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2)
 
     monkeypatch.setitem(newton.LAWS, "fading", fading)
-    at, told = {"t_end": 0.5, "every": 0.1, "tolerance": 1e-12, "fading": 0.1, "slip1": 0.2}, Stop(10**9)
+    at, told = {"t_end": 0.5, "every": 0.1, "tolerance": 1e-12, "fading": 0.1, "slip1": 0.2}, Heard()
     one = sweep.trajectory(folder / "fading.yaml", reporter=told, **at).isel(trajectory=0)
     assert {progress.unit for progress in told.seen} == {"s"}
     p = {name: one[name].item() for name in load_config(folder / "fading.yaml").equations.parameters}

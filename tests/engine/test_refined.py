@@ -214,10 +214,8 @@ refine: 2
 
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("map") / "map.yaml"
-    path.write_text(MAP, encoding="utf-8")
-    return path
+def file(kept: Write) -> Path:
+    return kept(MAP, "map.yaml")
 
 
 def counted(patch: pytest.MonkeyPatch) -> Counter[int]:

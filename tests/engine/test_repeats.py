@@ -3,18 +3,18 @@
 import csv
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from support import ENDS, ROOT, STANDARD, Write, adaptive, columns, newton
 from support.kernels import threads
-from support.runs import lengthen, run_cells, same_numbers
+from support.runs import Heard, interrupt, lengthen, run_cells, same_numbers
 
 import sweep
 from sweep.engine import local, repeats
 from sweep.engine.executor import Work
 from sweep.engine.plan import plan
-from sweep.engine.reporter import Progress, Reporter
 from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, SETTLED, TIME_LIMIT, TOPPLED
 
@@ -160,40 +160,25 @@ def test_tiles_and_threads_do_not_touch_the_numbers(monkeypatch: pytest.MonkeyPa
     )
 
 
-class Stops(Reporter):
-    """Interrupts once, where `stop` is set."""
-
-    def __init__(self) -> None:
-        self.stop, self.seen = False, list[Progress]()
-
-    def chunk(self, progress: Progress) -> None:
-        self.seen.append(progress)
-        if self.stop:
-            self.stop = False
-            raise KeyboardInterrupt
-
-
 @pytest.mark.usefixtures("short_chunks")
 def test_an_interrupt_while_cells_are_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = {"method": "adams", "t_end": 5.0}
-    whole, stops, out = run_cells(MIXED, **settings), Stops(), tmp_path / "out"
+    whole, heard, out = run_cells(MIXED, **settings), Heard(), tmp_path / "out"
     for name in ("decide_failures", "keep_tolerance"):
         again = getattr(local, name)
 
         def repeat(*arguments: Any) -> Any:
-            stops.stop = True
-            found = again(*arguments)  # noqa: B023
-            stops.stop = False
-            return found
+            with patch.object(heard, "act", interrupt):
+                return again(*arguments)  # noqa: B023
 
         monkeypatch.setattr(local, name, repeat)
         with pytest.raises(KeyboardInterrupt):
-            run_cells(MIXED, out, reporter=stops, **settings)
+            run_cells(MIXED, out, reporter=heard, **settings)
         monkeypatch.setattr(local, name, again)
         assert [path.name for path in out.iterdir()] == ["cells.checkpoint"]
-    same_numbers(run_cells(MIXED, out, reporter=stops, **settings), whole)
+    same_numbers(run_cells(MIXED, out, reporter=heard, **settings), whole)
     # A failure is reported only when it is certain, and no progress is taken back.
-    failed, done = ([getattr(progress, name) for progress in stops.seen] for name in ("failed", "done"))
+    failed, done = ([getattr(progress, name) for progress in heard.seen] for name in ("failed", "done"))
     assert done[-1] == len(MIXED)
     assert max(failed) == failed[-1] == int(np.isin(whole.status, list(ENDS)).sum())
 

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from scipy import stats
 from support import Write
 from support.cli import invoke, refused
-from support.runs import Stop, same_numbers
+from support.figures import maps
+from support.runs import Heard, Stop, same_numbers
 
 import sweep
 from sweep.config.distributions import Distribution, drawn
@@ -111,7 +112,7 @@ def test_intervals_of_random_samples_hold_as_often_as_they_say() -> None:
 
 @pytest.mark.usefixtures("no_pictures")
 def test_more_samples_take_over_the_fewer(write: Write, tmp_path: Path) -> None:
-    more, reporter = SCENE.replace("32", "48"), Stop(10**6)
+    more, reporter = SCENE.replace("32", "48"), Heard()
     sweep.run(write(SCENE), tmp_path)
     found = sweep.run(write(more), tmp_path, reporter=reporter)
     assert reporter.notes[0].startswith("64 of 96 cells are taken over")
@@ -125,7 +126,7 @@ def widest(dataset: xr.Dataset) -> float:
 
 
 def test_sampling_stops_when_every_probability_is_known_so_closely(write: Write, tmp_path: Path) -> None:
-    sparing, reporter = write(SCENE.replace("samples: 32", "until: 0.1\nverify: 0.05")), Stop(10**6)
+    sparing, reporter = write(SCENE.replace("samples: 32", "until: 0.1\nverify: 0.05")), Heard()
     found = sweep.run(sparing, tmp_path, reporter=reporter)
     assert found.sizes["sample"] == 128
     assert widest(found) <= 0.1 < widest(sweep.run(sparing, until=None, samples=64))
@@ -264,8 +265,8 @@ def test_bars_curves_and_maps_of_probabilities(write: Write) -> None:
         expected = np.bincount(here, minlength=two.sizes["count"] + 1) / 32
         np.testing.assert_allclose([bar.get_height() for bar in axes.patches], expected, atol=1e-12)
     several = sweep.run(write(SCENE), t_end=300, b=np.linspace(2, 6, 5), mu=np.linspace(40, 200, 5), samples=4)
-    assert maps(sweep.plot(several)) == min(several.sizes["count"], 3)
-    assert maps(sweep.plot(several, sel={"count": 1})) == 1
+    assert len(maps(sweep.plot(several))) == min(several.sizes["count"], 3)
+    assert len(maps(sweep.plot(several, sel={"count": 1}))) == 1
     source = Source(several)
     shown = source.map("probability", "b", "mu", {"sample": 2, "count": 0})
     np.testing.assert_array_equal(shown.values, several["probability"].transpose("mu", "b", "count")[..., 0])
@@ -288,10 +289,3 @@ def test_the_probability_of_a_chosen_count(write: Write, given: bool) -> None:
     bars = drawn_of(two.isel(b=1))
     np.testing.assert_allclose([bar.get_height() for bar in bars.patches], [1 - shares[1], shares[1]], atol=1e-12)
     assert [text.get_text() for text in bars.get_xticklabels()] == ["fewer", "2 reversals or more"]
-
-
-def maps(figure: Figure) -> int:
-    return sum(
-        bool(axes.collections) and axes.get_label() != "<colorbar>" and len(axes.get_title()) > 0
-        for axes in figure.axes
-    )

@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 from support import CHAOTIC
+from support.figures import entries
 from support.kernels import default_measures
 
 import sweep
@@ -32,15 +33,10 @@ def test_the_papers_counts_are_firm_and_unmarked() -> None:
 
 def test_maps_mark_counts_that_are_not_certain() -> None:
     found = run(b=np.linspace(2, 6, 6).tolist(), mu=np.linspace(40, 90, 6).tolist(), n0=0.05, t_end=100)
-    assert "count not certain" not in labels(found)
-    said = labels(found.assign(sensitive=(found.b == 2.0) & (found.mu == 40)))
+    assert "count not certain" not in " ".join(entries(picture.plot(found)))
+    said = " ".join(entries(picture.plot(found.assign(sensitive=(found.b == 2.0) & (found.mu == 40)))))
     assert "count not certain" in said
     assert "(1 of 36)" in said
-
-
-def labels(dataset: xr.Dataset) -> str:
-    """The entries of the legend of the maps."""
-    return " ".join(text.get_text() for legend in picture.plot(dataset).legends for text in legend.get_texts())
 
 
 def test_settled_trajectories_stay_where_they_are_said_to() -> None:

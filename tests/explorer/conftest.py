@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from support import Write
 
 import sweep
 from sweep.explorer.setup import Setup
@@ -21,22 +22,20 @@ measure: [reversals, margin, energy_error, noise_limited, resting_spin]
 
 
 @pytest.fixture(scope="session")
-def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def tiny(kept: Write) -> Path:
     """A dataset over mu (5), b (4) and n0 (2).
 
     At n0 = 0.05 the cell (0, 0) is made one that lifted off, (1, 0) one that settled, (2, 0) a lower bound, and (3, 0)
     one limited by round-off.
     """
-    folder = tmp_path_factory.mktemp("tiny")
-    config = folder / "tiny.yaml"
-    config.write_text(TEXT, encoding="utf-8")
+    config = kept(TEXT, "tiny.yaml")
     dataset = sweep.run(config)
     status = dataset["status"].values
     status[:3, 0, 1] = LIFT_OFF, 1, TIME_LIMIT
     status[3, 0, 1] = 1
     dataset["noise_limited"].values[:] = 0
     dataset["noise_limited"].values[3, 0, 1] = 1
-    path = folder / "tiny.nc"
+    path = config.with_suffix(".nc")
     dataset.to_netcdf(path)
     return path
 

@@ -47,16 +47,6 @@ class Heard(Job):
         return self
 
 
-def test_a_trajectory_has_the_sweeps_numbers(source: Source, setup: Setup, opened: xr.Dataset) -> None:
-    index = {"mu": 3, "b": 2, "n0": 1}
-    curve = whole(setup, cell_at(source, setup, **index))
-    cell = opened.isel(index)
-    for name in ("reversals", "t_last_reversal"):
-        assert curve.dataset[name].item() == cell[name].item()
-    assert len(curve.reversals) == cell["reversals"]
-    assert {"contact_x", "energy", "dissipated"} <= set(curve.dataset)
-
-
 def test_a_curve_goes_on_where_a_sweep_ends(setup: Setup) -> None:
     """A spin below 1.5 n_c1 settles within a few units of time, and is seen nevertheless."""
     cell = {**setup.base, "mu": 75.0, "b": 3.0, "n0": -0.006}

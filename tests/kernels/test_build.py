@@ -17,7 +17,6 @@ from support.kernels import kernel, threads
 from support.runs import run_cells
 
 import sweep
-from sweep.engine.estimate import estimate
 from sweep.jit import Cached, showing
 from sweep.kernels import build as builder
 from sweep.kernels.build import build
@@ -92,17 +91,6 @@ def test_what_is_compiled_is_shown(started: list[tuple[str, ...]]) -> None:
         build([kernel()])
     build([kernel()])
     assert told == ["begins", 2]
-
-
-def test_an_estimate_compiles_nothing(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
-        raise AssertionError("compiled")
-
-    for use in ("__call__", "compile"):
-        monkeypatch.setattr(Cached, use, refuse)
-    monkeypatch.setattr(builder, "_start", refuse)
-    told = estimate(sweep.load_config(write(AUTO)))
-    assert [line.split(":")[0] for line in told.splitlines()] == ["cells", "steps", "memory", "time"]
 
 
 def test_functions_are_compiled_for_the_arguments_that_they_get(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,8 @@ from support.kernels import finish, images_of, kernel
 
 import sweep
 from sweep import ConfigError
-from sweep.jit import exactly_compiled, inline
+from sweep.jit import inline
+from sweep.kernels.differentiate import make_extended
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.measures import chosen
 from sweep.kernels.measures.lyapunov import BINS
@@ -91,32 +92,17 @@ def test_a_stable_focus_of_the_lorenz_system_has_the_rate_of_its_eigenvalue() ->
         assert value == pytest.approx(np.linalg.eigvals(J).real.max(), abs=2e-3)
 
 
-@cache
-def _with_tangent() -> Any:
-    rhs = noslip.rhs
-
-    @exactly_compiled
-    def slopes(y: np.ndarray, p: Any) -> np.ndarray:
-        found, _ = rhs((y[0], y[1], y[2], y[3], y[4]), p)
-        return np.array([found[0], found[1], found[2], found[3], found[4]])
-
-    @exactly_compiled
-    def extended(_: float, z: np.ndarray, p: Any) -> np.ndarray:
-        y, v = z[:5], z[5:10]
-        d = 1e-5 / np.sqrt(v @ v)
-        change = (8 * (slopes(y + d * v, p) - slopes(y - d * v, p)) - slopes(y + 2 * d * v, p)
-                  + slopes(y - 2 * d * v, p)) / (12 * d)  # fmt: skip
-        rate = (v @ change) / (v @ v)
-        return np.concatenate((slopes(y, p), change - rate * v, np.array([rate])))
-
-    return extended
-
-
 @pytest.mark.campaign
 def test_the_exponent_is_that_of_the_variational_equations() -> None:
     """Over the very same stretch, from the same direction, on regular and on chaotic motion."""
     body = columns(a=3.0, b=2.0, delta=[0.03, 0.3, 0.5], n0=[0.5, 0.5, 0.3])
-    made = kernel("dopri5", "noslip", ["lyapunov"])
+    made, tangent = kernel("dopri5", "noslip", ["lyapunov"]), make_extended(noslip.MODEL)
+
+    def slopes(_: float, z: np.ndarray, p: Any) -> np.ndarray:
+        found = np.array(tangent(tuple(z[:10]), p)[0])
+        rate = z[5:10] @ found[5:] / (z[5:10] @ z[5:10])
+        return np.array([*found[:5], *(found[5:] - rate * z[5:10]), rate])
+
     table = made.table(finish(made, images_of(made, body, 0.0075, 200.0), settle=False))
     found = made.measurements[0].read(table, None)["lyapunov"]
     for i in range(3):
@@ -124,9 +110,7 @@ def test_the_exponent_is_that_of_the_variational_equations() -> None:
         times = np.array([full - full // 2, full]) * length
         start = np.concatenate([stack(noslip.MODEL.start(body))[:, i], np.full(5, 5**-0.5), [0.0]])
         constants = take(noslip.Constants.of(body), i)
-        solution = solve_ivp(
-            _with_tangent(), (0, times[1]), start, "DOP853", times, args=(constants,), rtol=1e-11, atol=1e-13
-        )
+        solution = solve_ivp(slopes, (0, times[1]), start, "DOP853", times, args=(constants,), rtol=1e-11, atol=1e-13)
         assert full >= BINS // 2
         assert found[i] == pytest.approx(np.diff(solution.y[-1])[0] / np.diff(times)[0], abs=1e-8)
 

@@ -24,14 +24,13 @@ EXPECTED = {60: [168.7, 720.1, 2379.9], 75: [167.3, 639.1, 1590.4], 100: [165.8,
 
 
 @pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("times")
+def config(kept: Write) -> Path:
+    return kept(TEXT, "times.yaml")
 
 
 @pytest.fixture(scope="module")
-def found(out: Path) -> xr.Dataset:
-    (out / "times.yaml").write_text(TEXT, encoding="utf-8")
-    return sweep.run(out / "times.yaml", out)
+def found(config: Path) -> xr.Dataset:
+    return sweep.run(config, config.parent)
 
 
 @pytest.mark.parametrize("mu", EXPECTED)
@@ -52,12 +51,12 @@ def test_reversals_that_have_not_happened_have_no_time(write: Write) -> None:
     assert int(early.reversals.min()) == 1
 
 
-def test_the_dataset_has_a_dimension_for_them(found: xr.Dataset, out: Path) -> None:
+def test_the_dataset_has_a_dimension_for_them(found: xr.Dataset, config: Path) -> None:
     times = found.reversal_times
     assert times.dims == ("mu", "reversal")
     assert list(times.reversal) == [1, 2, 3]
     assert times.attrs == {"long_name": "time of each spin reversal, in sqrt(c/g)"}
-    xr.testing.assert_identical(times, xr.load_dataset(out / "times.nc").reversal_times)
+    xr.testing.assert_identical(times, xr.load_dataset(config.with_suffix(".nc")).reversal_times)
 
 
 @pytest.mark.parametrize(

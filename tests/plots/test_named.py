@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from support import Write
 from support.cli import invoke, refused
 
 import sweep
@@ -20,9 +21,8 @@ def drawn(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.glob("*.png")}
 
 
-def test_a_run_draws_the_pictures_that_are_named(tmp_path: Path) -> None:
-    file, folder = tmp_path / "map.yaml", tmp_path / "out"
-    file.write_text(f"{FORMULA}picture: [status, form_factor]\n", encoding="utf-8")
+def test_a_run_draws_the_pictures_that_are_named(tmp_path: Path, write: Write) -> None:
+    file, folder = write(f"{FORMULA}picture: [status, form_factor]\n", "map.yaml"), tmp_path / "out"
     first = invoke("run", file, "--output", folder)
     assert first.stdout.splitlines()[-1] == f"wrote {folder / 'map'}.nc and .png and _form_factor.png"
     before = drawn(folder)
@@ -36,10 +36,9 @@ def test_a_run_draws_the_pictures_that_are_named(tmp_path: Path) -> None:
     assert drawn(folder)["map.png"] == before["map_form_factor.png"]
 
 
-def test_pictures_of_another_dataset_are_removed(tmp_path: Path) -> None:
+def test_pictures_of_another_dataset_are_removed(tmp_path: Path, write: Write) -> None:
     """With those that a run which was killed has left half-written."""
-    file = tmp_path / "map.yaml"
-    file.write_text(f"{FORMULA}picture: [status, form_factor]\n", encoding="utf-8")
+    file = write(f"{FORMULA}picture: [status, form_factor]\n", "map.yaml")
     sweep.run(file, output=tmp_path)
     (tmp_path / ".map_form_factor.png.77.part").touch()
     sweep.run(file, output=tmp_path, progress=False)
@@ -48,9 +47,8 @@ def test_pictures_of_another_dataset_are_removed(tmp_path: Path) -> None:
     assert set(drawn(tmp_path)) == {"map.png"}
 
 
-def test_without_a_name_it_is_what_the_dataset_is_about(tmp_path: Path) -> None:
-    (tmp_path / "map.yaml").write_text(FORMULA, encoding="utf-8")
-    result = sweep.run(tmp_path / "map.yaml", output=tmp_path, progress=False)
+def test_without_a_name_it_is_what_the_dataset_is_about(tmp_path: Path, write: Write) -> None:
+    result = sweep.run(write(FORMULA, "map.yaml"), output=tmp_path, progress=False)
     assert "pictured" not in result.attrs
     sweep.plot(result, output=tmp_path / "again.png")
     assert drawn(tmp_path)["map.png"] == drawn(tmp_path)["again.png"]
@@ -82,16 +80,14 @@ def test_pictures_of_a_file_are_set_aside_where_something_else_is_measured() -> 
         ("status", "4:10: picture: must be a list of variables, such as [reversals, spin_mean], not 'status'"),
     ],
 )  # fmt: skip
-def test_what_no_run_has_is_refused_before_it_begins(named: str, said: str, tmp_path: Path) -> None:
-    file = tmp_path / "map.yaml"
-    file.write_text(f"{FORMULA}picture: {named}\n", encoding="utf-8")
+def test_what_no_run_has_is_refused_before_it_begins(named: str, said: str, tmp_path: Path, write: Write) -> None:
+    file = write(f"{FORMULA}picture: {named}\n", "map.yaml")
     refused(invoke("run", file, "--output", tmp_path / "out"), f"{file}:{said}")
     assert not (tmp_path / "out").exists()
 
 
-def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_drawn(tmp_path: Path) -> None:
-    file = tmp_path / "map.yaml"
-    file.write_text(f"{FORMULA}picture: [probability, status]\n", encoding="utf-8")
+def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_drawn(tmp_path: Path, write: Write) -> None:
+    file = write(f"{FORMULA}picture: [probability, status]\n", "map.yaml")
     result = invoke("run", file, "--output", tmp_path / "out")
     assert result.exit_code == 0
     assert "no picture of probability: there is no variable probability" in result.stderr

@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, to_rgb
-from matplotlib.figure import Figure
+from support import Write
 from support.cli import invoke, refused
-from support.figures import constants, entries, made
+from support.figures import constants, entries, made, maps
 
 import sweep
 from sweep.kernels.status import DIVERGED, TIME_LIMIT
@@ -19,10 +19,6 @@ from sweep.plots import panels, picture, scales
 from sweep.plots.hatches import outline
 from sweep.results.dataset import VARIABLES, described
 from sweep.results.netcdf import open_dataset, write
-
-
-def maps(figure: Figure) -> list[Axes]:
-    return [axes for axes in figure.axes if axes.get_xlabel() or axes.get_title()]
 
 
 def mesh(axes: Axes) -> Any:
@@ -76,7 +72,7 @@ def test_the_lightness_of_colours_tells_values_apart() -> None:
     assert (steps * np.repeat([1, -1], 10) > 0.01).all()  # darker on both sides
 
 
-@pytest.mark.parametrize("top", [1, 6, 16, 33, 41, 200, 3000])
+@pytest.mark.parametrize("top", [1, 6, 16, 30, 33, 41, 60, 207, 3000])
 def test_every_count_has_a_colour_and_high_ones_are_told_apart(top: int) -> None:
     scale = scales.counts(np.arange(top + 1))
     assert isinstance(scale.norm, BoundaryNorm)
@@ -84,9 +80,12 @@ def test_every_count_has_a_colour_and_high_ones_are_told_apart(top: int) -> None
     assert scale.norm.boundaries[-1] > top
     assert scale.norm.extend == "neither"
     assert scale.norm.Ncmap <= 24
-    # No range is wider than four fifths of the count at which it begins.
-    first = scale.norm.boundaries[:-1] + 0.5
-    assert (np.diff(scale.norm.boundaries) <= np.maximum(1, 0.8 * first)).all()
+    # No range is wider than four fifths of the count at which it begins, and they become wider in round steps.
+    first, widths = scale.norm.boundaries[:-1] + 0.5, np.diff(scale.norm.boundaries).astype(int)
+    assert (widths <= np.maximum(1, 0.8 * first)).all()
+    assert (np.diff(widths) >= 0).all()
+    assert (first[widths > 1] % np.gcd(widths[widths > 1], 10) == 0).all()
+    assert all(words == f"{round(at)}" for at, words in (scale.ticks or {}).items())
     assert len({tuple(c) for c in scale.rgba(first)}) == len(first)
 
 
@@ -335,11 +334,10 @@ def test_numbers_along_a_further_dimension_get_panels() -> None:
     assert len(maps(picture.plot(more, "reversal_times"))) == 2
 
 
-def test_a_sweep_of_too_many_panels_is_not_drawn(tmp_path: Path) -> None:
+def test_a_sweep_of_too_many_panels_is_not_drawn(write: Write, tmp_path: Path) -> None:
     axes = ["b=2..2.4:5", "mu=40..44:5", "n0=0.01..0.03:3", "delta=0.01..0.03:3", "t_end=5"]
-    (tmp_path / "many.yaml").write_text("friction: {mu: 60}\n", encoding="utf-8")
     settings = [part for axis in axes for part in ("--set", axis)]
-    result = invoke("run", tmp_path / "many.yaml", "--output", tmp_path / "out", *settings)
+    result = invoke("run", write("friction: {mu: 60}\n", "many.yaml"), "--output", tmp_path / "out", *settings)
     assert result.exit_code == 0
     assert "no picture: 9 panels" in result.stderr
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["many.nc"]

@@ -167,16 +167,3 @@ def test_a_variable_is_drawn_without_its_dataset() -> None:
     assert not [text for text in entries(figure) if "time limit" in text]
     with pytest.raises(ValueError, match="an array without a name is no variable of a run; give the dataset"):
         picture.plot(made().reversals - made().reversals_predicted)
-
-
-def test_a_map_with_bars_of_high_counts_has_round_steps() -> None:
-    from sweep.plots import scales
-
-    for top in (30, 60, 207, 3000):
-        scale = scales.counts(np.arange(top + 1))
-        assert all(words == f"{round(at)}" for at, words in (scale.ticks or {}).items())
-        first = np.asarray(scale.norm.boundaries[:-1] + 0.5)  # type: ignore[attr-defined]
-        widths = np.diff(scale.norm.boundaries)  # type: ignore[attr-defined]
-        wide = widths > 1
-        assert (np.diff(widths) >= 0).all()
-        assert (first[wide] % np.gcd(widths[wide].astype(int), 10) == 0).all()

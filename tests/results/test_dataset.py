@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import ROOT, Write
-from support.runs import same_numbers
 
 import sweep
 from sweep.results.dataset import STATUSES, VARIABLES
@@ -36,12 +35,6 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
     flags = dict(zip(small["status"].attrs["flag_values"], small["status"].attrs["flag_meanings"].split(), strict=True))
     known = ["not_run", "settled", "time_limit", "lift_off", "diverged", "paradox", "toppled"]
     assert flags == STATUSES == dict(enumerate(known)) | {8: "impossible"}
-
-
-def test_dataset_values_belong_to_their_labels(small: xr.Dataset, write: Write) -> None:
-    for mu, b, n0 in ((40.0, 2.0, 0.05), (60.0, 5.0, 0.02), (60.0, 3.0, 0.05)):
-        alone = sweep.run(write(), mu=mu, b=b, n0=n0)
-        same_numbers(small.sel(mu=mu, b=b, n0=n0), alone)
 
 
 def test_provenance(small: xr.Dataset) -> None:

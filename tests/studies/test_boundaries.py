@@ -10,6 +10,7 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
+from support import Write
 from support.cli import invoke, refused
 from support.figures import entries
 from support.runs import Stop, same_numbers
@@ -264,13 +265,12 @@ def test_a_map_without_boundaries_has_an_empty_picture(tmp_path: Path) -> None:
     assert "0 points" in invoke("info", tmp_path / "sweep_boundaries.nc").output
 
 
-def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "one.yaml").write_text("friction: {mu: [60, 70]}\n")
-    refused(invoke("boundaries", tmp_path / "one.yaml"), "boundaries need two axes")
-    refused(invoke("boundaries", tmp_path / "one.yaml", "--x", "c"), "x: c is no axis of more than one value", "mu")
-    (tmp_path / "two.yaml").write_text("friction: {mu: [60, 70]}\nbody: {b: [2, 3]}\n")
-    assert "for each point" in invoke("boundaries", tmp_path / "two.yaml", "--dry-run").output
-    both = invoke("boundaries", tmp_path / "two.yaml", "--workers", "2", "--scheduler", "tcp://x")
+def test_what_cannot_be_searched_is_refused(write: Write) -> None:
+    one = write("friction: {mu: [60, 70]}\n", "one.yaml")
+    refused(invoke("boundaries", one), "boundaries need two axes")
+    refused(invoke("boundaries", one, "--x", "c"), "x: c is no axis of more than one value", "mu")
+    two = write("friction: {mu: [60, 70]}\nbody: {b: [2, 3]}\n", "two.yaml")
+    both = invoke("boundaries", two, "--workers", "2", "--scheduler", "tcp://x")
     refused(both, "cannot be combined with --scheduler")
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -59,11 +59,9 @@ def heading(body: Mapping[str, np.ndarray], law: str, start: np.ndarray, times: 
 
 
 @pytest.fixture(scope="module")
-def found(seen: tuple[np.ndarray, ...], tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    path = tmp_path_factory.mktemp("film") / "scene.yaml"
-    path.write_text(SCENE, encoding="utf-8")
+def found(seen: tuple[np.ndarray, ...], kept: Write) -> xr.Dataset:
     times, spins, _ = seen
-    return sweep.fit(path, Film(times, spins), ["mu", "n0"])
+    return sweep.fit(kept(SCENE), Film(times, spins), ["mu", "n0"])
 
 
 def test_samples_are_those_of_a_trajectory() -> None:
@@ -181,36 +179,11 @@ def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
     assert abs(found.value.values[1] - 0.05) < 1e-3
 
 
-def test_friction_that_hardly_slips_is_known_by_its_slope_alone(write: Write) -> None:
-    """With a speed far above that of the slip only the ratio of the two counts."""
-    times, true = np.arange(0, 2, 1 / 60), {"mu": 0.3, "speed": 0.5}
-    config = sweep.load_config(write(STONE))
-    problem = Problem(config, Film(times, 0 * times), {n: (v, v) for n, v in true.items()})
-    film = Film(times, noisy(problem.curves(np.zeros((1, 2)), times)[0], 0.02))
-    found = sweep.fit(config, film, list(true))
-    assert "speed and mu are known only together" in found.attrs["undetermined"]
-    ratio = (found.value[0] / found.value[1]).item()
-    assert ratio == pytest.approx(0.6, rel=0.1)
-
-
-UPRIGHT: dict[str, Any] = {"x0": 0.0, "y0": 0.0, "mu": 0.3, "speed": 0.5}
-
-
-@pytest.mark.campaign
-def test_a_couple_is_known_in_units_of_the_inertia_that_it_slows_down(write: Write) -> None:
-    """The spin of a body that does not rattle falls as exp(-sigma t / Izz), by hand."""
-    times = np.arange(0, 2, 1 / 60)
-    film = Film(times, noisy(5 * np.exp(-1e-3 / 1.7e-3 * times), 0.02))
-    ranges = {"sigma": [5e-4, 2e-3], "Izz": [1.5e-3, 1.8e-3]}
-    found = sweep.fit(write(STONE), film, list(ranges), **ranges, **UPRIGHT)
-    assert "Izz and sigma are known only together" in found.attrs["undetermined"]
-    assert (found.value[0] / found.value[1]).item() == pytest.approx(1e-3 / 1.7e-3, rel=0.02)
-
-
 def test_a_steady_spin_cannot_be_told_from_the_bias_of_a_gyroscope(write: Write) -> None:
     times = np.arange(0, 2, 1 / 60)
     film = Film(times, noisy(np.full(len(times), 5.3), 0.02), what="gyroscope")
-    found = sweep.fit(write(STONE), film, ["n0", "film_bias"], n0=[4.5, 5.5], **UPRIGHT)
+    upright = {"n0": [4.5, 5.5], "x0": 0.0, "y0": 0.0, "mu": 0.3, "speed": 0.5}
+    found = sweep.fit(write(STONE), film, ["n0", "film_bias"], **upright)
     assert "film_bias and n0 are known only together" in found.attrs["undetermined"]
     assert found.value.sum().item() == pytest.approx(5.3, abs=0.01)
 

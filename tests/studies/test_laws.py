@@ -36,10 +36,9 @@ def film(config: Path, law: str, error: float | None = None) -> Film:
 
 
 @pytest.fixture(scope="module")
-def dry(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+def dry(kept: Write) -> xr.Dataset:
     """A film with dry friction, which both laws are fitted to."""
-    path = tmp_path_factory.mktemp("dry") / "stone.yaml"
-    path.write_text(STONE, encoding="utf-8")
+    path = kept(STONE)
     return sweep.fit(path, film(path, "coulomb-sqrt"), ["mu", "n0", "mu_static"], laws=["viscous", "coulomb"])
 
 

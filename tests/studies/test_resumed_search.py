@@ -7,15 +7,15 @@ import os
 import re
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 import xarray as xr
-from support import nursery
+from support import Write
 from support.cli import invoke
-from support.runs import Stop, same_numbers
+from support.nursery import Runs
+from support.runs import Heard, same_numbers
 
 import sweep
 
@@ -28,10 +28,8 @@ integrator: {t_end: 12000}
 
 
 @pytest.fixture(scope="module")
-def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("config") / "standard.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return path
+def config(kept: Write) -> Path:
+    return kept(TEXT, "standard.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -40,35 +38,13 @@ def undisturbed(config: Path) -> xr.Dataset:
 
 
 @pytest.fixture
-def start(config: Path, tmp_path: Path) -> Iterator[Callable[..., Any]]:
-    """Starts a process of a command on the configuration, its files in tmp_path/out and what it says in `log`."""
-    started: list[Any] = []
-
-    def start_process(verb: str, *arguments: str) -> Any:
-        asked = [verb, str(config), *arguments, "--output", str(tmp_path / "out")]
-        started.append(nursery.start(asked, tmp_path / f"log{len(started)}"))
-        return started[-1]
-
-    yield start_process
-    for process in started:
-        process.kill()
-        process.join()
-        process.close()
+def runs(config: Path, tmp_path: Path) -> Iterator[Runs]:
+    with Runs("critical", config, tmp_path / "out") as runs:
+        yield runs
 
 
 def rounds(folder: Path) -> int:
     return len([path for path in folder.glob("*.npz") if path.name != "running.npz"])
-
-
-def strike(process: Any, now: Callable[[], bool], with_signal: int) -> bool:
-    """Send a signal at the moment `now`; False if the process ended before."""
-    while not now():
-        if not process.is_alive():
-            return False
-        time.sleep(5e-4)
-    os.kill(process.pid, with_signal)
-    process.join(60)
-    return True
 
 
 @pytest.mark.parametrize(
@@ -79,11 +55,9 @@ def strike(process: Any, now: Callable[[], bool], with_signal: int) -> bool:
 @pytest.mark.parametrize(
     "wanted", [range(1, 6, 2), pytest.param(range(12), marks=pytest.mark.campaign)], ids=["some", "many"]
 )
-def test_a_stopped_search_goes_on(
-    start: Callable[..., Any], tmp_path: Path, undisturbed: xr.Dataset, wanted: range, with_signal: int
-) -> None:
+def test_a_stopped_search_goes_on(runs: Runs, undisturbed: xr.Dataset, wanted: range, with_signal: int) -> None:
     """Stopped within round after round, also between two saved states of the same one."""
-    checkpoint = tmp_path / "out" / "standard_critical.checkpoint"
+    checkpoint = runs.out / "standard_critical.checkpoint"
     stops = 0
     for done in wanted:
         running, before = checkpoint / "running.npz", os.stat(checkpoint).st_mtime_ns if checkpoint.exists() else 0
@@ -92,8 +66,8 @@ def test_a_stopped_search_goes_on(
             saved = running.exists() and running.stat().st_mtime_ns > before
             return rounds(checkpoint) > done or (rounds(checkpoint) == done and saved)
 
-        process = start("critical")
-        if not strike(process, within, with_signal):
+        process = runs.strike(within, with_signal)
+        if process is None:
             break  # it has finished
         stops += 1
         assert process.exitcode == (130 if with_signal == signal.SIGINT else -signal.SIGKILL)
@@ -104,13 +78,11 @@ def test_a_stopped_search_goes_on(
             assert "Traceback" not in process.log.read_text()
     assert stops >= 2
     checkpoint_left = checkpoint.exists()
-    process = start("critical")
-    process.join(120)
-    said = process.log.read_text()
-    assert process.exitcode == 0, said
+    code, said = runs.finish()
+    assert code == 0, said
     assert ("resuming an earlier run: " if checkpoint_left else "already complete, nothing to compute") in said
-    same_numbers(xr.load_dataset(tmp_path / "out" / "standard_critical.nc"), undisturbed)
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"standard_critical.nc", "standard_critical.png"}
+    same_numbers(xr.load_dataset(runs.out / "standard_critical.nc"), undisturbed)
+    assert {path.name for path in runs.out.iterdir()} == {"standard_critical.nc", "standard_critical.png"}
 
 
 def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_path: Path) -> None:
@@ -125,26 +97,8 @@ def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_
     assert invoke(*command, "--set", "n0=0.3", "--width", "0.01").exit_code == 0  # no critical spin depends on it
 
 
-def test_dry_runs_compute_and_write_nothing(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: Any, **__: Any) -> None:
-        raise AssertionError("computed")
-
-    monkeypatch.setattr("sweep.kernels.kernel.Kernel.advance", fail)
-    out = tmp_path / "out"
-    told = invoke("critical", config, "--dry-run", "--output", out)
-    assert told.exit_code == 0
-    words = [line.split(":")[0] for line in told.stdout.splitlines()]
-    assert words == ["bodies", "cells", "steps", "memory", "time", "then"]
-    assert "6 (mu 3 × b 2)" in told.stdout
-    told = invoke("trajectory", config, "--at", "mu=60", "--at", "mu=75", "--dry-run", "--output", out)
-    assert told.exit_code == 0
-    assert [line.split(":")[0] for line in told.stdout.splitlines()] == ["trajectories", "steps", "samples", "time"]
-    assert "2" in told.stdout.splitlines()[0]
-    assert not out.exists()
-
-
 def test_progress_is_told(config: Path) -> None:
-    following = Stop(10**9)
+    following = Heard()
     sweep.trajectory(config, mu=[60, 75], t_end=3000, reporter=following)
     done = [progress.done for progress in following.seen]
     assert done == sorted(done)
@@ -152,10 +106,15 @@ def test_progress_is_told(config: Path) -> None:
     assert len(set(done)) > 5
 
 
-def test_an_interrupted_trajectory_says_so(start: Callable[..., Any], tmp_path: Path) -> None:
-    process = start("trajectory", "--at", "mu=100", "--set", "t_end=1e6", "--set", "stop_when_settled=false")
+def test_an_interrupted_trajectory_says_so(runs: Runs) -> None:
+    runs.verb = "trajectory"
     began = time.monotonic()
-    assert strike(process, lambda: process.log.exists() and time.monotonic() > began + 0.5, signal.SIGINT)
+
+    def at_work() -> bool:
+        return runs.started[0].log.exists() and time.monotonic() > began + 0.5
+
+    endless = ("--at", "mu=100", "--set", "t_end=1e6", "--set", "stop_when_settled=false")
+    process = runs.strike(at_work, signal.SIGINT, *endless)
     assert process.exitcode == 130
     assert process.log.read_text().splitlines()[-1] == "interrupted"
-    assert not (tmp_path / "out").exists()
+    assert not runs.out.exists()

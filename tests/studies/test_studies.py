@@ -1,10 +1,7 @@
 """Single trajectories."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import xarray as xr
 from scipy.interpolate import CubicSpline
 from support import Write
 
@@ -63,13 +60,6 @@ def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
     for i in range(2):
         np.testing.assert_array_equal(np.isfinite(both.spin[i]), both.time <= both.t_stop[i] * (1 + 1e-12))
     assert np.isclose(both.time, both.t_stop[0]).any()
-
-
-def test_a_saved_trajectory_is_plotted_over_time(write: Write, tmp_path: Path) -> None:
-    sweep.trajectory(sweep.load_config(write(STANDARD), {"t_end": 20.0}), mu=60).to_netcdf(tmp_path / "t.nc")
-    (line,) = xr.open_dataset(tmp_path / "t.nc").spin.plot()
-    assert line.axes.get_xlabel().startswith("time")
-    assert line.get_xdata()[-1] == pytest.approx(20)
 
 
 def test_trajectory_shows_the_motion(write: Write) -> None:

@@ -11,7 +11,7 @@ from sweep.kernels.status import LIFT_OFF, PARADOX, TOPPLED
 ROOT = Path(__file__).parent.parent.parent
 
 Write = Callable[..., Path]
-"""The fixture `write`: writes a configuration, by default a sweep of twelve cells, and returns its path."""
+"""The fixtures `write` and `kept`: write a configuration, by default a sweep of twelve cells, and return its path."""
 
 STANDARD = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 60.0, "n0": 0.05, "x0": 0.01, "y0": 0.01}
 """The standard case of Takano (2011)."""

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -13,6 +14,11 @@ from sweep.results.dataset import VARIABLES, described
 def entries(figure: Figure) -> list[str]:
     """The words of the legends below a figure."""
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+
+
+def maps(figure: Figure) -> list[Axes]:
+    """The panels of a figure, without its colour bars."""
+    return [axes for axes in figure.axes if axes.get_xlabel() or axes.get_title()]
 
 
 def constants(figure: Figure) -> str:

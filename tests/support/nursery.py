@@ -8,7 +8,12 @@ import ctypes
 import faulthandler
 import multiprocessing
 import os
+import signal
 import sys
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
 from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
@@ -16,6 +21,7 @@ from unittest.mock import patch
 
 from numba.np.ufunc import parallel
 
+from support.same import contents
 from sweep.cli import main
 from sweep.engine import executor, local
 from sweep.engine import run as engine_run
@@ -34,12 +40,57 @@ def context() -> Any:
     return started
 
 
-def start(arguments: list[str], log: Path, **settings: Any) -> Any:
-    """A process of `command`, which knows its `log`."""
-    process = context().Process(target=command, args=(arguments, log), kwargs=settings)
-    process.start()
-    process.log = log
-    return process
+@dataclass
+class Runs(AbstractContextManager["Runs"]):
+    """The command `VERB CONFIG --output OUT`, again and again; at the end of the context, no process of it is left."""
+
+    verb: str
+    config: Path
+    out: Path
+    started: list[Any] = field(default_factory=list)
+
+    def start(self, *arguments: str, **settings: Any) -> Any:
+        """A process that runs it, which knows the `log` of what it says."""
+        asked = [self.verb, str(self.config), "--output", str(self.out), *arguments]
+        log = self.out.parent / f"{self.out.name}.log{len(self.started)}"
+        process = context().Process(target=command, args=(asked, log), kwargs=settings)
+        process.start()
+        process.log = log
+        self.started.append(process)
+        return process
+
+    def finish(self, *arguments: str, **settings: Any) -> tuple[int, str]:
+        """Exit code and output of a process that runs it."""
+        process = self.start(*arguments, **settings)
+        process.join(120)
+        return process.exitcode, process.log.read_text(encoding="utf-8")
+
+    def complete(self, **settings: Any) -> dict[str, bytes]:
+        """The files after a process that succeeds."""
+        code, said = self.finish(**settings)
+        assert code == 0, said
+        return contents(self.out)
+
+    def strike(self, now: Callable[[], bool], with_signal: int, *arguments: str, delay: float = 0.0) -> Any:
+        """Start a process and send the signal so long after the moment `now`; None where it ended before that came."""
+        process = self.start(*arguments)
+        while not now():
+            if not process.is_alive():
+                return None
+            time.sleep(2e-4)
+        time.sleep(delay)
+        os.kill(process.pid, with_signal)
+        process.join(60)
+        if process.is_alive():
+            os.kill(process.pid, signal.SIGABRT)  # to have its stacks in the log
+            process.join(60)
+        return process
+
+    def __exit__(self, *_: object) -> None:
+        for process in self.started:
+            process.kill()
+            process.join()
+            process.close()
 
 
 def command(

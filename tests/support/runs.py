@@ -1,6 +1,6 @@
 """Runs that are interrupted, and whether two came to the same numbers."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +14,29 @@ from sweep.engine.reporter import Progress, Reporter
 from sweep.kernels import methods
 
 
-class Stop(Reporter):
-    """Interrupts after some chunks, as Ctrl-C does."""
+class Heard(Reporter):
+    """Keeps what a run tells, and does something at each chunk."""
 
-    def __init__(self, chunks: int) -> None:
-        self.left, self.notes, self.seen = chunks, list[str](), list[Progress]()
+    def __init__(self, act: Callable[[], object] = lambda: None) -> None:
+        self.act, self.notes, self.seen = act, list[str](), list[Progress]()
 
     def chunk(self, progress: Progress) -> None:
         self.seen.append(progress)
-        self.left -= 1
-        if self.left < 0:
-            raise KeyboardInterrupt
+        self.act()
 
     def note(self, message: str) -> None:
         self.notes.append(message)
+
+
+class Stop(Heard):
+    """Interrupts after some chunks, as Ctrl-C does."""
+
+    def __init__(self, chunks: int) -> None:
+        super().__init__(lambda: interrupt() if len(self.seen) > chunks else None)
+
+
+def interrupt() -> None:
+    raise KeyboardInterrupt
 
 
 def run_cells(bodies: Iterable[Mapping[str, float]], output: Path | None = None, **settings: Any) -> xr.Dataset:
