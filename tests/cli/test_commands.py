@@ -75,7 +75,7 @@ def test_a_dry_run_compiles_computes_and_writes_nothing(
     def fail(*_: object, **__: object) -> None:
         raise AssertionError("compiled or computed")
 
-    for name in ("jit.Cached.__call__", "kernels.build._start", "kernels.kernel.Kernel.advance"):
+    for name in ("jit.Cached.__call__", "jit.Cached.compile", "kernels.build._start", "kernels.kernel.Kernel.advance"):
         monkeypatch.setattr(f"sweep.{name}", fail)
     verb, *options = command.split()
     result = invoke(verb, write(), *options, "--output", tmp_path / "out", "--dry-run")
