@@ -3,7 +3,6 @@
 The inputs, and what must hold for each, are in tests/fuzzing/.
 """
 
-import signal
 from pathlib import Path
 from random import Random
 
@@ -30,14 +29,6 @@ SLOW = {"dry_run", "foreign"}
 """Kinds whose failing inputs are reported unshrunk: shrinking them takes minutes."""
 
 
-SECONDS = 20
-"""Allowed to one input."""
-
-
-def late(*_: object) -> None:
-    pytest.fail("no answer in time")  # no `Exception`, which a handler of damaged files would catch
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return fuzzing.prepare(tmp_path_factory.mktemp("fuzz"))
@@ -51,16 +42,12 @@ def test_any_input_is_accepted_or_refused(kind: str, times: int, folder: Path) -
     @settings(
         max_examples=times * EXAMPLES[kind], phases=[Phase.generate] if kind in SLOW else tuple(Phase),
         derandomize=times == 1, print_blob=True, suppress_health_check=[HealthCheck.too_slow],
+        deadline=20_000,
     )  # fmt: skip
     @given(st.randoms(use_true_random=False))
     def hand_in(random: Random) -> None:
-        signal.alarm(SECONDS)
-        try:
-            fuzzing.KINDS[kind](random, folder)
-        finally:
-            signal.alarm(0)
+        fuzzing.KINDS[kind](random, folder)
 
-    signal.signal(signal.SIGALRM, late)
     hand_in()
 
 

@@ -5,14 +5,14 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from support import columns
+from support import ROOT, columns
 
 from sweep.models.ladder import slip
 from sweep.models.model import take
 
 
 def test_traced_equations_are_those_of_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend("scripts")
+    monkeypatch.syspath_prepend(ROOT / "scripts")
     called = []
 
     def counted(x: float) -> float:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from support import ROOT
 
 import sweep
@@ -46,46 +45,23 @@ def test_there_are_three_computed_bodies() -> None:
     assert [path.stem for path in COMPUTED] == ["pebble", "plastic_toy", "wooden"]
 
 
-def kuypers(time: float) -> float:
-    """The spin of his body, in his axes with z up: angles α and β, F in place of -Ixy, and P below G."""
-    I1, I2, I3, delta, squares = 2e-4, 1.6e-3, 1.7e-3, 0.1, np.array([0.2, 0.03, 0.02]) ** 2
-    A, B = ((I1 + I2) / 2 + sign * (I1 - I2) / 2 * np.cos(2 * delta) for sign in (1, -1))
-    F = -(I1 - I2) / 2 * np.sin(2 * delta)
-    J, g, c = np.array([[A, -F, 0], [-F, B, 0], [0, 0, I3]]), 9.81, 1e-4
-
-    def down(alpha: complex, beta: complex) -> np.ndarray:
-        return np.array([np.cos(alpha) * np.sin(beta), -np.sin(alpha), -np.cos(alpha) * np.cos(beta)])
-
-    def contact(alpha: complex, beta: complex) -> np.ndarray:
-        mu = down(alpha, beta)
-        return squares * mu / np.sqrt(squares @ (mu * mu)) + np.array([0, 0, 1e-3])
-
-    def slopes(_: float, y: np.ndarray) -> np.ndarray:
-        alpha, beta, omega = y[0], y[1], y[2:]
-        turn = (omega[2] * np.cos(beta) - omega[0] * np.sin(beta)) / np.cos(alpha)
-        rates = omega[0] * np.cos(beta) + omega[2] * np.sin(beta), omega[1] - turn * np.sin(alpha)
-        x, mu = contact(alpha, beta), down(alpha, beta)
-        moving = contact(alpha + 1e-30j * rates[0], beta + 1e-30j * rates[1]).imag / 1e-30
-        pull = -np.cross(omega, moving + np.cross(omega, x)) - g * mu
-        torque = np.cross(x, pull) - np.cross(omega, J @ omega) - c * omega
-        return np.array([*rates, *np.linalg.solve(J + (x @ x) * np.eye(3) - np.outer(x, x), torque)])
-
-    end = solve_ivp(slopes, (0, time), [-0.02, -0.02, 0, 0, -8.0], "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
-    return float(-end[2:] @ down(*end[:2]))
-
-
-def test_the_wackelstein_is_kuypers() -> None:
-    """His axes point up, ours down."""
-    found = sweep.run(ROOT / "configs" / "wackelstein.yaml", omega3=[8.0], t_end=2.0)
-    assert float(found["spin_final"][0]) == pytest.approx(kuypers(float(found["t_stop"][0])), abs=1e-7)
-    assert int(found["reversals"][0]) == 1
+def test_the_wackelstein_has_the_inertia_that_its_head_tells() -> None:
+    given = load_config(ROOT / "configs" / "wackelstein.yaml").parameters
+    half, more, across = 9e-4, 7e-4 * np.cos(0.2), 7e-4 * np.sin(0.2)
+    for name, value in {"Ixx": half - more, "Iyy": half + more, "Izz": 1.7e-3, "Ixy": across}.items():
+        assert given[name].numbers[0] == pytest.approx(value, rel=1e-14), name
 
 
 @pytest.mark.parametrize(
-    ("name", "reverses"),
-    [("plastic_toy", 4.0), ("pebble", 4.0), pytest.param("wooden", -4.0, marks=pytest.mark.campaign)],
+    ("name", "fixed", "spin", "reverses"),
+    [
+        ("plastic_toy", {"mu": 0.3}, "n0", 4.0),
+        ("pebble", {"mu": 0.3}, "n0", 4.0),
+        ("wackelstein", {"t_end": 2.0}, "omega3", 8.0),
+        pytest.param("wooden", {"sigma": 5e-6}, "n0", -4.0, marks=pytest.mark.campaign),
+    ],
 )
-def test_which_way_a_body_reverses(name: str, reverses: float) -> None:
-    fixed = {"sigma": 5e-6} if name == "wooden" else {"mu": 0.3}
-    found = sweep.run(ROOT / "configs" / f"{name}.yaml", n0=[reverses, -reverses], t_end=6.0, **fixed)
+def test_which_way_a_body_reverses(name: str, fixed: dict[str, float], spin: str, reverses: float) -> None:
+    asked = {"t_end": 6.0, spin: [reverses, -reverses]} | fixed
+    found = sweep.run(ROOT / "configs" / f"{name}.yaml", **asked)
     assert (found["reversals"] > 0).values.tolist() == [True, False]

@@ -25,6 +25,10 @@ def mu(value: str) -> str:
     return small("[40, 60]", value)
 
 
+def drawn(n0: str, more: str = "samples: 32") -> str:
+    return small("[0.02, 0.05]", n0) + more + "\n"
+
+
 BOWL = ("{a: 0.2", "{surface: paraboloid, a: 0.01")
 
 # ruff: noqa: E501  (a table)
@@ -76,6 +80,17 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (SMALL + "measure: [reversals, [reversals]]\n", 6, "measure[1]", "or misfit, not ['reversals']"),
     (SMALL + "measure: {a: 1}\n", 6, "measure", "must be a list of reversals"),
     (SMALL + "measure: [reversals, reversals]\n", 6, "measure", "a measurement twice; name each once"),
+    (SMALL + "measure: [reversals, reversal_times, {reversal_times: 3}]\n", 6, "measure", "a measurement twice; name each once"),
+    (SMALL + "measure: [{reversal_times: 3}]\n", 6, "measure[0]", "reversal_times is measured with the reversals; add reversals"),
+    (SMALL + "measure: [first_reversal]\n", 6, "measure[0]", "first_reversal is measured with the reversals; add reversals"),
+    *((SMALL + f"measure: [reversals, {{reversal_times: {n}}}]\n", 6, "measure[1].reversal_times", f"must be a whole number from 1 to 1000, not {n}") for n in (0, 2.5)),
+    (SMALL + "measure: [reversals, {energy_error: 3}]\n", 6, "measure[1]", "energy_error takes no setting; write the name alone"),
+    (small("dopri5", "adams") + "measure: [lyapunov]\n", 6, "measure[0]", "lyapunov cannot be measured with method: adams; choose dopri5"),
+    (SMALL + "picture: [status, spn_mean]\n", 6, "picture[1]", "must be a variable, such as difference, ratio or regime, not 'spn_mean' (did you mean spin_mean?)"),
+    (SMALL + "picture: [cycle_mean]\n", 6, "picture[0]", "cycle_mean is not measured; add cycles to measure"),
+    (SMALL + "picture: [regime]\n", 6, "picture[0]", "regime is not measured; add cycles, lyapunov to measure"),
+    (SMALL + "picture: [status, status]\n", 6, "picture[1]", "status twice; name each once"),
+    (SMALL + "picture: status\n", 6, "picture", "must be a list of variables, such as [reversals, spin_mean], not 'status'"),
     (SMALL + "max_failed_fraction: 2\n", 6, "max_failed_fraction", "must be a finite number >= 0 and <= 1, not 2"),
     (small("name: small", "name: ../small"), 1, "name", "must be up to 100 letters, digits"),
     (small("{mu: [40, 60]}", "40"), 3, "friction", "must be a section with law, regularisation, mu, speed"),
@@ -91,6 +106,25 @@ BROKEN: list[tuple[str, int, str, str]] = [
     ("- 1\n- 2\n", 1, "", "a configuration is a mapping of keys to values"),
     ("", 1, "", "a configuration is a mapping of keys to values"),
     (SMALL + "---\nname: b\n", 6, "", "not YAML"),
+    ("model: analytic\nfriction: {mu: 60}\nverify: 0.1\n", 3, "verify", "the analytic model takes no steps to be verified; set it to 0"),
+    *((SMALL + f"refine: {n}\n", 6, "refine", f"must be a whole number >= 0 and <= 24, not {n}") for n in (-1, 1.5, 25)),
+    (SMALL + "refine: 2\nverify: 0.1\n", 7, "verify", "cannot be combined with refine; set it to 0"),
+    (SMALL + "refine: 2\nmeasure: [energy_error]\n", 7, "measure", "must have reversals, on which refine depends"),
+    ("model: analytic\nfriction: {mu: [40, 60]}\nrefine: 2\n", 3, "refine", "is a formula; set it to 0"),
+    ("friction: {mu: {start: 1, stop: 2, num: 5000}}\nbody: {b: {start: 2, stop: 3, num: 5000}}\nrefine: 1\n", 3, "refine", "keep to 16777216"),
+    ("cases: {mu: [60]}\nrefine: 1\n", 2, "refine", "cannot be combined with cases, which have no neighbours"),
+    (mu("{normal: [5, 9]}") + "samples: 32\n", 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, but 9 of 32 samples"),
+    (drawn("{normal: [0.05, -0.01]}"), 4, "start.n0.normal[1]", "must be the standard deviation, a finite"),
+    (drawn("{uniform: [0.02, 0]}"), 4, "start.n0.uniform[1]", "must be the highest value, a finite number > 0.02"),
+    (drawn("{normal: 0.05}"), 4, "start.n0.normal", "must be [mean, standard deviation], not 0.05"),
+    (drawn("{normal: [0.05, 0.01], num: 3}"), 4, "start.n0", "a distribution beside other keys"),
+    (drawn("0.05"), 6, "samples", "needs a parameter that is a distribution"),
+    (drawn("{normal: [0.05, 0.01]}", "samples: 32\nrefine: 2"), 7, "refine", "cannot be combined with samples"),
+    ("cases: {mu: [60]}\nstart: {n0: {normal: [0.05, 0.01]}}\n", 2, "start.n0", "cannot be a distribution beside cases"),
+    (drawn("{normal: [0.05, 0.01]}", "samples: 0"), 6, "samples", "must be a whole number >= 1 and <= 1000000, not 0"),
+    (drawn("0.05", "until: 0.1"), 6, "until", "needs a parameter that is a distribution"),
+    (drawn("{normal: [0.05, 0.01]}", "until: 0.1\nmeasure: [energy_error]"), 7, "measure", "must have reversals, on which until depends"),
+    (drawn("{normal: [0.05, 0.01]}", "until: 0.5"), 6, "until", "a number >= 0.001 and < 0.5"),
     # Beyond the paper: bodies, friction, starts and units.
     (stone(("1.7e-3", "1.9e-3")), 4, "body", "none of the principal ones may exceed the sum"),
     (stone(("Ixy: -2.0e-5", "Ixy: 6.0e-4")), 4, "body", "not positive definite"),

@@ -16,7 +16,6 @@ from support.cli import invoke
 from support.runs import in_sittings, same_numbers
 
 import sweep
-from sweep import ConfigError
 from sweep.engine import local, refinement
 from sweep.engine.cluster import Cluster
 from sweep.engine.local import Done
@@ -317,23 +316,3 @@ def test_command_tells_the_share(file: Path, refined: xr.Dataset, tmp_path: Path
 
 def test_in_other_processes(file: Path, refined: xr.Dataset, client: distributed.Client) -> None:
     same_numbers(sweep.run(file, cluster=Cluster(client)), refined)
-
-
-@pytest.mark.parametrize(
-    ("text", "place", "said"),
-    [
-        *((MAP.replace("refine: 2", f"refine: {n}"), "6:9: refine", f"must be a whole number >= 0 and <= 24, not {n}")
-          for n in (-1, 1.5, 25)),
-        (MAP + "verify: 0.1\n", "7:1: verify", "cannot be combined with refine; set it to 0"),
-        (MAP + "measure: [energy_error]\n", "7:1: measure", "must have reversals, on which refine depends"),
-        (MAP + "model: analytic\n", "6:1: refine", "is a formula; set it to 0"),
-        (MAP.replace("num: 1", "num: 500"), "6:1: refine", "keep to 16777216"),
-        ("cases: c.csv\nrefine: 1\n", "2:1: refine", "cannot be combined with cases, which have no neighbours"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_refined(text: str, place: str, said: str, write: Write, tmp_path: Path) -> None:
-    (tmp_path / "c.csv").write_text("mu\n60\n", encoding="utf-8")
-    with pytest.raises(ConfigError) as error:
-        sweep.load_config(write(text))
-    assert f"small.yaml:{place}: " in str(error.value)
-    assert said in str(error.value)

@@ -209,37 +209,6 @@ def test_tiles_cells_and_bodies_of_a_grid_with_a_table(
     assert row == CASE or "delta" in names or "sample" not in bodies.dims
 
 
-UNTIL = SCENE.replace("samples: 32", "until: 0.1")
-DRAWN = "n0: {normal: [0.05, 0.01]}, x0: {uniform: [0, 0.02]}"
-
-
-@pytest.mark.parametrize(
-    ("text", "old", "new", "words"),
-    [
-        (SCENE, "mu: 60", "mu: {normal: [5, 9]}", "mu: must be a finite number >= 0 and < 1e+12, but 10 of 32 samples"),
-        (SCENE, "[0.05, 0.01]", "[0.05, -0.01]", "start.n0.normal[1]: must be the standard deviation, a finite"),
-        (SCENE, "[0, 0.02]", "[0.02, 0]", "start.x0.uniform[1]: must be the highest value, a finite number > 0.02"),
-        (SCENE, "[0.05, 0.01]", "0.05", "start.n0.normal: must be [mean, standard deviation], not 0.05"),
-        (SCENE, "0.01]}", "0.01], num: 3}", "a distribution beside other keys"),
-        (SCENE, DRAWN, "n0: 0.05, x0: 0.01", "samples: needs a par"),
-        (SCENE, "samples: 32", "samples: 32\nrefine: 2", "refine: cannot be combined with samples"),
-        (
-            SCENE.replace("[2, 3]", "2"),
-            ", x0: {uniform: [0, 0.02]}, y0: 0.01",
-            "}\ncases: {x0: [0, 0.1]",
-            "start.n0: cannot be a distribution beside cases",
-        ),
-        (SCENE, "32", "0", "samples: must be a whole number >= 1 and <= 1000000, not 0"),
-        (UNTIL, DRAWN, "n0: 0.05", "until: needs a parameter that is a distr"),
-        (UNTIL, "integrator", "measure: [energy_error]\nintegrator", "must have reversals, on which until depends"),
-        (UNTIL, "0.1\n", "0.5\n", "a number >= 0.001 and < 0.5"),
-    ],
-)
-def test_what_cannot_be_sampled_is_refused(write: Write, text: str, old: str, new: str, words: str) -> None:
-    assert old in text
-    refused(invoke("run", write(text.replace(old, new))), words)
-
-
 @pytest.mark.parametrize("verb", ["critical", "boundaries"])
 def test_a_search_asks_for_numbers(write: Write, verb: str) -> None:
     refused(invoke(verb, write(SCENE)), "start.n0: is a distribution, of which run draws samples")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import xarray as xr
-from support import CHAOTIC
+from support import CHAOTIC, ROOT
 from support.figures import entries
 from support.kernels import default_measures
 
@@ -15,7 +15,7 @@ MEASURE = ["reversals", "margin", "sensitivity"]
 
 
 def run(**settings: object) -> xr.Dataset:
-    return sweep.run("configs/quick.yaml", **{"x0": 0.01, "y0": 0.01, **settings})
+    return sweep.run(ROOT / "configs" / "quick.yaml", **{"x0": 0.01, "y0": 0.01, **settings})
 
 
 def test_a_chaotic_cell_has_a_range_of_counts() -> None:

@@ -10,7 +10,6 @@ from support.cli import invoke
 from support.runs import in_sittings, same_numbers
 
 import sweep
-from sweep import ConfigError
 from sweep.engine.checks import verify
 from sweep.engine.executor import Work, execute
 from sweep.engine.plan import plan
@@ -108,5 +107,3 @@ def test_the_command_prints_the_verification(write: Write, tmp_path: Path) -> No
     result = invoke("run", write(), "--set", "verify=0.1", "--output", tmp_path / "out")
     assert result.exit_code == 0
     assert "verified: 2 cells run again with finer steps: 0 counts changed, the largest difference in" in result.stdout
-    with pytest.raises(ConfigError, match=r"verify: the analytic model takes no steps to be verified; set it to 0"):
-        sweep.load_config(write("model: analytic\nfriction: {mu: 60}\nverify: 0.1\n"))

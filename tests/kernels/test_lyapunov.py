@@ -13,7 +13,6 @@ from support import Write, columns
 from support.kernels import finish, images_of, kernel
 
 import sweep
-from sweep import ConfigError
 from sweep.jit import inline
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.layout import BLOCK
@@ -160,8 +159,3 @@ def test_it_does_not_depend_on_how_a_run_is_divided() -> None:
 def test_auto_is_dopri5_with_it(method: str | None, write: Write) -> None:
     given = {"measure": ["lyapunov"], "integrator": {} if method is None else {"method": method}}
     assert sweep.load_config(write("friction: {mu: 60}\n"), given).integrator.method == "dopri5"
-
-
-def test_adams_refuses_it(write: Write) -> None:
-    with pytest.raises(ConfigError, match="cannot be measured with method: adams; choose dopri5"):
-        sweep.load_config(write("friction: {mu: 60}\n"), {"measure": ["lyapunov"], "method": "adams"})

@@ -8,7 +8,6 @@ import xarray as xr
 from support import Write
 
 import sweep
-from sweep import ConfigError
 
 TEXT = """\
 name: times
@@ -57,21 +56,6 @@ def test_the_dataset_has_a_dimension_for_them(found: xr.Dataset, config: Path) -
     assert list(times.reversal) == [1, 2, 3]
     assert times.attrs == {"long_name": "time of each spin reversal, in sqrt(c/g)"}
     xr.testing.assert_identical(times, xr.load_dataset(config.with_suffix(".nc")).reversal_times)
-
-
-@pytest.mark.parametrize(
-    ("measure", "words"),
-    [
-        ([{"reversal_times": 3}], "measured with the reversals; add reversals"),
-        (["reversals", {"reversal_times": 0}], "must be a whole number from 1 to 1000, not 0"),
-        (["reversals", {"reversal_times": 2.5}], "must be a whole number from 1 to 1000, not 2.5"),
-        (["reversals", {"energy_error": 3}], "energy_error takes no setting; write the name alone"),
-        (["reversals", "reversal_times", {"reversal_times": 3}], "a measurement twice; name each once"),
-    ],
-)
-def test_a_wrong_setting_is_refused(measure: list[object], words: str, write: Write) -> None:
-    with pytest.raises(ConfigError, match=words):
-        sweep.load_config(write(TEXT), {"measure": measure})
 
 
 def test_the_setting_survives_in_the_configuration_of_the_dataset(found: xr.Dataset, write: Write) -> None:

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from support import STANDARD, newton, wide_bodies
 from support import cells as all_cells
-from support import newton
 from support.physics import KANE_LEVINSON
 
 from sweep.models import find
@@ -63,44 +62,43 @@ def test_the_equations_and_the_energy_are_those_of_newton_and_euler(
     for couple in filter(None, couples.split("+")):
         parameters = parameters | {name: COUPLES[name] for name in KINDS[couple].parameters}
     name = f"slip+{law}{couples}" if law else f"noslip+solid{couples}"
-    model, constants = one(f"{name}+paraboloid" if body is BOWL else name, parameters)
     for number in range(30):
-        y = states(number, len(model.states))
-        slopes, (spin, power, force, _) = model.rhs(tuple(y), constants)
-        expected, N, lost = newton.derivative(y, parameters, law)
-        np.testing.assert_allclose(slopes, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
-        assert force == pytest.approx(N / parameters["mass"], rel=1e-12)
-        assert power == pytest.approx(lost / parameters["mass"], rel=1e-12)
-        assert spin == pytest.approx(y[2:5] @ [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], rel=1e-12)
-        # The derivative of the energy along the motion, by a complex step.
-        spin, rattle, inertia = model.energy(tuple(y + 1e-30j * np.array(slopes)), constants)
-        total = rattle + 0.5 * inertia * spin**2
-        assert total.real == pytest.approx(newton.energy(y, parameters, law), rel=1e-12)
-        assert total.imag / 1e-30 == pytest.approx(-power, rel=1e-11, abs=1e-11 * total.real * np.abs(slopes).max())
+        agree(f"{name}+paraboloid" if body is BOWL else name, parameters, law, number)
 
 
-@pytest.mark.parametrize(("sigma", "omega3", "time"), [(0, -5, 2.855), (1e-4, -5, 2.556), (0, 5, 11.53)])
-def test_kane_and_levinson_1982(sigma: float, omega3: float, time: float) -> None:
-    """The spin, which ripples, has changed its sign for good at the published time."""
-    start = {"roll": np.radians(0.5), "pitch": np.radians(0.5), "omega1": 0.0, "omega2": 0.0, "omega3": omega3}
-    parameters = KANE_LEVINSON | start | {"sigma": sigma}
-    model, constants = one("noslip+solid+sigma", parameters)
-    solution = solve_ivp(
-        lambda t, y: np.array(model.rhs(tuple(y), constants)[0]),  # noqa: ARG005
-        (0, 15), np.array(model.start(cells(**parameters)))[:, 0], "DOP853", rtol=1e-10, atol=1e-13,
-        events=lambda t, y: float(model.energy(tuple(y), constants)[0]),  # noqa: ARG005
-    )  # fmt: skip
-    found = solution.t_events[0]
-    assert len(found) % 2 == 1
-    assert found[-1] == pytest.approx(time, abs=0.005)
+@pytest.mark.parametrize(("name", "law"), [("slip", "viscous"), ("noslip", None)])
+def test_so_are_those_of_the_papers_body(name: str, law: str | None) -> None:
+    bodies = wide_bodies(100)
+    for i in range(100):
+        agree(name, {each: values[i] for each, values in bodies.items()}, law, i)
 
 
-@pytest.mark.parametrize("body", [KANE_LEVINSON, SKEW])
-def test_frequencies_are_those_of_the_equations(body: dict[str, float]) -> None:
-    model, _ = one("noslip+solid", body)
-    values = linear.jacobian(model, model.constants.of(cells(**body)), np.zeros(1))[0]
-    expected = np.unique(np.abs(np.linalg.eigvals(values).imag).round(9))
-    np.testing.assert_allclose(np.ravel(frequencies(rigid_body.rocking(cells(**body)))), expected[-2:], rtol=1e-8)
+def agree(name: str, parameters: dict[str, Any], law: str | None, number: int) -> None:
+    """A model and Newton's equations, in random states."""
+    model, constants = one(name, parameters)
+    y, m = states(number, len(model.states)), parameters.get("mass", 1.0)
+    slopes, (spin, power, force, _) = model.rhs(tuple(y), constants)
+    expected, N, lost = newton.derivative(y, parameters, law)
+    np.testing.assert_allclose(slopes, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+    assert force == pytest.approx(N / m, rel=1e-12)
+    assert power == pytest.approx(lost / m, rel=1e-12)
+    assert spin == pytest.approx(y[2:5] @ [y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)], rel=1e-12)
+    # The derivative of the energy along the motion, by a complex step.
+    spin, rattle, inertia = model.energy(tuple(y + 1e-30j * np.array(slopes)), constants)
+    total = rattle + 0.5 * inertia * spin**2
+    assert total.real == pytest.approx(newton.energy(y, parameters, law), rel=1e-12)
+    assert total.imag / 1e-30 == pytest.approx(-power, rel=1e-11, abs=1e-11 * total.real * np.abs(slopes).max())
+
+
+@pytest.mark.parametrize(
+    ("name", "body"), [("noslip", STANDARD), ("noslip+solid", KANE_LEVINSON), ("noslip+solid", SKEW)]
+)
+def test_frequencies_are_those_of_the_equations(name: str, body: dict[str, float]) -> None:
+    model, columns = find(name), cells(**body)
+    values = linear.jacobian(model, model.constants.of(columns), np.zeros(1))[0]
+    expected = np.unique(np.abs(np.linalg.eigvals(values).imag).round(9))[-2:]
+    np.testing.assert_allclose(np.ravel(frequencies(rigid_body.rocking(columns))), expected, rtol=1e-8)
+    assert model.slower_period(columns)[0] == pytest.approx(2 * np.pi / expected[0], rel=1e-8)
 
 
 def test_the_ripple_free_spin_of_a_real_body_hardly_ripples() -> None:

@@ -1,4 +1,4 @@
-"""The full model against a second derivation and its energy balance."""
+"""Starts, limits and bounds of the full model; `test_general` has its equations."""
 
 import numpy as np
 import pytest
@@ -6,42 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import columns, newton
 
-from sweep.models.ladder import noslip, slip
+from sweep.models.ladder import slip
 from sweep.models.model import stack, take
-
-bodies = st.fixed_dictionaries(
-    {
-        "a": st.floats(2, 15),
-        "b": st.floats(1.1, 10),
-        "c": st.floats(0.5, 1.5),
-        "delta": st.floats(-0.5, 0.5),
-        "mu": st.floats(0, 300),
-    }
-)
-tilt, rate, slide = st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.01, 0.01)
-states = st.tuples(tilt, tilt, rate, rate, rate, slide, slide).map(np.array)
-
-
-@given(states, bodies)
-def test_the_equations_and_the_energy_are_those_of_newton_and_euler(y: np.ndarray, body: dict[str, float]) -> None:
-    """With slip, and without it, where the contact rests."""
-    u = np.array([y[0], y[1], -np.sqrt(1 - y[0] ** 2 - y[1] ** 2)])
-    for model, law in ((slip, "viscous"), (noslip, None)):
-        y = y if law else y[:5]
-        constants = take(model.Constants.of(columns(**body)), 0)
-        slopes, (spin, power, R, _) = model.rhs(tuple(y), constants)
-        expected, N, lost = newton.derivative(y, body, law)
-        scale = 1 + np.abs(expected).max()
-        np.testing.assert_allclose(slopes, expected, atol=1e-10 * scale)
-        assert pytest.approx(N, abs=1e-10 * scale) == R
-        assert (spin, power) == (pytest.approx(u @ y[2:5], abs=1e-14), pytest.approx(lost, rel=1e-9, abs=1e-9))
-
-        spin, rattle, J = model.energy(tuple(y), constants)
-        assert rattle + 0.5 * J * spin**2 == pytest.approx(newton.energy(y, body, law), rel=1e-9, abs=1e-12)
-        # The derivative of the energy along the motion, by a complex step.
-        spin, rattle, J = model.energy(y + 1e-30j * np.array(slopes), constants)
-        change = (rattle + 0.5 * J * spin**2).imag / 1e-30
-        assert change == pytest.approx(-power, abs=1e-10 * (1 + abs(power)) if law else 1e-11 * scale)
 
 
 @given(

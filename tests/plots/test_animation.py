@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
+from support import ROOT
 from support.cli import invoke, refused
 
 from sweep.plots import animation, body
@@ -105,4 +106,4 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path, monkeypatch: pytest.Mon
         animation.animate(turning(), tmp_path / "clip.mp4")
     with pytest.raises(ValueError, match="unknown format"):
         animation.animate(turning(), tmp_path / "clip.avi")
-    refused(invoke("animate", "configs/mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")
+    refused(invoke("animate", ROOT / "configs" / "mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")

@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-import pytest
 from support import Write
-from support.cli import invoke, refused
+from support.cli import invoke
 
 import sweep
 from sweep.config import load_config
@@ -67,23 +66,6 @@ def test_pictures_of_a_file_are_set_aside_where_something_else_is_measured() -> 
     assert load_config(asked, {"measure": ["reversals"]}).picture == ()
     assert load_config(asked, {"measure": ["reversals"], "picture": ["status"]}).picture == ("status",)
     assert load_config(asked, {"mu": [20, 70]}).picture == ("cycle_mean",)
-
-
-@pytest.mark.parametrize(
-    ("named", "said"),
-    [
-        ("[status, spn_mean]", "4:19: picture[1]: must be a variable, such as difference, ratio or regime, "
-         "not 'spn_mean' (did you mean spin_mean?)"),
-        ("[cycle_mean]", "4:11: picture[0]: cycle_mean is not measured; add cycles to measure"),
-        ("[regime]", "4:11: picture[0]: regime is not measured; add cycles, lyapunov to measure"),
-        ("[status, status]", "4:19: picture[1]: status twice; name each once"),
-        ("status", "4:10: picture: must be a list of variables, such as [reversals, spin_mean], not 'status'"),
-    ],
-)  # fmt: skip
-def test_what_no_run_has_is_refused_before_it_begins(named: str, said: str, tmp_path: Path, write: Write) -> None:
-    file = write(f"{FORMULA}picture: {named}\n", "map.yaml")
-    refused(invoke("run", file, "--output", tmp_path / "out"), f"{file}:{said}")
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_drawn(tmp_path: Path, write: Write) -> None:

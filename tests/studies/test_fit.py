@@ -224,11 +224,12 @@ def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: 
         (["mu", "n0", "x0"], {"x0": 0.0}, "give the ends of its range as two values"),
         (["film_lean_x"], {}, "film_lean_x is no parameter of the slip model"),
         (["mu"], {"model": "analytic", "n0": 0.05}, "is a formula and cannot be simulated"),
+        (["mu"], {"laws": ["viscuos"]}, "viscuos is no law of friction (did you mean viscous?); choose from viscous"),
+        (["muu"], {"laws": ["viscous"]}, "muu is no parameter of the slip"),
+        (["mu"], {"laws": ["none"]}, "name the free parameters"),
     ],
 )
-def test_what_cannot_be_fitted_is_refused(
-    write: Write, free: list[str], overrides: dict[str, object], words: str
-) -> None:
+def test_what_cannot_be_fitted_is_refused(write: Write, free: list[str], overrides: dict[str, Any], words: str) -> None:
     film = Film(np.arange(9.0), np.ones(9))
     with pytest.raises(ConfigError) as refusal:
         sweep.fit(write(SCENE), film, free, **overrides)

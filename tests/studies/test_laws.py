@@ -9,7 +9,6 @@ from support import Write, newton
 from support.cli import invoke
 
 import sweep
-from sweep.config import ConfigError
 from sweep.kernels.measures.misfit import Film
 
 STONE = """\
@@ -88,17 +87,3 @@ def test_the_command_writes_table_picture_and_the_best_body(write: Write, tmp_pa
     assert sweep.load_config(out / "stone_laws.yaml").law == "viscous"
     for verb in ("info", "plot"):
         assert invoke(verb, out / "stone_laws.nc").exit_code == 0
-
-
-@pytest.mark.parametrize(
-    ("laws", "free", "words"),
-    [
-        (["viscuos"], ["mu"], "viscuos is no law of friction (did you mean viscous?); choose from viscous, none"),
-        (["viscous"], ["muu"], "muu is no parameter of the slip"),
-        (["none"], ["mu"], "name the free parameters"),
-    ],
-)
-def test_what_cannot_be_compared_is_refused(write: Write, laws: list[str], free: list[str], words: str) -> None:
-    with pytest.raises(ConfigError) as refusal:
-        sweep.fit(write(STONE), Film(np.arange(9.0), np.ones(9)), free, laws=laws)
-    assert words in str(refusal.value)
