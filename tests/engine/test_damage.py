@@ -122,7 +122,12 @@ DAMAGES: dict[str, Callable[[Path], None]] = {
 }
 
 
-@pytest.mark.parametrize("how", DAMAGES)
+QUICK = ("flip0.3", "another's")
+
+
+@pytest.mark.parametrize(
+    "how", [how if how in QUICK else pytest.param(how, marks=pytest.mark.campaign) for how in DAMAGES]
+)
 def test_damaged_tiles_and_images_are_computed_again(
     config: Path, out: Path, undisturbed: dict[str, bytes], how: str
 ) -> None:
