@@ -2,8 +2,6 @@
 
 import csv
 import re
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.cli import invoke
+from support.processes import python
 
 from sweep.bench import hard, precision, report
 from sweep.bench.reference import Spins, read_spins, spin_errors, whole_steps
@@ -105,8 +104,7 @@ assert report.bench(Path(sys.argv[1]), print, effort) == []
 @pytest.mark.campaign
 def test_a_tiny_run_has_every_section_for_every_method(tmp_path: Path) -> None:
     """Also for one that has just been added to the registry."""
-    done = subprocess.run([sys.executable, "-c", TINY, str(tmp_path)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    told = python("-c", TINY, tmp_path).stdout
     with (tmp_path / "bench.csv").open(encoding="utf-8", newline="") as stream:
         lines = list(csv.DictReader(stream))
     everywhere = {("slip", "dopri5"), ("slip", "adams"), ("slip", "twin")}
@@ -135,8 +133,8 @@ def test_a_tiny_run_has_every_section_for_every_method(tmp_path: Path) -> None:
     assert sum(shares.values()) == pytest.approx(2 * shares["whole_seconds"], rel=1e-5)
 
     titles = ("Work and precision", "Time of a step", "Cost", "Whole runs", "Hard cases")
-    assert all(f"\n{title}\n" in done.stdout for title in titles)
-    assert "short [twin]" in done.stdout
+    assert all(f"\n{title}\n" in told for title in titles)
+    assert "short [twin]" in told
     page = (tmp_path / "bench.html").read_text(encoding="utf-8")
     assert not re.search("https?:", page)  # letters alone occur in pictures by chance
     assert page.count("<h2>") == 7

@@ -1,16 +1,14 @@
 """Each change of the table in `docs/explanation/layout.md` is made, in a copy of the package, in the files it names."""
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from support import ROOT
 from support.own import PENDULUM
+from support.processes import python
 
 
 @dataclass(frozen=True)
@@ -222,8 +220,5 @@ def test_a_change_of_these_files_works(name: str, tmp_path: Path) -> None:
             text = text.replace(old, new)
         (tmp_path / path).write_text(text, encoding="utf-8")
     (tmp_path / "pendulum.py").write_text(PENDULUM, encoding="utf-8")
-    run = [sys.executable, "-c", f"import sweep\nassert sweep.__file__.startswith({str(tmp_path)!r})\n{change.works}"]
-    done = subprocess.run(
-        run, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
+    program = f"import sweep\nassert sweep.__file__.startswith({str(tmp_path)!r})\n{change.works}"
+    python("-c", program, folder=tmp_path, PYTHONPATH=str(tmp_path))

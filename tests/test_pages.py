@@ -6,14 +6,13 @@ python -m pytest -m browser -n0 tests/test_pages.py
 from __future__ import annotations
 
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 from support import ROOT
+from support.processes import python
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext
@@ -29,9 +28,7 @@ TYPESET = "window.MathJax?.startup?.promise.then(() => null, String)"
 @pytest.fixture(scope="module")
 def pages() -> list[Path]:
     """Every page, built by the command of the README; what has not changed since the last build is not made again."""
-    command = [sys.executable, *shlex.split("-m sphinx -j auto -W --keep-going -q -b html docs build/docs")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    python(*shlex.split("-m sphinx -j auto -W --keep-going -q -b html docs build/docs"))
     return sorted(BUILD.rglob("*.html"))
 
 

@@ -1,7 +1,6 @@
 """How a command starts: it loads nothing that it does not need, and Ctrl-C is one line from the beginning on."""
 
 import json
-import os
 import re
 import signal
 import subprocess
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from support import ROOT, SMALL, Write
+from support.processes import python
 
 HEAVY = {"numba", "llvmlite", "xarray", "pandas", "netCDF4", "dask", "distributed", "matplotlib", "scipy", "pint"}
 """Each takes from a tenth of a second to a whole one."""
@@ -58,8 +58,7 @@ COMPLETED = {
 def test_the_shell_completes_and_loads_nothing_heavy(typed: str) -> None:
     words = f"sweep {typed}".split(" ")
     asked = {"_SWEEP_COMPLETE": "bash_complete", "COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1)}
-    command = [sys.executable, "-X", "importtime", "-m", "sweep"]
-    done = subprocess.run(command, cwd=ROOT, env=os.environ | asked, capture_output=True, text=True, check=True)
+    done = python("-X", "importtime", "-m", "sweep", **asked)
     assert [line.removeprefix("plain,") for line in done.stdout.split()] == COMPLETED[typed].split()
     assert {name.partition(".")[0] for name in _IMPORT.findall(done.stderr)} & HEAVY == set()
 
@@ -80,9 +79,7 @@ print(json.dumps([codes, [*sys.modules]]))
 
 def loaded(commands: list[list[str]]) -> tuple[list[int], set[str]]:
     """The exit codes of commands, one after another in a process of their own, and the packages that they load."""
-    run = [sys.executable, "-c", PROGRAM, json.dumps(commands)]
-    done = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True)
-    codes, modules = json.loads(done.stdout.splitlines()[-1])
+    codes, modules = json.loads(python("-c", PROGRAM, json.dumps(commands)).stdout.splitlines()[-1])
     return codes, {name.partition(".")[0] for name in modules}
 
 
@@ -108,7 +105,7 @@ for name, loaded in (("run", set()), ("load_config", {"numpy"}), ("predict", {"n
     getattr(sweep, name)
     assert {"numpy", "xarray"} & set(sys.modules) == loaded
 """
-    subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True)
+    python("-c", program)
 
 
 MOMENTS = "click sweep.cli ruamel.yaml numpy pydantic sweep.config numba xarray sweep.engine.run"

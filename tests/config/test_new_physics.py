@@ -1,9 +1,6 @@
 """A new surface or law of friction is its record alone: what the configuration and labels know stands there."""
 
-import subprocess
-import sys
-
-from support import ROOT
+from support.processes import python
 
 PROGRAM = """
 from dataclasses import replace
@@ -70,5 +67,4 @@ refused(lambda: load_config({"body": {"surface": "dish", **INERTIA}, "friction":
 
 
 def test_a_new_surface_and_a_new_law_are_their_records_alone() -> None:
-    done = subprocess.run([sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    python("-c", PROGRAM)

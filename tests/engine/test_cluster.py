@@ -20,6 +20,7 @@ import xarray as xr
 from support import ROOT, Write
 from support.cli import invoke
 from support.kernels import threads
+from support.processes import python
 from support.runs import Heard, Stop, same_numbers
 from support.same import contents
 
@@ -205,7 +206,7 @@ def test_a_tile_that_kills_its_workers_is_reported(
 
 
 def command(config: Path, out: Path) -> list[str]:
-    return [sys.executable, "-m", "sweep", "run", str(config), "--output", str(out), "--workers", "2"]
+    return ["-m", "sweep", "run", str(config), "--output", str(out), "--workers", "2"]
 
 
 def test_only_the_run_itself_reaches_its_local_scheduler() -> None:
@@ -220,10 +221,8 @@ def test_only_the_run_itself_reaches_its_local_scheduler() -> None:
 
 @pytest.mark.campaign
 def test_local_processes_give_the_same_files(config: Path, tmp_path: Path, by_threads: dict[str, bytes]) -> None:
-    done = subprocess.run(
-        [*command(config, tmp_path), "--quiet"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    done = python(*command(config, tmp_path), "--quiet")
+    assert (done.stdout, done.stderr) == ("", "")
     assert contents(tmp_path) == by_threads
 
 
@@ -233,7 +232,7 @@ def test_ctrl_c_ends_all_processes(
     config: Path, tmp_path: Path, by_threads: dict[str, bytes], send: Callable[[int, int], None]
 ) -> None:
     with subprocess.Popen(
-        [*command(config, tmp_path), "--set", "t_end=5000"],
+        [sys.executable, *command(config, tmp_path), "--set", "t_end=5000"],
         cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
     ) as process:  # fmt: skip
         while not list(tmp_path.glob("tiles.checkpoint/identity.json")):
@@ -269,8 +268,7 @@ for address in sys.argv[3:]:
 def test_a_scheduler_that_does_not_answer_is_reported(config: Path, tmp_path: Path) -> None:
     """In a process of its own, for what dask still says when that ends: one line for each is all that is printed."""
     addresses = ["tcp://127.0.0.1:1", "nonsense", "foo://here:1"]
-    command = [sys.executable, "-c", UNANSWERED, str(config), str(tmp_path), *addresses]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=120)
+    done = python("-c", UNANSWERED, config, tmp_path, *addresses)
     assert done.stdout.split() == ["2"] * len(addresses)
     lines = done.stderr.splitlines()
     assert len(lines) == len(addresses), done.stderr

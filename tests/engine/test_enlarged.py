@@ -8,14 +8,13 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from support import ROOT, Write
+from support import Write
 from support.runs import Heard, Stop, same_numbers
 
 import sweep
 from sweep import StoreError
-from sweep.engine.enlarged import reason_against, taken_over
+from sweep.engine.enlarged import taken_over
 from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
-from sweep.results.provenance import identify
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
@@ -172,21 +171,6 @@ def test_nothing_is_taken_from_other_sources(write: Write, tmp_path: Path, monke
     monkeypatch.setattr("sweep.results.provenance.sources", lambda _maker: ("other", "versions"))
     with pytest.raises(StoreError, match="not resumed"):
         grown(write, tmp_path / "out", MORE)
-
-
-def test_another_law_of_friction_is_another_run(write: Write) -> None:
-    text = (ROOT / "configs" / "kane_levinson_coulomb.yaml").read_text(encoding="utf-8")
-    mine = sweep.load_config(write(text))
-    dims, coordinates = (
-        tuple(mine.axes),
-        {n: list(v.numbers) if v.is_axis else v.numbers[0] for n, v in mine.parameters.items()},
-    )
-    there = xr.Dataset({"status": (dims, np.ones([len(mine.axes[d]) for d in dims]))}, coordinates)
-    longer = sweep.load_config(mine, {"t_end": 2000})
-    assert not reason_against(longer, identify(mine), identify(longer), there, None)
-    other = sweep.load_config(write(text.replace("sqrt", "tanh")))
-    assert other.parameters == mine.parameters
-    assert "tanh" in reason_against(other, identify(mine), identify(other), there, None)
 
 
 def test_a_scene_does_not_grow_into_another(write: Write, tmp_path: Path) -> None:

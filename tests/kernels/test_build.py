@@ -14,6 +14,7 @@ import psutil
 import pytest
 from support import ENDS, ROOT, Write, columns
 from support.kernels import kernel, threads
+from support.processes import python
 from support.runs import run_cells
 
 import sweep
@@ -159,8 +160,7 @@ def test_without_a_cache_a_run_compiles_for_itself(folder: str, write: Write, tm
     program = "from sweep.__main__ import main\nmain()\n"
     if folder == "none at all":
         program = "from numba.core.caching import CacheImpl\nCacheImpl._locator_classes = []\n" + program
-    command = [sys.executable, "-c", program, "run", write(text), "--output", tmp_path / "out"]
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    python(
+        "-c", program, "run", write(text), "--output", tmp_path / "out", NUMBA_CACHE_DIR=str(tmp_path / "cache")
+    )  # fmt: skip
     assert (tmp_path / "out" / "small.nc").exists()

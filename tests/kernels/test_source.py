@@ -1,16 +1,13 @@
 """A debugger stops in the equations, and the source of a kernel says what it is bound to."""
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from inspect import getsourcelines
 from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT
+from support.processes import python
 
 import sweep
 from sweep.kernels import source
@@ -50,11 +47,7 @@ def test_a_debugger_stops_in_the_equations(method: str, function: Callable[..., 
     file, head = function.__code__.co_filename, getsourcelines(function)[1] + 1
     line = min(line for *_, line in function.__code__.co_lines() if line and line > head)
     request = json.dumps([SCENE, method, file, line, wanted])
-    done = subprocess.run(
-        [sys.executable, "-c", DEBUGGED, request], cwd=ROOT, env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    way, spin, violation, step = json.loads(done.stdout)
+    way, spin, violation, step = json.loads(python("-c", DEBUGGED, request, NUMBA_DISABLE_JIT="1").stdout)
     assert wanted in way
     compiled = sweep.run(SCENE, method=method, t_end=3)
     np.testing.assert_array_equal(step, compiled.step)

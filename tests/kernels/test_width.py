@@ -1,24 +1,19 @@
 """Loops over lanes are vectorised as widely as the CPU can, and the width changes no bit."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import llvmlite.binding as llvm
 import numpy as np
 import pytest
 from support import ROOT
+from support.processes import python
 
 WIDE = "+avx512f,+avx512vl,+avx512dq,+avx512bw,+avx2,+fma,+avx,+prefer-256-bit"
 """A CPU of the kind for which LLVM prefers vectors narrower than the widest."""
 
 
-def python(code: str, cache: Path, **environment: str) -> str:
-    variables = os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(ROOT)} | environment
-    return subprocess.run(
-        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
-    ).stdout
+def run(code: str, cache: Path, **environment: str) -> str:
+    return python("-c", code, NUMBA_CACHE_DIR=str(cache), **environment).stdout
 
 
 @pytest.mark.x86
@@ -34,7 +29,7 @@ add = compiled(compile_inline("add", "x, y", {lines}, {{"full_width": full_width
 add.compile((numba.float64[::1], numba.float64[::1]))
 print(next(iter(add.inspect_asm().values())))
 """
-    assembly = python(code, tmp_path, NUMBA_CPU_NAME="skylake-avx512", NUMBA_CPU_FEATURES=WIDE)
+    assembly = run(code, tmp_path, NUMBA_CPU_NAME="skylake-avx512", NUMBA_CPU_FEATURES=WIDE)
     assert ("zmm" in assembly) == wide
 
 
@@ -48,9 +43,9 @@ for method in ("dopri5", "adams"):
     run = sweep.run({str(ROOT / "configs" / "quick.yaml")!r}, method=method, n0=0.05, b=[1.2, 3.0, 8.5], t_end=1000)
     np.save(f"{tmp_path}/{{vector_bits()}}-{{method}}.npy", np.stack([run.spin_final, run.reversals, run.t_stop]))
 """
-    python(code, tmp_path / "512")
+    run(code, tmp_path / "512")
     features = ",".join(f"+{name}" for name, has in llvm.get_host_cpu_features().items() if has and "512" not in name)
-    python(code, tmp_path / "256", NUMBA_CPU_NAME="haswell", NUMBA_CPU_FEATURES=features)
+    run(code, tmp_path / "256", NUMBA_CPU_NAME="haswell", NUMBA_CPU_FEATURES=features)
     for method in ("dopri5", "adams"):
         wide, narrow = (np.load(tmp_path / f"{bits}-{method}.npy") for bits in (512, 256))
         np.testing.assert_array_equal(wide, narrow)
