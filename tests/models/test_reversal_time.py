@@ -88,16 +88,6 @@ def test_the_mirror_image_reverses_at_the_same_time() -> None:
         assert one == pytest.approx(other, rel=1e-13)
 
 
-def test_si_and_natural_units_give_the_same_time() -> None:
-    m, L, g = (KANE_LEVINSON[name] for name in ("mass", "c", "gravity"))
-    T = np.sqrt(L / g)
-    natural = {name: value / L for name, value in KANE_LEVINSON.items() if name in ("a", "b", "c", "offset")}
-    natural |= {name: value / (m * L**2) for name, value in KANE_LEVINSON.items() if name.startswith("I")}
-    natural |= {name: value * (T if name.startswith("omega") else 1) for name, value in ANGLES.items()}
-    one, other = (first_reversal(cells(**given), NO_SLIP)[0][0] for given in (KANE_LEVINSON | ANGLES, natural))
-    assert one == pytest.approx(other * T, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("model", "given", "reason"),
     [

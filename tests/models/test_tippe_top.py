@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import ROOT
 from support.newton import cross
+from support.runs import settled
 
 import sweep
-from sweep.kernels.status import SETTLED, TIME_LIMIT
 
 CONFIG = ROOT / "configs" / "tippe_top.yaml"
 TOP = {"eccentricity": 0.3, "ratio": 0.936, "C": 0.4, "mu": 0.3, "n0": 6.0, "tilt": 0.1}
@@ -96,14 +96,10 @@ def test_no_settled_top_reverses_later() -> None:
     tops = {"eccentricity": draw(0.01, 0.6, n), "ratio": draw(0.6, 1.8, n), "C": draw(0.2, 0.6, n)}
     tops |= {"mu": 10 ** draw(-2, 0.5, n), "n0": draw(0.2, 8, n), "tilt": draw(0, 3, n)}
     asked = {"model": str(CONFIG.with_suffix(".py")), "cases": tops, "max_failed_fraction": 1}
-    ends = sweep.run(asked, t_end=1000)
-    later = sweep.run(asked, t_end=1000, stop_when_settled=False)
-    settled = (ends["status"] == SETTLED) & (later["status"] == TIME_LIMIT)
-    assert settled.sum() > 0.7 * n
+    ends, later, which = settled(asked, 0.7, t_end=1000)
     for low, high in ((0, 0), (1, 1), (2, 99)):
-        assert (settled & (low <= ends["reversals"]) & (ends["reversals"] <= high)).any()
-    assert not (settled & (ends["reversals"] != later["reversals"])).any()
-    assert not (settled & (ends["spin_final"] * later["spin_final"] <= 0)).any()
+        assert (which & (low <= ends["reversals"]) & (ends["reversals"] <= high)).any()
+    assert (ends["spin_final"] * later["spin_final"] > 0).values[which].all()
 
 
 def test_the_automatic_step_keeps_the_tolerance() -> None:

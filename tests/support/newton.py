@@ -31,8 +31,9 @@ LAWS: dict[str, Callable[[float, Mapping[str, float]], float]] = {
     "coulomb-tanh": lambda x, p: p["mu"] * np.tanh(x / p["speed"]),
     "coulomb-cubic": lambda x, p: p["mu"] * x / _rounded(x, p["speed"]),
     "stribeck": _stribeck,
+    "fading": lambda x, p: p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2),
 }
-"""Friction force per unit of normal force, at the slip velocity x >= 0."""
+"""Friction force per unit of normal force, at the slip velocity x >= 0; the last is the one in `support.own`."""
 
 
 def contensou(v: float, n: float, p: Mapping[str, float]) -> tuple[float, float]:

@@ -12,6 +12,7 @@ import sweep
 from support import STANDARD
 from sweep.engine.reporter import Progress, Reporter
 from sweep.kernels import methods
+from sweep.kernels.status import SETTLED
 
 
 class Heard(Reporter):
@@ -59,6 +60,17 @@ def in_sittings(chunks: int, config: Path, output: Path) -> tuple[xr.Dataset, in
             return result, interruptions, reporter if reporter.seen else last
         except KeyboardInterrupt:
             interruptions, last = interruptions + 1, reporter
+
+
+def settled(scene: Any, share: float, **settings: Any) -> tuple[xr.Dataset, xr.Dataset, np.ndarray]:
+    """A run, the same one without an early end, and which cells have settled: they have had their last reversal."""
+    ended, gone_on = (sweep.run(scene, **settings, stop_when_settled=stops) for stops in (True, False))
+    which = ended["status"].values == SETTLED
+    assert which.mean() >= share
+    np.testing.assert_array_equal(ended["reversals"].values[which], gone_on["reversals"].values[which])
+    # Their steps may differ: both runs look for errors of their own.
+    np.testing.assert_allclose(ended["t_last_reversal"].values[which], gone_on["t_last_reversal"].values[which], 1e-4)
+    return ended, gone_on, which
 
 
 def lengthen(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
