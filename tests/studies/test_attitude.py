@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import newton, own
 from support.physics import KANE_LEVINSON
-from support.runs import Stop
+from support.runs import Heard
 
 import sweep
 from sweep.config import load_config
@@ -55,7 +55,7 @@ def test_attitude_and_path_are_those_of_newton_and_euler(
     scene: dict[str, Any], law: str | None, t_end: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(own.write(tmp_path))  # where fading.py is
-    config, told = load_config(scene, {"t_end": t_end, "tolerance": 1e-12}), Stop(10**9)
+    config, told = load_config(scene, {"t_end": t_end, "tolerance": 1e-12}), Heard()
     cell, model = config.grid.columns(), config.equations
     parameters = {"surface": scene["body"].get("surface")} | {name: float(v[0]) for name, v in cell.items()}
     one = sweep.trajectory(config, every=t_end / 50, reporter=told).isel(trajectory=0)
