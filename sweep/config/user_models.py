@@ -61,7 +61,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
     for p in loading.load(origin).own_parameters:
         if wrong := [word for word in (p.name, p.section) if word in TAKEN]:
-            words = f"parameter {p.path}: {wrong[0]!r} means something else in a configuration; rename it"
+            words = f"parameter {p.path}: {wrong[0]!r} means something else already; rename it"
             raise fault_of(words, file=origin.place)
     return origin
 

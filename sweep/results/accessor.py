@@ -71,4 +71,7 @@ def configuration(
     if isinstance(measure := values.get("measure"), list):
         values["measure"] = [each for each in measure if not (isinstance(each, dict) and Misfit.name in each)]
     first = {str(name): float(c[0]) for name, c in dataset.coords.items() if c.dims == (CASE,) and name != CASE}
-    return load_config(values, {**first, **(model or {})}, argument=lambda _: "--model", announce=announce)
+    named = dict(model or {})
+    return load_config(
+        values, first | named, argument=lambda key: "--model" if key in named else key, announce=announce
+    )
