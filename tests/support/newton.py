@@ -31,9 +31,11 @@ LAWS: dict[str, Callable[[float, Mapping[str, float]], float]] = {
     "coulomb-tanh": lambda x, p: p["mu"] * np.tanh(x / p["speed"]),
     "coulomb-cubic": lambda x, p: p["mu"] * x / _rounded(x, p["speed"]),
     "stribeck": _stribeck,
-    "fading": lambda x, p: p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2),
 }
-"""Friction force per unit of normal force, at the slip velocity x >= 0; the last is the one in `support.own`."""
+"""Friction force per unit of normal force, at the slip velocity x >= 0: the package's laws."""
+
+OWN = {"fading": lambda x, p: p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2)}
+"""The law of a user's model, in `support.own`."""
 
 
 def contensou(v: float, n: float, p: Mapping[str, float]) -> tuple[float, float]:
@@ -98,7 +100,7 @@ def _solution(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vecto
             matrix[5, 8] += couple
             spinning += couple / n
         else:
-            force = LAWS[law](size, p)
+            force = (LAWS | OWN)[law](size, p)
         friction = force * v / size if size else v
         matrix[7:, 6:8], matrix[7:, 8] = np.eye(2), friction[:2]
     else:
