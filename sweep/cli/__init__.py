@@ -23,8 +23,8 @@ def main() -> None:
     CONFIG is a YAML file, FILE a dataset that a command wrote.
 
     Exit codes: 0 done; 1 a row of a report does not hold; 2 a configuration or file is wrong;
-    3 more cells failed than the configuration allows; 130 interrupted, and the same command resumes
-    the run; 141 the program that read the output has closed the pipe.
+    3 more cells failed than the configuration allows; 130 interrupted, and the same command
+    without --fresh resumes the run; 141 the program that read the output has closed the pipe.
     """
 
 

@@ -41,7 +41,7 @@ answers of 1000 workers would have kept this process busy."""
 _POLL = 0.01
 """Time in seconds between two looks at whether a tile has come back."""
 
-_LOST = "the dask scheduler is gone; finished tiles are kept, and the same command resumes the run"
+_LOST = "the dask scheduler is gone; finished tiles are kept, and the same command without --fresh resumes the run"
 
 
 class Cluster:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import matplotlib as mpl
@@ -14,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from sweep.grid import SAMPLE, Array
+from sweep.kernels.status import FAILURES
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, theory
@@ -151,14 +151,15 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
 
 
 def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
-    """Draw a series of sampled trajectories; returns the entries for the legend."""
+    """Draw a series of sampled trajectories that do not fail, until the first ends; returns the legend's entries."""
     time = dataset["time"]
     entries: list[Artist] = []
-    for i, one in enumerate(_cells(dataset)):
-        tails = [(1 - share) / 2 for share in _BANDS]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # no sample goes on so long
-            median, *ends = np.nanquantile(one[name], [0.5, *tails, *(1 - tail for tail in tails)], axis=0)
+    tails = [(1 - share) / 2 for share in _BANDS]
+    for i, each in enumerate(_cells(dataset)):
+        one = each.isel(trajectory=~np.isin(each["status"], FAILURES))
+        if not one.sizes["trajectory"]:
+            continue
+        median, *ends = np.quantile(one[name], [0.5, *tails, *(1 - tail for tail in tails)], axis=0)
         axes.plot(time, median, color=f"C{i}", linewidth=0.9, gid=name)
         for low, high, opacity in zip(ends[:2], ends[2:], _BANDS.values(), strict=True):
             axes.fill_between(time, low, high, color=f"C{i}", alpha=opacity, linewidth=0, rasterized=time.size > 5000)

@@ -307,7 +307,7 @@ def test_a_lost_scheduler_leaves_finished_tiles(config: Path, tmp_path: Path, by
         _, said = process.communicate(timeout=60)
     assert (process.returncode, said) == (
         2,
-        "the dask scheduler is gone; finished tiles are kept, and the same command resumes the run\n",
+        "the dask scheduler is gone; finished tiles are kept, and the same command without --fresh resumes the run\n",
     )
     sweep.run(config, out)
     assert contents(out) == by_threads

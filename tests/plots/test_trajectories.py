@@ -10,6 +10,7 @@ from support import Write
 from support.cli import invoke, refused
 from support.figures import constants, entries
 
+from sweep.kernels.status import LIFT_OFF, SETTLED
 from sweep.plots import picture
 from sweep.plots.panels import in_lines
 from sweep.results.dataset import VARIABLES
@@ -29,6 +30,7 @@ def made(mu: list[float], **given: Any) -> xr.Dataset:
     each = {name: ("trajectory", np.broadcast_to(v, len(mu))) for name, v in constants.items()}
     each |= {name: ("trajectory", v) for name, v in {"mu": bodies, **of_bodies}.items()}
     dataset = xr.Dataset({**values, **each, "reversals": ("trajectory", np.full(len(mu), 3))}, {"time": time})
+    dataset["status"] = "trajectory", np.full(len(mu), SETTLED)
     dataset["time"].attrs = {"long_name": "time, in sqrt(c/g)", "units": "1"}
     dataset["spin"].attrs = {"long_name": "spin about the upward normal, in sqrt(g/c)", "units": "1"}
     return dataset
@@ -121,6 +123,23 @@ def test_bands_are_of_the_samples_that_are_there(part: Any, cells: dict[str, Any
     assert [text.partition("median")[0].rstrip(", ") for text in entries(figure)[: len(cells)]] == list(cells)
     for curve, here in zip(curves, cells.values(), strict=True):
         np.testing.assert_allclose(curve.get_ydata(), np.median(whole["spin"][here], axis=0), atol=1e-15)
+
+
+def test_bands_are_of_all_samples_that_do_not_fail_while_they_last() -> None:
+    """A median of those that are left would jump when one ends."""
+    samples = made([60] * 4, n0=[0.01, 0.02, 0.04, 0.08]).assign_coords(sample=("trajectory", np.arange(4)))
+    samples["spin"] = samples["spin"] * xr.DataArray([1.0, 2.0, 4.0, 8.0], dims="trajectory")
+    samples["spin"][1, 150:] = np.nan
+    samples["spin"][2, 20:] = np.nan
+    samples["status"][2] = LIFT_OFF
+    figure = picture.plot(samples)
+    (curve,) = (line for line in figure.axes[0].lines if line.get_gid() == "spin")
+    expected = np.median(samples["spin"][[0, 1, 3]], axis=0)
+    np.testing.assert_array_equal(curve.get_ydata(), expected)
+    assert np.isnan(expected).sum() == 51
+    assert entries(figure)[0] == "median of 3 samples"
+    samples["status"][:] = LIFT_OFF
+    assert entries(picture.plot(samples)) == ["95% of them", "68% of them"]
 
 
 def test_a_page_of_all_series_fits_a_screen() -> None:
