@@ -86,7 +86,8 @@ def _rows(path: Path) -> tuple[list[str], Array]:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is no table of numbers"
         raise _fault(path, None, f"cannot be read: {reason}") from None
-    return list(map(str.strip, table)), table.apply(pandas.to_numeric, errors="coerce").to_numpy(float)
+    points = table.apply(lambda column: column.str.replace(",", "."))  # of numbers with decimal commas
+    return list(map(str.strip, table)), points.apply(pandas.to_numeric, errors="coerce").to_numpy(float)
 
 
 def _columns(header: list[str]) -> dict[str, tuple[int, str]]:

@@ -36,6 +36,14 @@ def test_spins_come_in_their_units(write: Write, header: str, mark: str, unit: f
     assert found.what == ("spin" if "spin" in header else "gyroscope")
 
 
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_numbers_may_have_decimal_commas(write: Write, mark: str) -> None:
+    text = table("t;n", TIMES, SPINS, mark=";").replace(".", ",").replace(";", mark)
+    found = film.read(write(text, "film.csv"))
+    assert found.left_out == 0
+    np.testing.assert_allclose([found.time, found.value], [TIMES, SPINS], rtol=1e-12)
+
+
 def test_a_heading_is_unwrapped(write: Write) -> None:
     turned = 300 * TIMES  # in degrees; a turn and two thirds
     found = film.read(write(table("time (s),angle (deg),error (deg)", TIMES, turned % 360, 1 + TIMES), "film.csv"))
