@@ -20,6 +20,8 @@ _SPINS = {"rad/s": 1.0, "1/s": 1.0, "": 1.0, "deg/s": np.pi / 180, "°/s": np.pi
 _ANGLES = {"rad": 1.0, "": 1.0, "deg": np.pi / 180, "°": np.pi / 180}
 _TIMES = {"s": 1.0, "": 1.0, "ms": 1e-3, "min": 60.0}
 
+_NO_TABLE = "no table; the first line must name all columns, with semicolons between them if numbers have commas"
+
 # What trackers and phones (phyphox) call their columns, without the unit in parentheses.
 _NAMES: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "time": (_TIMES, ("time", "t")),
@@ -66,7 +68,8 @@ def read(path: str | Path) -> Film:
     kept = np.flatnonzero(whole)
     kept = kept[:: -(-len(kept) // MOST_ROWS)] if len(kept) else kept
     if len(kept) < 8 or time[kept[-1]] == time[kept[0]]:
-        raise _fault(path, None, f"has {len(kept)} rows with a time and a {what}; a fit needs at least 8")
+        need = "a fit needs at least 8, not all at one time"
+        raise _fault(path, None, f"has {len(kept)} rows with a time and a {what}; {need}")
     value = np.unwrap(value[kept]) if what == "heading" else value[kept]
     error = None if error is None else error[kept]
     return Film(time[kept] - time[kept[0]], value, error, what, len(rows) - len(kept))
@@ -84,8 +87,10 @@ def _rows(path: Path) -> tuple[list[str], Array]:
             path, sep=mark, encoding="utf-8-sig", dtype=str, keep_default_na=False, skip_blank_lines=False
         )
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "is no table of numbers"
+        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", _NO_TABLE)
         raise _fault(path, None, f"cannot be read: {reason}") from None
+    if not isinstance(table.index, pandas.RangeIndex):  # of columns without a name, to their left for pandas
+        raise _fault(path, 2, _NO_TABLE)
     points = table.apply(lambda column: column.str.replace(",", "."))  # of numbers with decimal commas
     return list(map(str.strip, table)), points.apply(pandas.to_numeric, errors="coerce").to_numpy(float)
 

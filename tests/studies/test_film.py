@@ -84,8 +84,10 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
         (table("t,spin (1/s),error (rad)", TIMES, SPINS, 1 + TIMES), ":1:", "error is in 'rad'; its unit must be 1/s,"),
         (table("t,spin,error", TIMES, SPINS, TIMES), ":2:", "the error must be a number > 0"),
         (table("t,spin", TIMES[:5], SPINS[:5]), ":", "has 5 rows with a time and a spin; a fit needs at least 8"),
-        (table("t,spin", 0 * TIMES, SPINS), ":", "rows with a time"),
+        (table("t,spin", 0 * TIMES, SPINS), ":", "a fit needs at least 8, not all at one time"),
         ("", ":", "cannot be read"),
+        ("t,spin\n0,1\n1,2,3\n", ":", "cannot be read: no table; the first line must name all columns"),
+        (table("t,spin", TIMES, TIMES, SPINS), ":2:", "no table; the first line must name all columns"),
         ("\0\0\1", ":", "film.csv"),
     ],
 )  # fmt: skip
@@ -101,6 +103,13 @@ def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, lin
 def test_a_film_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"film\.csv: cannot be read: No such file"):
         film.read(tmp_path / "film.csv")
+
+
+def test_a_film_that_is_not_in_utf_8_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "film.csv"
+    path.write_bytes("t,spin (°/s)\n".encode("cp1252"))
+    with pytest.raises(ConfigError, match=r"film\.csv: cannot be read: not UTF-8 text"):
+        film.read(path)
 
 
 def test_repeated_instants_and_gaps_are_kept(write: Write) -> None:
