@@ -20,8 +20,9 @@ import xarray as xr
 from scipy.stats import qmc
 
 from sweep.config import Config, ConfigError, Values
+from sweep.config.cross_checks import misplaced
 from sweep.faults import brief, fault_of, suggestion
-from sweep.grid import Array
+from sweep.grid import BODY, Array
 from sweep.interrupt import deferred
 from sweep.kernels.measures.misfit import Film, Misfit
 from sweep.models.user.blame import blamed
@@ -75,8 +76,12 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
     began = time.perf_counter()
     if film.left_out:
         note(f"{film.left_out} rows of the film are left out: they hold no number, or are more than a fit needs")
+    ranges = {name: theirs.get(name) or _range(config, name) for name in free}
+    ends = {name: Values(each, True, list(each)) for name, each in ranges.items() if name in (*BODY, "x0", "y0")}
+    if off := misplaced(replace(config, parameters=config.parameters | ends)):
+        raise ConfigError([config.fault(("start", "x0"), f"what is free reaches too far: {off}")])
     with blamed(config.origin):
-        problem = Problem(config, film, {name: theirs.get(name) or _range(config, name) for name in free})
+        problem = Problem(config, film, ranges)
         minima = _search(problem, note)
         best, limits, rugged = _intervals(problem, minima[0], note)
     words = _blind(problem, best) + ([_RUGGED] if rugged else [])
