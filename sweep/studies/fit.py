@@ -77,6 +77,8 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
     if film.left_out:
         note(f"{film.left_out} rows of the film are left out: they hold no number, or are more than a fit needs")
     ranges = {name: theirs.get(name) or _range(config, name) for name in free}
+    if len(ranges) >= len(film.time):
+        raise fault_of(f"{len(ranges)} parameters are free, and the film has {len(film.time)} rows; free fewer")
     ends = {name: Values(each, True, list(each)) for name, each in ranges.items() if name in (*BODY, "x0", "y0")}
     if off := misplaced(replace(config, parameters=config.parameters | ends)):
         raise ConfigError([config.fault(("start", "x0"), f"what is free reaches too far: {off}")])
