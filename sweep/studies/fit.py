@@ -187,7 +187,9 @@ def _profiles(
     lower = min((each for _, each in found if each), key=lambda each: each.misfit, default=None)
     if lower and stops:
         return np.empty(0), lower
-    return np.reshape([end for end, _ in found], (len(LEVELS), 2, len(problem.free))), None
+    low, high = np.reshape([end for end, _ in found], (len(LEVELS), 2, len(problem.free))).swapaxes(0, 1)
+    # In a rugged misfit a narrow search may have come farther; what fits so well belongs to the wide interval too.
+    return np.stack([np.minimum.accumulate(low), np.maximum.accumulate(high)], axis=1), None
 
 
 def _end(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int, allowed: float) -> tuple[float, Minimum | None]:

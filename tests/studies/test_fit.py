@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, get_args
 
 import numpy as np
@@ -20,8 +21,8 @@ from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import stack, take
 from sweep.results.store import StoreError
-from sweep.studies.fit import _horizons
-from sweep.studies.misfit import Problem
+from sweep.studies.fit import _horizons, _profiles
+from sweep.studies.misfit import Minimum, Problem
 
 SCENE = "name: scene\nfriction: {mu: [30, 100]}\nstart: {n0: [0.03, 0.07], x0: 0.01, y0: 0.01}\n"
 STONE = """\
@@ -167,6 +168,14 @@ def test_a_film_is_learned_bit_by_bit(rows: int) -> None:
     assert found[-1] == rows
     assert found[0] <= max(rows / 10, 2)
     assert all(before <= after <= 1.5 * before + 1 for before, after in pairwise(found))
+
+
+def test_a_wide_interval_holds_the_narrow_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    reached = {(1.0, -1): 0.3, (1.0, 1): 0.6, (3.84, -1): 0.2, (3.84, 1): 0.5}
+    monkeypatch.setattr("sweep.studies.fit._end", lambda *_, allowed, sign, **__: (reached[allowed, sign], None))
+    problem: Any = SimpleNamespace(free=["mu"], answers=None, trajectories=0)
+    limits, _ = _profiles(problem, Minimum(np.zeros(1), 0.0, np.zeros((1, 1))), print, stops=False)
+    np.testing.assert_array_equal(limits[..., 0], [[0.3, 0.6], [0.2, 0.6]])
 
 
 def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
