@@ -47,10 +47,9 @@ def fitted(
     for name in dict.fromkeys(map(_full_name, laws)):
         other, own = _with_law(config, LAWS[name])
         theirs = [each for each in free if each in other.tier.parameters or each not in config.table]
-        dropped = [each for each in free if each not in theirs]
-        note(f"law {name}: free are {', '.join([*theirs, *own])}"
-             + (f"; it has no {', '.join(dropped)}" if dropped else ""))  # fmt: skip
-        found[name] = fit(other, film, list(dict.fromkeys([*theirs, *own])), note)
+        dropped, names = [each for each in free if each not in theirs], list(dict.fromkeys([*theirs, *own]))
+        note(f"law {name}: free are {', '.join(names)}" + (f"; it has no {', '.join(dropped)}" if dropped else ""))
+        found[name] = fit(other, film, names, note)
     return _together(found, film)
 
 

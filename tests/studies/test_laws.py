@@ -75,14 +75,15 @@ def test_a_film_that_no_law_reproduces_is_said(write: Write) -> None:
 
 
 def test_the_command_writes_table_picture_and_the_best_body(write: Write, tmp_path: Path) -> None:
-    config = write(VISCOUS)
-    seen = film(config, "viscous")
+    seen = film(write(VISCOUS), "viscous")
+    config = write(STONE)
     rows = "".join(f"{time},{spin}\n" for time, spin in zip(seen.time, seen.value, strict=True))
     table = write("time,spin\n" + rows, "film.csv")
     out = tmp_path / "out"
     said = invoke("fit", config, table, "--free", "mu,n0,speed", "--laws", "none,viscous", "--output", out)
     assert said.exit_code == 0, said.output
-    assert "law none: free are n0; it has no mu, speed" in said.stderr
+    assert "law none: free are n0; it has no mu, speed\n" in said.stderr
+    assert "law viscous: free are mu, n0; it has no speed\n" in said.stderr
     assert said.stdout.splitlines()[1].startswith("viscous ")
     assert sweep.load_config(out / "stone_laws.yaml").law == "viscous"
     for verb in ("info", "plot"):
