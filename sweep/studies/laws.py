@@ -77,7 +77,7 @@ def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
     friction |= {name: given[name] for name in said}
     own = [name for name in law.parameters if name not in said and config.table[name].default is None]
     friction |= {name: _usual(config, law)[name] for name in own}
-    return load_config({**kept, "friction": friction}), own
+    return load_config({**kept, "friction": friction, "integrator": {"t_end": config.integrator.t_end}}), own
 
 
 def _usual(config: Config, law: Law) -> Mapping[str, list[float]]:

@@ -85,6 +85,7 @@ def test_the_command_writes_table_picture_and_the_best_body(write: Write, tmp_pa
     assert "law none: free are n0; it has no mu, speed\n" in said.stderr
     assert "law viscous: free are mu, n0; it has no speed\n" in said.stderr
     assert said.stdout.splitlines()[1].startswith("viscous ")
-    assert sweep.load_config(out / "stone_laws.yaml").law == "viscous"
+    best = sweep.load_config(out / "stone_laws.yaml")
+    assert (best.law, best.integrator.t_end) == ("viscous", 2)
     for verb in ("info", "plot"):
         assert invoke(verb, out / "stone_laws.nc").exit_code == 0
