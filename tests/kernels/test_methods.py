@@ -135,6 +135,14 @@ def test_automatic_step_is_about_that_of_the_tolerance(
     assert abs(coarse - fine) < (2 * tolerance if method == "dopri5" else 3 * tolerance)
 
 
+def test_bodies_on_and_beyond_the_edge_of_standing_have_steps() -> None:
+    """A body that leans from unstable rest has less energy than at rest; in a sphere at rest nothing moves."""
+    body = columns(a=[0.5, 1.0, 1.0, 3.0, 1.0], b=[0.5, 0.9, 3.0, 0.5, 1.0], n0=0.0)
+    for method, ends in (("dopri5", 5), ("adams", 4)):
+        assert np.isfinite(automatic_step(method, MODELS["slip"], body)[0]).sum() == ends
+    assert start_up.count_levels(np.array([100.0]), np.array([np.inf]))[0] < 60
+
+
 @pytest.mark.parametrize(
     ("method", "steps", "low", "high"), [("dopri5", (0.016, 0.008), 25, 80), ("adams", (0.1, 0.05), 10, 1e3)]
 )

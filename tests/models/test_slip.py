@@ -37,7 +37,7 @@ def test_a_tiny_rattle_keeps_its_relative_precision() -> None:
     np.testing.assert_allclose(tiny[rattle] * 1e150, linear[rattle] * 1e8, rtol=1e-12)
 
 
-@pytest.mark.parametrize("start", [{}, {"n0": 0.2}, {"x0": 5.0, "y0": 1.5}, {"b": 9.9}, {"b": 1.01}])
+@pytest.mark.parametrize("start", [{}, {"n0": 0.2}, {"x0": 5.0, "y0": 1.5}, {"b": 9.9}, {"b": 1.01}, {"a": 1.0}])
 def test_fastest_decay_bounds_the_slip_at_the_start(start: dict[str, float]) -> None:
     body = columns(**start)
     y, p = stack(slip.start(body)).astype(complex), slip.Constants.of(body)

@@ -72,6 +72,7 @@ def count_levels(slip_decay: Array, step: Array) -> Array:
 
     `slip_decay` is the rate at which the slip decays at first; both it and the result are of shape (cells,).
     """
+    step = np.minimum(step, 1e9)  # a sphere at rest has no motion that a step would have to follow
     return np.maximum(1, np.ceil(np.log2(step * slip_decay / (2 * _SHARE)))).astype(np.int64)
 
 

@@ -168,7 +168,7 @@ def strongest_grip(columns: Columns) -> Array:
     _, nu = frequencies(rocking(Body.of(columns)))
     worst = np.zeros_like(energy_start)
     with np.errstate(divide="ignore", invalid="ignore"):
-        long = np.fmin(I2, (a**2 - c**2) / (c * nu**2) - c**2)
+        long = np.fmin(I2, np.where(a > c, (a**2 - c**2) / (c * nu**2) - c**2, np.inf))
     for share in np.linspace(0, 1, 9):
         for axis, J in ((a, long), (b, I1)):
             excess = axis**2 - c**2

@@ -70,9 +70,12 @@ def fastest_motion(model: Model, columns: Columns) -> Array:
 
 
 def fastest_spin(model: Model, columns: Columns) -> Array:
-    """The |spin| that a trajectory would reach if all its energy went into it, in sqrt(g/c), shape (cells,)."""
+    """The |spin| that a trajectory would reach if all its energy went into it, in sqrt(g/c), shape (cells,).
+
+    It is 0 where that energy is less than at rest.
+    """
     spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
-    return np.asarray(np.sqrt(spin**2 + 2 * rattle / inertia))
+    return np.asarray(np.sqrt(np.maximum(spin**2 + 2 * rattle / inertia, 0.0)))
 
 
 NODES = np.array([0.0, -1.0, 1.0, -0.5, 0.5])
