@@ -35,7 +35,7 @@ def _difference(dataset: xr.Dataset) -> xr.DataArray:
 
 def _ratio(dataset: xr.Dataset) -> xr.DataArray:
     found = dataset["t_first_reversal"] / dataset["t_first_reversal_predicted"]
-    return found.rename("ratio").assign_attrs(long_name="first reversal, simulated / predicted")
+    return found.rename("ratio").assign_attrs(long_name="first reversal, simulated / predicted", units="1")
 
 
 PREDICTIONS = {

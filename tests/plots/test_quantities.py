@@ -160,6 +160,12 @@ def test_a_bar_has_arrows_where_values_lie_beyond(variable: str, limits: Any, ar
     assert variable != "ratio" or bars[0].get_yticklabels()[2].get_text() == "1"
 
 
+def test_a_ratio_of_seconds_has_no_unit(whole: xr.Dataset) -> None:
+    for name in ("t_first_reversal", "t_first_reversal_predicted"):
+        whole[name].attrs["units"] = "s"
+    assert labels.label(whole.assign(ratio=field(whole, "ratio")), "ratio") == "first reversal, simulated / predicted"
+
+
 def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None:
     whole["t_first_reversal_predicted"][:, :2] = np.nan
     assert "no reversal, or none predicted (12 of 42)" in entries(picture.plot(whole, "t_first_reversal"))
