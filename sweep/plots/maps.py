@@ -35,8 +35,8 @@ _SMALL = 2.5
 _AROUND = 1.2
 """Inches across of what stands around maps."""
 
-_OF_DIFFERENCES = ("failed", "not_run", "impossible", "time_limit")
-"""Kinds of cell marked on maps of differences too; the map of the simulated counts beside it has all."""
+_OF_DIFFERENCES = ("failed", "not_run", "impossible", "no_value", "time_limit")
+"""Kinds of cell marked on maps of differences and ratios too; the map of the simulated counts beside it has all."""
 
 
 def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None, *, contours: bool = False) -> Picture:

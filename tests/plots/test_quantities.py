@@ -168,7 +168,10 @@ def test_a_ratio_of_seconds_has_no_unit(whole: xr.Dataset) -> None:
 
 def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None:
     whole["t_first_reversal_predicted"][:, :2] = np.nan
-    assert "no reversal, or none predicted (12 of 42)" in entries(picture.plot(whole, "t_first_reversal"))
+    figure = picture.plot(whole, "t_first_reversal")
+    assert "no reversal, or none predicted (12 of 42)" in entries(figure)
+    grey = [sum(patch.get_gid() == "no_value" for patch in axes.patches) for axes in figure.axes if axes.get_title()]
+    assert grey == [1, 1, 1]
     whole["t_first_reversal_predicted"][3:5, 3] = np.nan
     figure = picture.plot(whole.isel(delta=3), "t_first_reversal")
     (missing,) = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
