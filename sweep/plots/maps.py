@@ -167,8 +167,8 @@ def _title(panels: Panels, name: str, panel: Panel, *, small: bool) -> str:
     if panels.compared:  # what they have in common stands at the bar
         words = words.rpartition(", ")[2] if compared else words.partition(", ")[2] or "simulated"
         words = (name if compared else words.partition(" (")[0]) if small else words
-    elif panel:
-        words = ""  # it stands at the bar or in the legend
+    elif panel and not labels.flag_words(panels.dataset, name):
+        words = ""  # it stands at the bar
     where = title(panels.dataset, panel) if not small or name == panels.names[0] else ""
     return ", ".join(filter(None, [words, where]))
 

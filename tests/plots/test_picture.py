@@ -198,6 +198,8 @@ def test_a_status_is_told_in_words() -> None:
     figure = picture.plot(made(), "status")
     assert entries(figure) == ["settled (79 of 80)", "ended at the time limit (1 of 80)"]
     assert len(figure.axes) == 1  # and no bar with numbers
+    several = picture.plot(made(n0=[0.02, 0.05]), "status")  # whose words alone would not say what they are about
+    assert maps(several)[0].get_title() == "how the trajectory ended, n₀ = 0.02"
 
 
 @pytest.mark.parametrize("variable", [None, "status", "difference", "t_last_reversal"])
