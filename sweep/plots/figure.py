@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from io import BytesIO
@@ -154,11 +155,12 @@ class Picture(Figure):
         self.set_figheight(self.get_figheight() * (1 + more / self._height))
 
     def _wrap_labels(self) -> None:
-        """Break the labels of panels that are longer than their axes."""
+        """Break the titles and labels of panels that are longer than their axes."""
         for axes in (each for each in self.axes if each.get_label() != BESIDE):
             letter = _OF_LABEL * self.dpi * self.get_figwidth() / self._width
-            for label, length in ((axes.xaxis.label, axes.bbox.width), (axes.yaxis.label, axes.bbox.height)):
-                label.set_text(fill(label.get_text(), int(length / letter), break_long_words=False))
+            across, up = axes.bbox.size
+            for text, length in ((axes.title, across), (axes.xaxis.label, across), (axes.yaxis.label, up)):
+                text.set_text(_in_lines(text.get_text(), int(length / letter)))
 
     def letter(self) -> None:
         """Letters a, b, c at the panels, if there are several."""
@@ -166,6 +168,13 @@ class Picture(Figure):
         for letter, axes in zip(ascii_lowercase, panels if len(panels) > 1 else [], strict=False):
             axes.annotate(letter, (0, 1), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points",
                           ha="right", va="bottom", weight="bold")  # fmt: skip
+
+
+def _in_lines(words: str, room: int) -> str:
+    """Words in lines of so many letters, if these are not broken within the brackets at the end, such as a unit."""
+    space = "\N{NO-BREAK SPACE}"
+    whole = re.sub(r"(?<= )\(.*\)$", lambda brackets: brackets[0].replace(" ", space), words)
+    return fill(whole, max(room, 1), break_long_words=False).replace(space, " ")
 
 
 def extent(text: Text) -> Array:

@@ -50,6 +50,16 @@ def test_a_figure_for_print_is_as_wide_as_asked_and_can_be_read(kind: str, width
     assert all(axes.get_window_extent().width > 0.3 * figure.bbox.width / 3 for axes in panels)
 
 
+@pytest.mark.parametrize("width", ["85mm", "120mm"])
+def test_titles_and_units_are_whole(width: str) -> None:
+    figure = picture.plot(made(n0=[0.02, 0.05]), width=width)
+    figure.draw_without_rendering()
+    for axes in (each for each in figure.axes if each.get_label() == ""):
+        (letter,) = (text for text in axes.texts if text.get_weight() == "bold")
+        assert not letter.get_window_extent().overlaps(axes.title.get_window_extent())
+        assert {line.count("(") - line.count(")") for line in axes.get_ylabel().split("\n")} == {0}
+
+
 @pytest.mark.parametrize("kind", [*KINDS.values(), {"histogram": True}], ids=str)
 def test_no_text_in_a_file_for_print_is_smaller_than_6_points(kind: dict[str, Any], tmp_path: Path) -> None:
     with mpl.rc_context({"pdf.compression": 0}):
