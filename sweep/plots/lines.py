@@ -30,7 +30,7 @@ its width."""
 
 
 def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
-    """Draw the lines of a map; returns their entries for the legend.
+    """Draw the lines of a map; returns their entries for the legend, by their words.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
     axes.axis(box)
     if labelled:
         _symbols(axes, shown, number(axes, shown.lines, shown.x, shown.y))
-    return {line.name: entry(line.name, line.words) for line in shown.lines}
+    return {line.words: entry(line.name, line.words) for line in shown.lines}
 
 
 def number(axes: Axes, drawn: list[Line], x: Axis, y: Axis) -> list[places.Number]:

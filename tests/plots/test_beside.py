@@ -43,6 +43,12 @@ def test_one_scale_and_axes_of_their_own(two: list[xr.Dataset]) -> None:
     assert "δ" not in constants(figure)
 
 
+def test_the_legend_explains_the_lines_of_each() -> None:
+    over_b, over_n0 = made(), made(n0=[0.02, 0.03, 0.05, 0.07, 0.1]).isel(b=0)
+    told = [words for words in entries(sweep.plot([over_b, over_n0])) if "c2" in words]
+    assert [words.rpartition(" ")[2] for words in told] == ["smaller", "larger"]
+
+
 def test_the_legend_counts_the_cells_of_each(two: list[xr.Dataset]) -> None:
     limits = [int((dataset["status"] == 2).sum()) for dataset in two]
     assert f"({limits[0]} of 6 and {limits[1]} of 6)" in entries(picture.plot(two, x="b", y="mu"))[0]
