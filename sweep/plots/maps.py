@@ -93,7 +93,7 @@ def draw_beside(
     Raises
     ------
     ValueError
-        if a dataset has no two axes, or there would be too many maps.
+        if a dataset has no two axes, the units differ, or there would be too many maps.
     """
     name = each[0].names[0]
     count = sum(len(panels.each) for panels in each)
@@ -101,6 +101,10 @@ def draw_beside(
         raise ValueError(f"{count} maps side by side are more than {MAX_PANELS}; select one value of an axis")
     if short := [_name(panels.dataset) for panels in each if len(panels.across) < 2]:
         raise ValueError(f"{', '.join(short)} has no two axes; only maps are drawn side by side")
+    units = {labels.unit(panels.dataset, name): _name(panels.dataset) for panels in each}
+    if len(units) > 1:
+        told = " and ".join(f"{unit or 'a plain number'} in {of}" for unit, of in units.items())
+        raise ValueError(f"{name} is in different units, {told}; only maps of one unit share a scale")
     rows, columns = arrangement(count, 1)
     width = panel_width(columns, _WIDEST, _AROUND)
     figure = Picture(width * columns + _AROUND, 1.8 + width * RATIO * rows)

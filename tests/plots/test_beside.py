@@ -72,6 +72,9 @@ def test_what_cannot_stand_side_by_side(two: list[xr.Dataset], small: xr.Dataset
         picture.plot([two[0], two[1].isel(mu=0)], x="b")
     with pytest.raises(ValueError, match="10 maps side by side are more than 8"):
         picture.plot([small] * 5, x="b", y="mu")
+    two[1]["spin_final"].attrs["units"] = "rad s-1"
+    with pytest.raises(ValueError, match=r"different units, √\(g/c\) in small and rad/s in other; only"):
+        picture.plot(two, "spin_final", x="b", y="mu")
     critical = xr.Dataset({"critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]})
     for several in ([], [critical, critical]):
         with pytest.raises(ValueError, match="side by side only if each is of a run"):
