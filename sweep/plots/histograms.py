@@ -19,12 +19,13 @@ from sweep.plots.figure import Frames
 from sweep.plots.hatches import HATCHES
 from sweep.plots.marks import legend
 from sweep.plots.panels import Panels
+from sweep.plots.scales import Limits
 
 _MOST = 60
 """Bars of a histogram, at most."""
 
 
-def draw(panels: Panels, frames: Frames) -> list[Artist]:
+def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[Artist]:
     """Draw the shares of the cells, simulated and predicted; returns entries for a legend."""
     dataset, names, across = panels.dataset, panels.names, panels.across[::-1] or [""]
     maps = [[describe(chosen, name, *across) for name in names] for _, chosen in frames]
@@ -42,6 +43,8 @@ def draw(panels: Panels, frames: Frames) -> list[Artist]:
         if axes.get_xlabel():
             axes.set_xlabel(labels.common(dataset, names[0]))
         _scale(axes, first, edges)
+        if limits:
+            axes.set_xlim(limits)
     return frames[0][0].get_legend_handles_labels()[0]
 
 

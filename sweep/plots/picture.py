@@ -204,8 +204,8 @@ def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None, *, histo
     if histogram and bars:
         raise ValueError("histogram: a probability is a share already; name another variable, such as reversals")
     if histogram:
-        return histograms.draw(chosen, frames)
-    return probabilities.draw(chosen, frames) if bars else curves.draw(chosen, frames, limits)
+        return histograms.draw(chosen, frames, limits)
+    return (probabilities if bars else curves).draw(chosen, frames, limits)
 
 
 def inches(width: str) -> float:

@@ -15,20 +15,21 @@ from sweep.grid import Array
 from sweep.plots import labels
 from sweep.plots.figure import Frames, set_scale
 from sweep.plots.panels import Panels, title
+from sweep.plots.scales import Limits
 from sweep.results.probabilities import interval, sound
 
 _COLOURS = 0.85
 """Part of the colour map that curves take: its last colours are too light for lines."""
 
 
-def draw(panels: Panels, frames: Frames) -> list[Artist]:
+def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[Artist]:
     """Draw the probabilities over the one long axis, or over counts; returns entries for a legend."""
     for axes, chosen in frames:
         if panels.across in ([], ["count"]):
             _bars(axes, chosen, lowest=len(frames) == 1 or bool(axes.get_xlabel()))
         else:
             _curves(axes, chosen, panels.across[0])
-        axes.set_ylim(0, 1.02)
+        axes.set_ylim(limits or (0, 1.02))
         axes.grid(alpha=0.3)
     return frames[0][0].get_legend_handles_labels()[0]
 

@@ -67,6 +67,11 @@ def test_one_real_number_has_a_bar_that_can_be_seen(value: float) -> None:
     assert np.ptp(bar.get_data().edges) > 0.1 * np.ptp(axes.get_xlim())
 
 
+def test_limits_are_the_ends_of_the_axis() -> None:
+    (axes,) = picture.plot(made(), histogram=True, limits=(1, 4)).axes
+    assert axes.get_xlim() == (1, 4)
+
+
 def test_a_status_is_told_in_words() -> None:
     (axes,) = picture.plot(made(), "status", histogram=True).axes
     assert "settled" in {text.get_text() for text in axes.get_xticklabels()}
