@@ -62,6 +62,8 @@ def run(
     config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun must be {' or '.join(RERUN)}, not {rerun!r}")
+    if rerun and fresh:
+        raise StoreError("--rerun needs the dataset that --fresh discards; leave out one of the two")
     dataset.check_names(config)
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)

@@ -214,3 +214,7 @@ def test_rerun_needs_a_dataset(write: Write, tmp_path: Path) -> None:
         grown(write, tmp_path / "out", ONE, rerun="limit")
     with pytest.raises(ValueError, match="rerun must be failed or limit, not 'all'"):
         grown(write, tmp_path / "out", ONE, rerun="all")
+    grown(write, tmp_path / "out", SINGLE)
+    with pytest.raises(StoreError, match="leave out one of the two"):
+        grown(write, tmp_path / "out", SINGLE, rerun="limit", fresh=True)
+    assert (tmp_path / "out" / "small.nc").exists()
