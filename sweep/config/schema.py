@@ -178,7 +178,9 @@ _WORDS: dict[str, type[Strict]] = {"body": Body, "friction": Friction}
 
 
 class _Top(Strict):
-    name: Annotated[str, Allowed("up to 100 letters, digits, '.', '_' or '-', not '.', '_' or '-' first")] = Field(
+    name: Annotated[
+        str, Allowed("up to 100 letters, digits, '.', '_' or '-', not '.', '_' or '-' first, in quotes if a number")
+    ] = Field(
         default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
         description="name of the run and of its files; by default that of the configuration file",
     )  # fmt: skip

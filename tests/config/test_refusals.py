@@ -93,6 +93,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (SMALL + "picture: status\n", 6, "picture", "must be a list of variables, such as [reversals, spin_mean], not 'status'"),
     (SMALL + "max_failed_fraction: 2\n", 6, "max_failed_fraction", "must be a finite number >= 0 and <= 1, not 2"),
     (small("name: small", "name: ../small"), 1, "name", "must be up to 100 letters, digits"),
+    (small("name: small", "name: 2024"), 1, "name", "in quotes if a number, not 2024"),
     (small("{mu: [40, 60]}", "40"), 3, "friction", "must be a section with law, regularisation, mu, speed"),
     (SMALL + "cases: nowhere.csv\n", 6, "cases", "nowhere.csv: no such file"),
     (SMALL + "cases: .\n", 6, "cases", "cannot be read: Is a directory"),
