@@ -39,6 +39,10 @@ def in_notebook() -> bool:
 _COMPILING = "compiling for this model and machine; later runs find it in the cache"
 
 
+_LOGGED = 60.0
+"""Time in s from one line to the next where there is no terminal for a bar, such as in the log of a job."""
+
+
 class _Console(Console):
     def on_broken_pipe(self) -> None:
         """Leave it to the caller what a closed pipe means; rich would end the process with exit code 1."""
@@ -46,13 +50,17 @@ class _Console(Console):
 
 
 class Terminal(Reporter):
-    """A bar with what is done and the time left, of cells also failures and trajectories per second."""
+    """A bar with what is done and the time left, of cells also failures and trajectories per second.
+
+    Where there is no terminal, it is a line, a minute apart and at the end.
+    """
 
     def __init__(self, quiet: bool = False) -> None:
         self.console = _Console(stderr=True, quiet=quiet, highlight=False)
         self.last: Done | None = None
         self._bar: Progress | None = None
         self._told = False
+        self._logged = time.monotonic()
 
     def __enter__(self) -> Terminal:
         interrupt.raise_again()
@@ -89,6 +97,9 @@ class Terminal(Reporter):
             self._bar.start()
         (task,) = self._bar.task_ids
         self._bar.update(task, total=progress.cells, completed=progress.done, failed=progress.failed, rate=rate)
+        if not self.console.is_terminal and time.monotonic() > self._logged + _LOGGED:
+            self.console.print(self._bar.get_renderable())
+            self._logged = time.monotonic()
 
 
 # Characters that all words need, with room for a bar.

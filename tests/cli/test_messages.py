@@ -168,3 +168,14 @@ def test_a_terminal_of_any_width_keeps_the_bar(width: int, unit: str, monkeypatc
     assert "3036/6072" in line
     assert 2 <= line.count("━") < 40
     assert (unit in line) == (width >= 80)
+
+
+def test_a_log_tells_now_and_then_how_far_a_run_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rich draws its bar nowhere but on a terminal, and elsewhere once, at the end."""
+    screen = io.StringIO()
+    with Terminal() as terminal:
+        terminal.console = Console(file=screen)
+        for seconds, lines in ((60.0, 0), (-1.0, 1)):
+            monkeypatch.setattr("sweep.progress._LOGGED", seconds)
+            terminal.chunk(Progress(6072, 3036, 0, 0, 10.0))
+            assert screen.getvalue().count("3036/6072 cells") == lines
