@@ -151,7 +151,8 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
     if "misfit" in dataset and np.isfinite(dataset["misfit"]).any():
         least = dataset["misfit"].isel(dataset["misfit"].argmin(...))
         where = ", ".join(f"{name} = {least[name].item():g}" for name in dataset["misfit"].dims)
-        yield f"misfit: {least.item():.6g} at least, of {dataset.attrs.get('film_instants', '?')} instants, at {where}"
+        bound, at = (" at least", f", at {where}") if where else ("", "")
+        yield f"misfit: {least.item():.6g}{bound}, of {dataset.attrs.get('film_instants', '?')} instants{at}"
     for name, words in (("spin", ", as estimated"), ("energy", "")):
         error = dataset[f"{name}_error"].values if f"{name}_error" in dataset else np.empty(0)
         if np.isfinite(error).any():

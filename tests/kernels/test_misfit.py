@@ -19,6 +19,7 @@ from sweep.explorer.slices import Source
 from sweep.models.ladder import slip
 from sweep.models.model import take
 from sweep.results.store import StoreError
+from sweep.results.summary import describe
 
 TEXT = """\
 name: film
@@ -119,6 +120,7 @@ def test_it_is_drawn_told_and_explored(config: Path, tmp_path: Path) -> None:
     said = invoke("info", tmp_path / "film.nc").stdout
     at = found.misfit.isel(found.misfit.argmin(...))
     assert f"misfit: {at.item():.6g} at least, of 301 instants, at mu = {at.mu.item():g}, n0 = {at.n0.item():g}" in said
+    assert "misfit: 1, of 301 instants\n" in describe(found.isel(mu=0, n0=0).assign(misfit=1.0))
     assert usable(Source(found))
 
 
