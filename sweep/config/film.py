@@ -66,13 +66,14 @@ def read(path: str | Path) -> Film:
     if error is not None and not np.all(error[whole] > 0):
         raise _fault(path, int(np.flatnonzero(whole & ~(error > 0))[0]) + 2, "the error must be a number > 0")
     kept = np.flatnonzero(whole)
+    if what == "heading":
+        value[kept] = np.unwrap(value[kept])
     kept = kept[:: -(-len(kept) // MOST_ROWS)] if len(kept) else kept
     if len(kept) < 8 or time[kept[-1]] == time[kept[0]]:
         need = "a fit needs at least 8, not all at one time"
         raise _fault(path, None, f"has {len(kept)} rows with a time and a {what}; {need}")
-    value = np.unwrap(value[kept]) if what == "heading" else value[kept]
     error = None if error is None else error[kept]
-    return Film(time[kept] - time[kept[0]], value, error, what, len(rows) - len(kept))
+    return Film(time[kept] - time[kept[0]], value[kept], error, what, len(rows) - len(kept))
 
 
 def _rows(path: Path) -> tuple[list[str], Array]:

@@ -72,6 +72,8 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
     found = film.read(write(table("time,spin", times, np.cos(times)), "film.csv"))
     assert len(found.time) == film.MOST_ROWS
     np.testing.assert_allclose(found.value, np.cos(found.time), rtol=1e-12)
+    turned = film.read(write(table("time,heading", times, np.mod(1e4 * times, 2 * np.pi)), "film.csv"))
+    np.testing.assert_allclose(turned.value, 1e4 * turned.time, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
