@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
 from sweep.plots.formats import suffix
+from sweep.plots.panels import in_lines
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
@@ -112,7 +113,8 @@ class _Scene:
     def __init__(self, dataset: xr.Dataset, times: Array) -> None:
         bodies = dataset.sizes["trajectory"]
         self.figure = Figure((max(3.2 * bodies, 6.4), 4.8), dpi=80)
-        self.figure.suptitle(labels.constants(trajectories.constants_apart(dataset)), fontsize=8)
+        constants = labels.constants(trajectories.constants_apart(dataset))
+        self.figure.suptitle(in_lines(constants, self.figure.get_figwidth()), y=0.99, fontsize=8)
         over_time = self.figure.add_axes((0.1, 0.12, 0.85, 0.26))
         over_time.set(xlim=(times[0], times[-1]), xlabel=labels.label(dataset, "time"), ylabel="spin n")
         over_time.axhline(0, color="black", linewidth=0.5)
@@ -120,7 +122,7 @@ class _Scene:
         for i in range(bodies):
             place = (i / bodies, 0.42, 1 / bodies, 0.55)
             axes: Any = self.figure.add_axes(place, projection="3d", computed_zorder=False)
-            axes.set_title(trajectories.label(dataset, i), fontsize=9, color=f"C{i}", y=0.82)
+            axes.set_title(trajectories.label(dataset, i), fontsize=9, color=f"C{i}", y=0.8)
             (curve,) = over_time.plot([], [], color=f"C{i}", linewidth=1)
             self.bodies.append(_Body(dataset.isel(trajectory=i), times, axes, curve))
         spins = np.concatenate([each.spin for each in self.bodies])
