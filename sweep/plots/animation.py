@@ -116,7 +116,8 @@ class _Scene:
         constants = labels.constants(trajectories.constants_apart(dataset))
         self.figure.suptitle(in_lines(constants, self.figure.get_figwidth()), y=0.99, fontsize=8)
         over_time = self.figure.add_axes((0.1, 0.12, 0.85, 0.26))
-        over_time.set(xlim=(times[0], times[-1]), xlabel=labels.label(dataset, "time"), ylabel="spin n")
+        across, up = (labels.label(dataset, name) for name in ("time", "spin"))
+        over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)
         over_time.axhline(0, color="black", linewidth=0.5)
         self.bodies = []
         for i in range(bodies):
