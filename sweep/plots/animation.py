@@ -126,9 +126,9 @@ class _Scene:
             axes.set_title(trajectories.label(dataset, i), fontsize=9, color=f"C{i}", y=0.8)
             (curve,) = over_time.plot([], [], color=f"C{i}", linewidth=1)
             self.bodies.append(_Body(dataset.isel(trajectory=i), times, axes, curve))
-        spins = np.concatenate([each.spin for each in self.bodies])
+        spins = np.append(np.concatenate([each.spin for each in self.bodies]), 0.0)
         margin = 0.08 * max(np.ptp(spins), 1e-12)
-        over_time.set_ylim(min(spins.min(), 0) - margin, max(spins.max(), 0) + margin)
+        over_time.set_ylim(spins.min() - margin, spins.max() + margin)
 
     def show(self, frame: int) -> list[Any]:
         """Draw all bodies at a frame."""
