@@ -39,7 +39,7 @@ _BUTTONS = {
 }  # fmt: skip
 """What a page shows in place of the icons that matplotlib's would load from the network."""
 
-_SURFACE = {"rstride": 1, "cstride": 1, "linewidth": 0, "antialiased": False, "zorder": 2}
+_SURFACE = {"rstride": 1, "cstride": 1, "linewidth": 0, "antialiased": False, "zorder": 2, "clip_on": False}
 """How matplotlib draws the surface of a body: each face, without lines between them."""
 
 FORMATS = ("gif", "mp4", "html")

@@ -74,9 +74,10 @@ def test_all_that_is_said_of_a_real_body_can_be_read(tmp_path: Path) -> None:
     assert clip._fig.axes[0].get_ylabel() == "spin n (rad/s)"
 
 
-def test_a_spin_that_hardly_changes_is_not_drawn_on_the_frame(tmp_path: Path) -> None:
+def test_neither_a_steady_spin_nor_a_body_is_lost_at_a_frame(tmp_path: Path) -> None:
     clip: Any = animation.animate(turning(), tmp_path / "clip.gif", begin=0, end=0.1, speed=1)
     assert clip._fig.axes[0].get_ylim()[1] > 0.32
+    assert not clip._fig.axes[1].collections[0].get_clip_on()  # or tips of the body were cut off
 
 
 def test_ffmpeg_is_given_all_frames_of_a_film(tmp_path: Path) -> None:
