@@ -205,8 +205,7 @@ def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None, *, histo
         raise ValueError("histogram: a probability is a share already; name another variable, such as reversals")
     if histogram:
         return histograms.draw(chosen, frames, limits)
-    draw = probabilities.draw if bars else curves.draw
-    return draw(chosen, frames, limits)
+    return probabilities.draw(chosen, frames, limits) if bars else curves.draw(chosen, frames, limits)
 
 
 def inches(width: str) -> float:
