@@ -43,6 +43,7 @@ BESIDE = "beside"
 _STYLE: dict[Any, Any] = {
     "font.size": TEXT, "axes.titlesize": "medium", "xtick.labelsize": "small", "ytick.labelsize": "small",
     "legend.fontsize": "small", "legend.title_fontsize": "small", "hatch.linewidth": 0.7,
+    "axes.formatter.limits": [-4, 6], "axes.formatter.use_mathtext": True,
     "figure.dpi": 110, "pdf.fonttype": 42, "ps.fonttype": 42, "svg.hashsalt": "sweep",
 }  # fmt: skip
 """Settings of matplotlib, where the user has none of his own."""

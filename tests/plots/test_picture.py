@@ -1,6 +1,7 @@
 """What the pictures of a dataset contain, told by the artists of the figures."""
 
 import tracemalloc
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,13 @@ def test_every_count_has_a_colour_and_high_ones_are_told_apart(top: int) -> None
 def test_limits_leave_arrows_for_what_is_beyond() -> None:
     norm = mesh(maps(picture.plot(made(), limits=(3, 5)))[0]).norm
     assert (norm.boundaries[0], norm.boundaries[-1], norm.extend) == (2.5, 5.5, "both")
+
+
+def test_small_numbers_at_ticks_are_apart() -> None:
+    figure = picture.plot(made(b=[0, 1e-4, 2e-4, 3e-4]).isel(b=[0, 1]), x="b", y="mu")  # as a couple is in kg m²/s
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in maps(figure)[0].get_xticklabels()]
+    assert all(one.x1 < other.x0 for one, other in pairwise(boxes))
 
 
 def test_the_ticks_of_counts_are_integers() -> None:
