@@ -118,7 +118,7 @@ class _Scene:
         over_time = self.figure.add_axes((0.1, 0.12, 0.85, 0.26))
         across, up = (labels.label(dataset, name) for name in ("time", "spin"))
         over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)
-        over_time.axhline(0, color="black", linewidth=0.5)
+        over_time.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
         self.bodies = []
         for i in range(bodies):
             place = (i / bodies, 0.42, 1 / bodies, 0.55)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import matplotlib as mpl
 import xarray as xr
 
 from sweep.plots import labels
@@ -25,9 +26,9 @@ def draw(dataset: xr.Dataset) -> Picture:
         fitted, colour = one["fitted"].values, f"C{i}" if laws else "0.4"
         above.plot(time, fitted, color=f"C{i}", linewidth=1, label=name, gid=f"fitted {name}")
         below.plot(time, seen - fitted, ".", color=colour, markersize=2, gid=f"residuals {name}")
-    above.axhline(0, color="black", linewidth=0.5)
+    above.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
     above.set_ylabel(labels.label(dataset, "seen"))
-    below.axhline(0, color="black", linewidth=0.5)
+    below.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
     below.set_ylabel("film − fit")
     below.set_xlabel(labels.label(dataset, "time"))
     words = [_of_law(name, one) for name, one in laws] or _values(dataset)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
@@ -51,7 +52,7 @@ def number(axes: Axes, drawn: list[Line], x: Axis, y: Axis) -> list[places.Numbe
     """Write the counts that begin on boundaries into the lines themselves; returns where."""
     written = list(places.numbers(drawn, x, y))
     for at_x, at_y, count in written:
-        axes.annotate(count, (at_x, at_y), size="small", ha="center", va="center", path_effects=_halo(2))
+        axes.annotate(count, (at_x, at_y), size="small", color="black", ha="center", va="center", path_effects=_halo(2))
     return written
 
 
@@ -72,13 +73,14 @@ def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
     """Draw lines over curves; returns their entries for the legend."""
     for line in lines:
         for at in line.parts[0][0]:
-            axes.axvline(at, linestyle=_STYLES[line.name]["linestyle"], color="black", linewidth=0.8, gid=line.name)
+            style: Any = {"linestyle": _STYLES[line.name]["linestyle"], "color": mpl.rcParams["text.color"]}
+            axes.axvline(at, linewidth=0.8, gid=line.name, **style)
     return {line.name: entry(line.name, line.words) for line in lines}
 
 
 def entry(name: str, words: str) -> Line2D:
     """The entry of a legend for a line."""
-    return Line2D([], [], color="black", label=words, **_STYLES[name])
+    return Line2D([], [], color=mpl.rcParams["text.color"], label=words, **_STYLES[name])
 
 
 def _halo(width: float) -> list[AbstractPathEffect]:
@@ -97,4 +99,5 @@ def _symbols(axes: Axes, shown: Map, written: list[places.Number]) -> None:
     in_points = size * 72 / axes.get_figure(root=True).dpi  # type: ignore[union-attr]
     for symbol, at, middle in places.symbols(shown.lines, shown.x, shown.y, written, halves):
         axes.annotate(words[symbol], tuple(at), xycoords="axes fraction", xytext=tuple((middle - at) * in_points),
-                      textcoords="offset points", ha="center", va="center", path_effects=_halo(2))  # fmt: skip
+                      textcoords="offset points", color="black", ha="center", va="center",
+                      path_effects=_halo(2))  # fmt: skip

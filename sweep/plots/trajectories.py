@@ -110,13 +110,13 @@ def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
 def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist]:
     """Draw the spins; returns the entries for the legend."""
     if SAMPLE in dataset.coords:
-        axes.axhline(0, color="black", linewidth=0.5)
+        axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
         return _series(axes, dataset, {"spin": "spin n"})
     for i in range(dataset.sizes["trajectory"]):
         times = reversal_times(dataset.isel(trajectory=i))
         axes.plot(times, np.zeros(len(times)), "o", color=f"C{i}", markersize=4)
     entries = _series(axes, dataset, {"spin": "spin n"})
-    axes.axhline(0, color="black", linewidth=0.5)
+    axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
     entries.append(Line2D([], [], linestyle="none", marker="o", color="0.4", markersize=4, label="reversal"))
     return entries + (_critical_spins(axes, dataset) if critical else [])
 
@@ -142,7 +142,7 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
         entries.append(Line2D([], [], linestyle="none", label=f"and {more} more"))
     if len(names) > 1:
         named = zip(shades, names.values(), strict=True)
-        styles = [Line2D([], [], color="black", alpha=shade, label=words) for shade, words in named]
+        styles = [Line2D([], [], color=mpl.rcParams["text.color"], alpha=shade, label=words) for shade, words in named]
         axes.legend(
             handles=styles, ncols=2, frameon=False, loc="lower right", bbox_to_anchor=(1, 0.98),
             borderaxespad=0.2,
@@ -199,7 +199,7 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
             style: Any = {"linestyle": theory.OVER_TIME[name], "linewidth": 0.9}
             axes.axhline(at, color=colour, gid=name, **style)
             words = theory.words(name, source, over_n0=True, spin="n")
-            entries[name] = Line2D([], [], color="black", label=words, **style)
+            entries[name] = Line2D([], [], color=mpl.rcParams["text.color"], label=words, **style)
             if all(abs(at - other) > apart for other in written):
                 axes.annotate(
                     labels.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),

@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib import style
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from support.cli import invoke, refused
@@ -135,6 +136,14 @@ def test_settings_of_the_user_are_obeyed() -> None:
     assert {tick.get_fontsize() for tick in axes.get_xticklabels()} == {11}
     assert figure.get_figwidth() == pytest.approx(7)
     assert mpl.rcParams["font.size"] == mpl.rcParamsDefault["font.size"]
+
+
+def test_lines_and_numbers_can_be_read_on_a_dark_page() -> None:
+    dataset = made().assign(margin_more=made()["spin_final"] + 1, margin_fewer=made()["spin_final"] + 1)
+    with style.context("dark_background"):
+        figure = picture.plot(dataset, "reversals")
+    assert {text.get_color() for text in figure.axes[0].texts} == {"black"}  # with a white halo
+    assert {line.get_color() for line in figure.legends[0].get_lines()} == {"white"}
 
 
 def test_a_figure_has_the_size_that_is_asked_for(small: xr.Dataset) -> None:
