@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from sweep.axis import Axis
@@ -17,7 +18,7 @@ from sweep.plots import labels
 from sweep.plots.description import Map, common_scale, describe
 from sweep.plots.figure import Frames
 from sweep.plots.hatches import HATCHES
-from sweep.plots.marks import legend
+from sweep.plots.marks import BLANK, legend
 from sweep.plots.panels import Panels
 from sweep.plots.scales import Limits
 
@@ -29,7 +30,8 @@ def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[A
     """Draw the shares of the cells, simulated and predicted; returns entries for a legend."""
     dataset, names, across = panels.dataset, panels.names, panels.across[::-1] or [""]
     maps = [[describe(chosen, name, *across) for name in names] for _, chosen in frames]
-    edges, bound = _edges([each for of_one in maps for each in of_one]), legend(dataset, names[0]).get("time_limit")
+    edges, kinds = _edges([each for of_one in maps for each in of_one]), legend(dataset, names[0])
+    bound = kinds.get("time_limit")
     words = {name: labels.words(dataset, name) for name in names}
     for (axes, _), (first, *others) in zip(frames, maps, strict=True):
         _stairs(axes, first, first.shown, edges, label=words[first.name], color="C0", alpha=0.6, fill=True)
@@ -45,7 +47,8 @@ def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[A
         _scale(axes, first, edges)
         if limits:
             axes.set_xlim(limits)
-    return frames[0][0].get_legend_handles_labels()[0]
+    left_out = [Line2D([], [], linestyle="none", label=f"left out: {kinds[k]}") for k in BLANK if k in kinds]
+    return frames[0][0].get_legend_handles_labels()[0] + left_out
 
 
 def _scale(axes: Axes, shown: Map, edges: Array) -> None:
