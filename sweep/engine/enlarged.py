@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,9 @@ from sweep.engine.checks import verify
 from sweep.engine.executor import Work
 from sweep.engine.plan import choose
 from sweep.engine.whole import Apart, Some
-from sweep.grid import Array, Grid
+from sweep.grid import SAMPLE, Array, Grid
 from sweep.kernels.kernel import steps_to
+from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.sensitivity import Sensitivity
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import FAILURES, TIME_LIMIT
@@ -25,6 +27,7 @@ from sweep.parameters import Parameter, sections
 from sweep.results import dataset
 from sweep.results.dataset import ROWS
 from sweep.results.identity import Identity
+from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
 from sweep.results.store import Store
 
@@ -75,6 +78,9 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     same_program = (found.source_hash, found.versions) == (wanted.source_hash, wanted.versions)
     if rerun is None and not (same_program and found.of_one_run):
         return found.difference(wanted)
+    edited = "a run, but has been edited since"
+    if _is_edited(config, there):
+        return edited
     old, new = (_settings(parse_value(each.config, "dataset"), config.table) for each in (found, wanted))
     # Of a user's model, `model_sha256` tells what `model` only names.
     free = _FREE | ({"model"} if config.origin else set())
@@ -88,8 +94,36 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     grown = _match(config.grid, _grid(there))
     same_cells = len(grown) == there["status"].size
     if changed or less or config.refine or (grown >= 0).sum() < there["status"].size or (rerun and not same_cells):
-        return found.difference(wanted)
+        return found.difference(wanted) or edited
     return ""
+
+
+def _is_edited(config: Config, there: xr.Dataset) -> bool:
+    """Tell whether a dataset lacks what a run writes, or has it in another type or order, so that nothing is taken."""
+    try:
+        grid = _grid(there)
+    except KeyError:  # no status, or a dimension without values
+        return True
+    measured = {spec.partition("=")[0] for spec in str(there.attrs.get("measured", "")).split()}
+    kinds = [MEASURES[each] for each in measured & MEASURES.keys()]
+    needed = {"spin_final", "t_stop", "step", *(name for kind in kinds for name in kind.variables)}
+    if "measured" not in there.attrs or (
+        config.simulated and "inferred" not in there and not needed <= set(there.data_vars)
+    ):
+        return True
+    written = dataset.layout(grid, set(map(str, there.data_vars)))
+    return any(
+        there[name].dims != (*over.dims, *filter(None, [spec.along])) or there[name].dtype != np.dtype(spec.dtype)
+        for name, (over, spec) in written.items()
+    )
+
+
+def is_whole(config: Config, path: Path) -> bool:
+    """Tell whether the dataset of the run of `config` has all its cells: it may have been cut since."""
+    with open_dataset(path, load=False) as there:
+        sizes = dict(there["status"].sizes) if "status" in there else {"": 0}
+    rows = {SAMPLE: sizes[SAMPLE]} if config.until and SAMPLE in sizes else {}  # drawn until they were enough
+    return sizes == dict(zip(config.grid.dims, config.grid.shape, strict=True)) | rows
 
 
 def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:

@@ -20,7 +20,7 @@ import xarray as xr
 from sweep.config import Config, ConfigLike, load_config
 from sweep.engine import local
 from sweep.engine.cluster import Cluster
-from sweep.engine.enlarged import RERUN, Earlier, Enlarged, reason_against, taken_over
+from sweep.engine.enlarged import RERUN, Earlier, Enlarged, is_whole, reason_against, taken_over
 from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.sampled import Sampled
@@ -75,7 +75,7 @@ def run(
             _forget_pictures(config, files)
             files.discard()
         found = files.identity()
-        if found and not found.difference(identity):
+        if found and not found.difference(identity) and is_whole(config, files.dataset):
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
             earlier = _earlier(config, found, identity, files, rerun)

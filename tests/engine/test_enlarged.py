@@ -1,6 +1,7 @@
 """A run that has grown simulates only what is missing, and ends with the dataset of a run of all cells at once."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -164,6 +165,36 @@ def test_no_result_is_lost(write: Write, tmp_path: Path, change: tuple[str, str]
         grown(write, tmp_path / "out", ONE.replace(*change))
     assert said in str(caught.value)
     assert (tmp_path / "out" / "small.nc").read_bytes() == before
+
+
+EDITS: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
+    "no status": lambda there: there.drop_vars("status"),
+    "no counts": lambda there: there.drop_vars("reversals"),
+    "real numbers": lambda there: there.where(there["mu"] > 50),
+    "turned": lambda there: there.transpose(),
+    "another axis": lambda there: there.expand_dims("run"),
+    "no attributes": lambda there: there.drop_attrs(),
+}
+"""What may have been done to a dataset before it was saved under its old name."""
+
+
+@pytest.mark.parametrize("how", EDITS)
+def test_nothing_is_taken_from_an_edited_dataset(how: str, write: Write, tmp_path: Path) -> None:
+    """A count that is not there was taken for zero."""
+    text = by("dopri5", ONE) + MEASURED
+    there, _ = grown(write, tmp_path / "out", text)
+    EDITS[how](there).to_netcdf(tmp_path / "out" / "small.nc")
+    for options in ({"n0": [0.02, 0.03, 0.05]}, {"rerun": "limit"}):
+        with pytest.raises(StoreError, match=r"edited since|another configuration"):
+            grown(write, tmp_path / "out", text, **options)
+
+
+def test_a_part_of_a_dataset_is_no_complete_run(write: Write, tmp_path: Path) -> None:
+    there, _ = grown(write, tmp_path / "out", FEWER)
+    there.isel(mu=[0]).to_netcdf(tmp_path / "out" / "small.nc")
+    found, notes = grown(write, tmp_path / "out", FEWER)
+    assert notes[0].startswith("6 of 12 cells are taken over")
+    same_numbers(found, there)
 
 
 def test_nothing_is_taken_from_other_sources(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
