@@ -79,9 +79,12 @@ def run(
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
             earlier = _earlier(config, found, identity, files, rerun)
-            _forget_pictures(config, files)
-            store = Checkpoint(files.checkpoint, identity, reporter.note)
-            _compute(config, store, reporter, cluster, earlier).save(files.dataset)
+            if rerun and earlier and (earlier.cells >= 0).all():
+                reporter.note(f"{files.dataset}: has no such cells, nothing to compute")
+            else:
+                _forget_pictures(config, files)
+                store = Checkpoint(files.checkpoint, identity, reporter.note)
+                _compute(config, store, reporter, cluster, earlier).save(files.dataset)
         files.discard_checkpoint()
         point()
         result = open_dataset(files.dataset, load=config.grid.size <= LARGE)

@@ -240,6 +240,13 @@ def test_rerun_of_failed_cells(write: Write, tmp_path: Path) -> None:
     assert (found["step"].values != short["step"].values)[failed].all()
 
 
+def test_rerun_of_no_cells_leaves_a_dataset_that_can_grow(write: Write, tmp_path: Path) -> None:
+    grown(write, tmp_path / "out", FEWER)
+    before = (tmp_path / "out" / "small.nc").read_bytes()
+    assert "has no such cells" in grown(write, tmp_path / "out", FEWER, rerun="failed")[1][0]
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == {"small.nc": before}
+
+
 def test_rerun_needs_a_dataset(write: Write, tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="--rerun needs the dataset"):
         grown(write, tmp_path / "out", ONE, rerun="limit")
