@@ -143,6 +143,7 @@ def test_a_trajectory_takes_cells_and_settings() -> None:
     found = sweep.trajectory(SAID, mu=(50, 70), b=np.array([3.0]), t_end=30)
     assert found.mu.values.tolist() == [50, 70]
     assert float(found.time.max()) == 30
+    assert found.attrs["wall_time"] > 0
 
 
 def test_open_takes_what_sweep_wrote_and_nothing_else(tmp_path: Path) -> None:

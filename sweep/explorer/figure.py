@@ -124,7 +124,9 @@ class MapFigure:
         self._uncertain.data_source.data = at
         self._uncertain.glyph.size = float(np.clip(120 / max(part.values.shape), 2.0, 6.0))
         for cut in self._cuts:
-            cut["plot"].yaxis.major_label_overrides = (scale.ticks or {}) if part.flags else {}
+            words = (scale.ticks or {}) if part.flags else {}
+            ticker = models.FixedTicker(ticks=list(words), minor_ticks=[]) if words else models.BasicTicker()
+            cut["plot"].yaxis.update(ticker=ticker, major_label_overrides=words)
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]

@@ -117,7 +117,8 @@ def _integrator_words(config: Config) -> str:
         return "none"
     if config.integrator.step != "auto":
         return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"
-    rule, method = f"a spin error of {config.integrator.tolerance:g} at t = 400", config.integrator.method
+    tolerance, method = config.integrator.tolerance, config.integrator.method
+    rule = f"a spin error of {tolerance:g} sqrt(g/c) at t = 400 sqrt(c/g)"
     if method != AUTO and METHODS[method].step_words:
         rule = f"the shorter of {METHODS[method].step_words} and {rule}"
     name = "the cheapest method" if method == AUTO else method

@@ -170,7 +170,7 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     times = _times(kernel, images, every or _intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
     (found,) = job.by_grid(results(job, errors, work))
-    labelled = dataset.label(chosen, grid, found, provenance(chosen, 0.0, grid.size))
+    labelled = dataset.label(chosen, grid, found, provenance(chosen, time.perf_counter() - began, grid.size))
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(grid.size), {"units": "1", "long_name": "number of the trajectory"})
     return flat.assign_coords(trajectory=index).assign(_described(times, series, kernel.model, chosen.units))

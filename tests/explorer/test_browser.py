@@ -329,6 +329,8 @@ def test_cuts_follow_the_pointer(page: Page, counts: np.ndarray) -> None:
         assert np.flatnonzero(np.isfinite(here)).tolist() == [j]
     page.evaluate(f"{MAP}.x_range.start = 50")
     assert model(page, "cut along mu", "m.x_range.start") == 50
+    select(page, "show", "how the trajectory ended", "show=status")
+    wait(page, "cut along mu", "m.left[0].ticker.ticks?.every((tick) => m.left[0].major_label_overrides.has(tick))")
 
 
 def test_two_maps_stand_side_by_side(page: Page, opened: xr.Dataset) -> None:
