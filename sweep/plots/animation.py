@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
+from sweep.plots.figure import zero_line
 from sweep.plots.formats import suffix
 from sweep.plots.panels import in_lines
 from sweep.results.netcdf import open_dataset
@@ -118,7 +119,7 @@ class _Scene:
         over_time = self.figure.add_axes((0.1, 0.12, 0.85, 0.26))
         across, up = (labels.label(dataset, name) for name in ("time", "spin"))
         over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)
-        over_time.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
+        zero_line(over_time)
         self.bodies = []
         for i in range(bodies):
             place = (i / bodies, 0.42, 1 / bodies, 0.55)

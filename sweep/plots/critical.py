@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import product
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.lines import Line2D
@@ -13,7 +12,7 @@ from matplotlib.lines import Line2D
 from sweep.axis import Axis
 from sweep.plots import fine, labels, theory
 from sweep.plots.description import along
-from sweep.plots.figure import Picture, framed, set_scale
+from sweep.plots.figure import Picture, framed, set_scale, zero_line
 from sweep.plots.panels import MAX_PANELS, indices
 
 _COLOURS = {"n_c1": "C0", "n_c2": "C1"}
@@ -44,7 +43,7 @@ def draw(dataset: xr.Dataset) -> Picture:
             values = between.get(variable, chosen[variable])
             places = values[x].values if variable in between else at
             axes.plot(places, np.atleast_1d(values.values), gid=variable, **styles[variable])
-        axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
+        zero_line(axes)
         axes.set_ylabel(f"spin n ({labels.unit(dataset, 'n_c2_plus_simulated')})")
     names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()}
     sources = [drawn for suffix, drawn in _SOURCES.items() if {f"n_c1_plus{suffix}", f"n_c2_plus{suffix}"} & {*dataset}]

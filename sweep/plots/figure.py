@@ -161,7 +161,7 @@ class Picture(Figure):
             letter = _OF_LABEL * self.dpi * self.get_figwidth() / self._width
             across, up = axes.bbox.size
             for text, length in ((axes.title, across), (axes.xaxis.label, across), (axes.yaxis.label, up)):
-                text.set_text(_in_lines(text.get_text(), int(length / letter)))
+                text.set_text(_wrapped(text.get_text(), int(length / letter)))
 
     def letter(self) -> None:
         """Letters a, b, c at the panels, if there are several."""
@@ -171,11 +171,16 @@ class Picture(Figure):
                           ha="right", va="bottom", weight="bold")  # fmt: skip
 
 
-def _in_lines(words: str, room: int) -> str:
+def _wrapped(words: str, room: int) -> str:
     """Words in lines of so many letters, if these are not broken within the brackets at the end, such as a unit."""
     space = "\N{NO-BREAK SPACE}"
     whole = re.sub(r"(?<= )\(.*\)$", lambda brackets: brackets[0].replace(" ", space), words)
     return fill(whole, max(room, 1), break_long_words=False).replace(space, " ")
+
+
+def zero_line(axes: Axes) -> None:
+    """Draw where the spin, or what else goes up, is zero."""
+    axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
 
 
 def extent(text: Text) -> Array:

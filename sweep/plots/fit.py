@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib as mpl
 import xarray as xr
 
 from sweep.plots import labels
-from sweep.plots.figure import Picture, page, panel_width
+from sweep.plots.figure import Picture, page, panel_width, zero_line
 
 _VALUES = 3.2
 """Inches that the values take across."""
@@ -26,9 +25,9 @@ def draw(dataset: xr.Dataset) -> Picture:
         fitted, colour = one["fitted"].values, f"C{i}" if laws else "0.4"
         above.plot(time, fitted, color=f"C{i}", linewidth=1, label=name, gid=f"fitted {name}")
         below.plot(time, seen - fitted, ".", color=colour, markersize=2, gid=f"residuals {name}")
-    above.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
+    zero_line(above)
     above.set_ylabel(labels.label(dataset, "seen"))
-    below.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
+    zero_line(below)
     below.set_ylabel("film − fit")
     below.set_xlabel(labels.label(dataset, "time"))
     words = [_of_law(name, one) for name, one in laws] or _values(dataset)

@@ -17,7 +17,7 @@ from sweep.kernels.status import FAILURES
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, theory
-from sweep.plots.figure import Picture, page, panel_width
+from sweep.plots.figure import Picture, page, panel_width, zero_line
 from sweep.results.kind import is_of_own_body, parameters
 
 # Title and the series drawn together; two panels stand beside each other.
@@ -110,13 +110,13 @@ def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
 def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist]:
     """Draw the spins; returns the entries for the legend."""
     if SAMPLE in dataset.coords:
-        axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
+        zero_line(axes)
         return _series(axes, dataset, {"spin": "spin n"})
     for i in range(dataset.sizes["trajectory"]):
         times = reversal_times(dataset.isel(trajectory=i))
         axes.plot(times, np.zeros(len(times)), "o", color=f"C{i}", markersize=4)
     entries = _series(axes, dataset, {"spin": "spin n"})
-    axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
+    zero_line(axes)
     entries.append(Line2D([], [], linestyle="none", marker="o", color="0.4", markersize=4, label="reversal"))
     return entries + (_critical_spins(axes, dataset) if critical else [])
 
