@@ -98,6 +98,7 @@ def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int
         server.stop()
         for one in sockets:
             one.close()
+        await http.close_all_connections()
 
     thread = threading.Thread(target=lambda: asyncio.run(work()), daemon=True, name="explorer")
     thread.start()
