@@ -20,44 +20,44 @@ GENERATED: dict[str, dict[str, Any]] = {}
 """What the names in each generated source are bound to, by the source's file name."""
 
 
-def make_load(names: Sequence[str], layout: Any, record: Any = None) -> Any:
+def make_load(names: Sequence[str], layout, record=None):
     """Compiled (group, lane) -> the quantities `names` of one lane, as a tuple or as the `NamedTuple` `record`."""
     return make_gather("group, lane", (f"group[{layout.at(name)} + lane]" for name in names), record)
 
 
-def make_gather(arguments: str, places: Iterable[str], record: Any = None) -> Any:
+def make_gather(arguments: str, places: Iterable[str], record=None):
     """Compiled (arguments) -> what is at `places`, expressions, as a tuple or as the `NamedTuple` `record`."""
     made = f"{'record' if record else ''}{tuple_of(places)}"
     return compile_inline("load", arguments, [f"return {made}"], {"record": record})
 
 
-def make_store(names: Sequence[str], layout: Any) -> Any:
+def make_store(names: Sequence[str], layout):
     """Compiled (group, lane, keep, new, old) -> None: sets the quantities `names` to `new` if `keep`, else to `old`."""
     lines = [f"group[{layout.at(name)} + lane] = new[{i}] if keep else old[{i}]" for i, name in enumerate(names)]
     return compile_inline("store", "group, lane, keep, new, old", lines, {})
 
 
-def make_rest(n_states: int, spin_state: int) -> Any:
+def make_rest(n_states: int, spin_state: int):
     """Compiled (states) -> states with the same spin and no rattle."""
     rest = tuple_of(f"y[{i}]" if i == spin_state else "0.0" for i in range(n_states))
     return compile_inline("rest", "y", [f"return {rest}"], {})
 
 
-def call_all(name: str, arguments: str, functions: Sequence[Any]) -> Any:
+def call_all(name: str, arguments: str, functions: Sequence[Any]):
     """Compiled (arguments) -> None: calls each of `functions`; if there is none, it leaves no instruction behind."""
     calls = [f"f{i}({arguments})" for i in range(len(functions))] or ["pass"]
     names = {f"f{i}": function for i, function in enumerate(functions)}
     return compile_inline(name, arguments, calls, names)
 
 
-def all_true(name: str, arguments: str, functions: Sequence[Any]) -> Any:
+def all_true(name: str, arguments: str, functions: Sequence[Any]):
     """Compiled (arguments) -> bool: whether each of `functions` is true; True if there is none."""
     calls = " & ".join(f"f{i}({arguments})" for i in range(len(functions))) or "True"
     names = {f"f{i}": function for i, function in enumerate(functions)}
     return compile_inline(name, arguments, [f"return {calls}"], names)
 
 
-def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]) -> Any:
+def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]):
     """Compiled (arguments) -> None: runs `lines` for each lane.
 
     The lines are the body of the loop itself.  If they were a function of their own, LLVM would unroll the loop over
@@ -67,7 +67,7 @@ def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[s
     return compiled(compile_inline(name, arguments, loop, names | {"full_width": full_width()}))
 
 
-def compile_inline(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]) -> Any:
+def compile_inline(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]):
     """Compiled (arguments) -> what `lines` return, which may use `names`.
 
     Equal sources have equal file names in every process.

@@ -46,7 +46,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
     def __init__(self, lines: list[str], value: str, slope: str) -> None:
         self.lines, self.value, self.slope = lines, value, slope
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(self, ufunc, method: str, *inputs, **options):
         if ufunc is np.power and isinstance(inputs[1], int) and inputs[1] > 0:
             product = inputs[0]
             for _ in range(inputs[1] - 1):
@@ -74,7 +74,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         raise TypeError("a branch cannot be differentiated")
 
 
-def make_extended(model: Model) -> Any:
+def make_extended(model: Model):
     """Inline (z, constants) -> (slopes, (0.0, 0.0, 1.0, 1.0)) for z = (states, direction), as a right-hand side.
 
     The slopes are those of the states, and their derivative in the direction.

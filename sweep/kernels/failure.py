@@ -9,7 +9,6 @@ tried again at half its length.  If this never ends, the failure is one of the b
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -37,7 +36,7 @@ _UPRIGHT = 1e-5
 _MOST_STEPS = 3_000_000
 
 
-def approach(model: Model, states: Array, constants: Any, stretch: Array) -> tuple[Array, Array]:
+def approach(model: Model, states: Array, constants, stretch: Array) -> tuple[Array, Array]:
     """Find what happens to trajectories within a stretch of time.
 
     Parameters
@@ -68,14 +67,14 @@ def compiled_approach(model: Model) -> Cached:
     load_constants = make_gather("rows, i", (f"rows[i, {n + j}]" for j in range(len(record._fields))), record)
     follow = _make_follow(model)
 
-    def run(rows: Any, stretch: Any, status: Any, time: Any) -> None:
+    def run(rows, stretch, status, time):
         for i in prange(len(rows)):
             status[i], time[i] = follow(load(rows, i), load_constants(rows, i), stretch[i])
 
     return parallel(run, "(f8[:, ::1], f8[::1], f8[::1], f8[::1])", f"approach-{model.key}")
 
 
-def _make_follow(model: Model) -> Any:
+def _make_follow(model: Model):
     """Compiled (states, constants, stretch) -> (status, time): `approach` for one trajectory."""
     n, rhs, tilt = len(model.states), model.rhs, model.tilt
     # Not inlined: it would be compiled three times over.
@@ -86,7 +85,7 @@ def _make_follow(model: Model) -> Any:
     allowed = _TOLERANCE * (2**DOPRI5.order - 1)
 
     @compiled
-    def kind(y: Any, p: Any, infinite: Any) -> Any:
+    def kind(y, p, infinite):
         """Return what a very short step from `y` has met.
 
         Its stages do not tell.  Where the denominator goes to zero the force goes to infinity, or stays finite because
@@ -98,7 +97,7 @@ def _make_follow(model: Model) -> Any:
         return DIVERGED if infinite else (PARADOX if jams else LIFT_OFF)
 
     @compiled
-    def probe(y: Any, p: Any) -> Any:
+    def probe(y, p):
         """Return what lies just ahead of `y`, where errors allow no step that is as long as the shortest.
 
         Near the paradox the denominator goes to zero as the root of the time left.
@@ -112,7 +111,7 @@ def _make_follow(model: Model) -> Any:
         return DIVERGED
 
     @compiled
-    def follow(y: Any, p: Any, stretch: float) -> Any:
+    def follow(y, p, stretch):
         time, h, cosine = 0.0, stretch / 8.0, np.sqrt(1.0 - tilt(y))
         for _ in range(_MOST_STEPS):
             if time >= stretch:

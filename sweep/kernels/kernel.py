@@ -82,7 +82,7 @@ class Kernel:
         """True if a measurement needs the ripple-free spin."""
         return any(each.follows_ripple for each in self.measurements)
 
-    def _make_watch(self) -> Any:
+    def _make_watch(self):
         """Inline (group, lane, accepted, y, p, spin, work, h, now): what all measurements do after a step.
 
         y, p, spin : states, constants and spin before the step; the others as in `Measurement.make_step`
@@ -93,16 +93,16 @@ class Kernel:
         load, ripple = make_load(self.ripple, self.layout), self._ripple.value
 
         @inline
-        def watch(group: Any, lane: int, accepted: Any, y: Any, p: Any, spin: Any, work: Any, h: Any, now: Any) -> None:
+        def watch(group, lane, accepted, y, p, spin, work, h, now):
             measure(group, lane, accepted, spin, spin - ripple(y, p, load(group, lane)), work, h, now)
 
         return watch
 
-    def _hooks(self, make: str, *more: Any) -> list[Any]:
+    def _hooks(self, make: str, *more) -> list[Any]:
         """The functions that a hook of `Measurement` gives; `more` are its arguments beside the layout."""
         return [hook for each in self.measurements if (hook := getattr(each, make)(self.layout, *more))]
 
-    def _compile_with(self, run_block: Any) -> None:
+    def _compile_with(self, run_block) -> None:
         """Set up `advance` around `run_block`, compiled (group) -> None."""
         may_settle = all_true("may_settle", "group, lane, spin, at_rest", self._hooks("make_may_settle"))
         looks = self._hooks("make_look")

@@ -8,7 +8,6 @@ the trajectory of a lane ends, its image is written back and the lane takes the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -36,7 +35,7 @@ MAX_ENERGY = 1e300
 NEGLIGIBLE = 1e-120
 
 
-def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any:
+def make_advance(run_block, look, compare, layout: Layout):
     """Python function to be compiled: (images, cells, blocks, stop_when_settled, groups, shared) -> None.
 
     `run_block`, (group) -> None, and `look`, (group, stop_when_settled) -> None, are compiled functions; `compare`,
@@ -47,7 +46,7 @@ def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any
     n_rows, lanes, status, wide = len(layout.names), LANES, layout.at("status"), full_width()
 
     @exactly_compiled
-    def take(images: Any, cells: Any, position: int, group: Any, lane: int, held: Any) -> int:
+    def take(images, cells, position, group, lane, held):
         """Fill a lane with the next cell of this group's share, or leave it idle if there is none."""
         if position < len(cells):
             held[lane] = cells[position]
@@ -59,12 +58,12 @@ def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any
         return position + 1
 
     @exactly_compiled
-    def release(images: Any, group: Any, lane: int, held: Any) -> None:
+    def release(images, group, lane, held):
         for row in range(n_rows):
             images[held[lane], row] = group[row * lanes + lane]
 
     @exactly_compiled
-    def run_group(images: Any, cells: Any, blocks: int, stop_when_settled: bool, shared: Any) -> None:
+    def run_group(images, cells, blocks, stop_when_settled, shared):
         wide()
         # An idle lane computes on zeros.  What comes out is meaningless but harmless: its status keeps it from
         # being stored.
@@ -90,7 +89,7 @@ def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any
             if held[lane] >= 0:
                 release(images, group, lane, held)
 
-    def advance(images: Any, cells: Any, blocks: int, stop_when_settled: bool, groups: int, shared: Any) -> None:
+    def advance(images, cells, blocks, stop_when_settled, groups, shared):
         for g in prange(groups):
             wide()
             run_group(images, cells[g::groups].copy(), blocks, stop_when_settled, shared)
@@ -98,9 +97,7 @@ def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any
     return advance
 
 
-def make_look(
-    model: Model, constants: Sequence[str], layout: Layout, may_settle: Any, measure: Any, energy_gain: float
-) -> Any:
+def make_look(model: Model, constants: Sequence[str], layout: Layout, may_settle, measure, energy_gain: float):
     """Compiled (group, stop_when_settled) -> None: checks all lanes between two blocks, and decides which ones end.
 
     Parameters
@@ -123,7 +120,7 @@ def make_look(
     QUIET_ENERGY, QUIET_AFTER = (layout.at(f"quiet_{name}") if pauses else 0 for name in ("energy", "after"))
 
     @exactly_compiled
-    def look(group: Any, stop_when_settled: bool) -> None:
+    def look(group, stop_when_settled):
         wide()
         for lane in range(lanes):
             y = load_states(group, lane)
@@ -163,7 +160,7 @@ def make_look(
     return look
 
 
-def _make_will_settle(layout: Layout, may_settle: Any, saturates: bool) -> Any:
+def _make_will_settle(layout: Layout, may_settle, saturates: bool):
     """Inline (group, lane, spin, 2 E / I3) -> (bounded, settled, followed).
 
     `bounded` says whether upright spin is stable at this spin; `settled`, whether in addition the spin can reverse no
@@ -185,7 +182,7 @@ def _make_will_settle(layout: Layout, may_settle: Any, saturates: bool) -> Any:
     FROM, TO, BELOW_FROM, BELOW_TO, ABOVE_FROM, ABOVE_TO = map(layout.at, STABLE)
 
     @inline
-    def will_settle(group: Any, lane: int, spin: Any, energy_ratio: Any) -> Any:
+    def will_settle(group, lane, spin, energy_ratio):
         e = SETTLE_MARGIN * energy_ratio
         low, high = group[FROM + lane], group[TO + lane]
         under, over = spin < low, spin > high

@@ -60,7 +60,7 @@ class Method:
     """(model, columns) -> the longest stable step, shape (cells,), in sqrt(c/g); None if no limit is near."""
     step_words: str = ""
     """The words for what limits an automatic step beside the tolerance, for the provenance; "" if nothing does."""
-    runs: Callable[[Model], bool] = lambda model: True  # noqa: ARG005
+    runs: Callable[[Model], bool] = lambda model: True
     """(model) -> whether it can integrate this; by default it can integrate all."""
     step_cost: float = 1.0
     """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""

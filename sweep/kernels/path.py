@@ -8,7 +8,6 @@ all stretches between two instants are stepped side by side.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from sweep.models.model import Array, Model
 _NAMES = ("heading", "along", "across")
 
 
-def stretches(model: Model, states: Array, constants: Any, interval: Array, step: Array) -> Array:
+def stretches(model: Model, states: Array, constants, interval: Array, step: Array) -> Array:
     """What heading and path gain on stretches of trajectories of a model that has a `path`.
 
     Parameters
@@ -66,7 +65,7 @@ def compiled_path(model: Model) -> Cached:
     INTERVAL, wide, lanes = layout.at("interval"), full_width(), LANES
 
     @exactly_compiled
-    def follow(group: Any, steps: int) -> None:
+    def follow(group, steps):
         wide()
         for _ in range(steps):
             for lane in range(lanes):
@@ -74,7 +73,7 @@ def compiled_path(model: Model) -> Cached:
                 new, _, _, _, _, _ = step(z, load_constants(group, lane), group[INTERVAL + lane] / steps)
                 store(group, lane, True, new, z)
 
-    def run(groups: Any, steps: Any) -> None:
+    def run(groups, steps):
         for g in prange(len(groups)):
             follow(groups[g], steps[g])
 

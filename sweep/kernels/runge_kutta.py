@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -47,19 +46,19 @@ class RungeKuttaKernel(Kernel):
                 table[name] = values
         return images
 
-    def _with_tangent(self, run_block: Any) -> Any:
+    def _with_tangent(self, run_block):
         """Compiled (group) -> None: as `run_block`, and then the tangents take the same steps."""
         step = make_step(self.tableau, make_extended(self.model), 2 * len(self.model.states))
         follow = tangent.make_follow(step, self.model, self.constants, self.layout)
 
         @exactly_compiled
-        def run_both(group: Any) -> None:
+        def run_both(group):
             run_block(group)
             follow(group)
 
         return run_both
 
-    def _make_run_block(self) -> Any:
+    def _make_run_block(self):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and calls the measurements after each."""
         model, layout = self.model, self.layout
         load_states = make_load(model.states, layout)
@@ -71,7 +70,7 @@ class RungeKuttaKernel(Kernel):
         block, lanes, wide = BLOCK, LANES, full_width()
 
         @exactly_compiled
-        def run_block(group: Any) -> None:
+        def run_block(group):
             wide()
             for number in range(block):
                 for lane in range(lanes):
@@ -91,7 +90,7 @@ class RungeKuttaKernel(Kernel):
         return run_block
 
 
-def make_step(tableau: Tableau, rhs: Any, n_states: int) -> Any:
+def make_step(tableau: Tableau, rhs, n_states: int):
     """Inline (states, constants, h) -> (states, spin, work, sound, airborne, jammed): one step.
 
     Returned are the states after the time h; the spin before the step; the integral of the dissipated power over the
@@ -131,7 +130,7 @@ def method(tableau: Tableau) -> Method:
         name=tableau.name,
         code=tableau.code,
         summary=tableau.summary,
-        kernel=lambda model, measurements, tolerance: RungeKuttaKernel(model, tableau, measurements),  # noqa: ARG005
+        kernel=lambda model, measurements, tolerance: RungeKuttaKernel(model, tableau, measurements),
         accurate_step=partial(_accurate_step, tableau),
         stable_step=lambda model, columns: np.asarray(longest / model.fastest_decay(columns)),
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",

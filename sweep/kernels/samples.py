@@ -7,7 +7,6 @@ the same number, so that those which differ little, as the columns of a Jacobian
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ def sampled(
     step: Array,
     interval: float,
     count: int,
-    seen: Any = None,
+    seen=None,
     axis: Array | None = None,
 ) -> Array:
     """Spins at the times 0, `interval`, …, shape (cells, count); NaN from where a body lifts off or a run diverges.
@@ -74,12 +73,12 @@ def in_lanes(rows: Array, needed: Array) -> tuple[Array, Array, Array]:
 
 
 @inline
-def _spin(y: Any, spin: Any, axis: Any) -> Any:  # noqa: ARG001
+def _spin(y, spin, axis):
     return spin
 
 
 @cache
-def _compiled(model: Model, seen: Any) -> Cached:
+def _compiled(model: Model, seen) -> Cached:
     """Compiled (lanes, h, steps, spins) -> None: `sampled` for groups of lanes."""
     from numba import prange
 
@@ -91,7 +90,7 @@ def _compiled(model: Model, seen: Any) -> Cached:
     lost = compile_inline("lost", "", [f"return {tuple_of(['np.nan'] * n)}"], {"np": np})
 
     @exactly_compiled
-    def follow(group: Any, h: float, steps: int, spins: Any) -> None:
+    def follow(group, h, steps, spins):
         wide()
         for k in range(len(spins)):
             for i in range(steps):
@@ -101,7 +100,7 @@ def _compiled(model: Model, seen: Any) -> Cached:
                     store(group, lane, sound, new, lost())
                     spins[k, lane] = seen(y, spin, load_axis(group, lane)) if i == 0 else spins[k, lane]
 
-    def run(groups: Any, h: Any, steps: Any, spins: Any) -> None:
+    def run(groups, h, steps, spins):
         for g in prange(len(groups)):
             follow(groups[g], h[g], steps[g], spins[g])
 

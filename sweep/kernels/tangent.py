@@ -12,8 +12,6 @@ b = 3, δ = 0.288, n0 = 0.0325 that gave an exponent of 0.009 for a motion that 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
@@ -43,7 +41,7 @@ def _places(model: Model) -> tuple[str, ...]:
     return tuple(f"{what}.{name}" for what in ("foot", "tangent") for name in model.states)
 
 
-def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Layout) -> Any:
+def make_follow(step, model: Model, constants: tuple[str, ...], layout: Layout):
     """Compiled (group) -> None: lets the tangents of all lanes catch up with their trajectories.
 
     Parameters
@@ -63,7 +61,7 @@ def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Lay
     block, lanes, wide = BLOCK, LANES, full_width()
 
     @exactly_compiled
-    def catch_up(group: Any) -> None:
+    def catch_up(group):
         wide()
         for _ in range(block):
             for lane in range(lanes):
@@ -76,7 +74,7 @@ def make_follow(step: Any, model: Model, constants: tuple[str, ...], layout: Lay
 
     # Not in one function with the steps: beside the logarithms LLVM vectorised those less well.
     @exactly_compiled
-    def follow(group: Any) -> None:
+    def follow(group):
         wide()
         catch_up(group)
         for lane in range(lanes):

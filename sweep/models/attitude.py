@@ -20,19 +20,17 @@ spin.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from sweep.jit import inline
 from sweep.models.model import Array
 
 
-def of_rolling(contact: Any) -> Any:
+def of_rolling(contact):
     """Make `Model.path` of the states (u1, u2, ω1, ω2, ω3) on a surface, of which `contact` tells the contact point."""
 
     @inline
-    def path(y: Any, along: Any, across: Any, p: Any) -> Any:
+    def path(y, along, across, p):
         u1, u2, w1, w2, w3 = y
         (u3, _), _, _, moving = contact(u1, u2, w1, w2, w3, p)
         return _rates(u1, u3, w1, w3, moving, along, across)
@@ -40,11 +38,11 @@ def of_rolling(contact: Any) -> Any:
     return path
 
 
-def of_slipping(contact: Any) -> Any:
+def of_slipping(contact):
     """As `of_rolling`, of the states (u1, u2, ω1, ω2, ω3, v1, v2)."""
 
     @inline
-    def path(y: Any, along: Any, across: Any, p: Any) -> Any:
+    def path(y, along, across, p):
         u1, u2, w1, w2, w3, v1, v2 = y
         (u3, inv_u3), _, _, (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
         velocity = v1 + dx, v2 + dy, dz - (v1 * u1 + v2 * u2) * inv_u3
@@ -54,7 +52,7 @@ def of_slipping(contact: Any) -> Any:
 
 
 @inline
-def _rates(u1: Any, u3: Any, w1: Any, w3: Any, velocity: Any, along: Any, across: Any) -> Any:
+def _rates(u1, u3, w1, w3, velocity, along, across):
     m1, m2, m3 = velocity
     square = u1 * u1 + u3 * u3
     turning, h = (w1 * u1 + w3 * u3) / square, np.sqrt(square)
@@ -63,7 +61,7 @@ def _rates(u1: Any, u3: Any, w1: Any, w3: Any, velocity: Any, along: Any, across
 
 
 @inline
-def turning(y: Any, spin: Any, axis: Any) -> Any:
+def turning(y, spin, axis):
     """The rate at which an axis of the body turns, seen from above, of states that begin with (u1, u2, ω1, ω2, ω3)."""
     (u1, u2, w1, w2, w3), (e1, e2, e3) = y[:5], axis
     upright = e1 * u1 + e2 * u2 - e3 * np.sqrt(1 - u1 * u1 - u2 * u2)
@@ -71,7 +69,7 @@ def turning(y: Any, spin: Any, axis: Any) -> Any:
 
 
 @inline
-def rate(y: Any, spin: Any, axis: Any) -> Any:  # noqa: ARG001
+def rate(y, spin, axis):
     """The angular velocity about an axis of the body, as a gyroscope on it tells; the arguments are as of `turning`."""
     return axis[0] * y[2] + axis[1] * y[3] + axis[2] * y[4]
 

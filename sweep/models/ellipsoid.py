@@ -8,8 +8,6 @@ Takano (2011) uses an expansion (xp, u).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from sweep.jit import inline
@@ -46,13 +44,13 @@ def start(columns: Columns) -> tuple[Array, ...]:
 
 
 @inline
-def tilt(y: Any) -> Any:
+def tilt(y):
     """sin² of the angle between u and the z axis, from states that begin with u1 and u2."""
     return y[0] * y[0] + y[1] * y[1]
 
 
 @inline
-def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+def contact(u1, u2, w1, w2, w3, p):
     """(u3, 1/u3), the contact point x_p, u', and the velocity x_p' of the contact point in the body.
 
     u' = u × ω (omega) and x_p' = -(A u' + x_p (u' · A u) / r) / r.  `p` holds A11 … A33.
@@ -75,7 +73,7 @@ def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
 
 
 @inline
-def energy(y: Any, p: Any) -> Any:
+def energy(y, p):
     """(spin n, energy of the rattle, I3), where the energy above rest is the energy of the rattle + I3 n²/2.
 
     `y` are the states of `slip`, and `p` holds A11 … A33 and the inverse moments of inertia, inv_I1 … inv_I3.
@@ -96,7 +94,7 @@ def energy(y: Any, p: Any) -> Any:
 
 
 @inline
-def split_energy(u: Any, w: Any, v: Any, x_p: Any, moments: Any, height: Any) -> Any:
+def split_energy(u, w, v, x_p, moments, height):
     """(spin n, energy of the rattle) of any body whose energy of height is `height`, without products of inertia.
 
     E = ωᵀIω/2 + |v_g|²/2 + `height` is split by means of ω = n u + o, o ⊥ u.  Every term except I3 n²/2 is quadratic in

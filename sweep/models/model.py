@@ -74,17 +74,17 @@ class Ripple:
     """Inline, (states, constants, coefficients) -> n - n*, in sqrt(g/c)."""
 
 
-NO_RIPPLE = Ripple((), lambda columns: (), nothing)  # noqa: ARG005
+NO_RIPPLE = Ripple((), lambda columns: (), nothing)
 """For a model whose spin does not ripple."""
 
 
 @inline
-def never_decided(y: Any, p: Any) -> bool:  # noqa: ARG001
+def never_decided(y, p):
     """The default `decided`: nothing is known beside the linear theory."""
     return False
 
 
-def never_upright(spin: Any) -> tuple[Any, ...]:
+def never_upright(spin) -> tuple[Any, ...]:
     """The default `upright`: there is no such motion."""
     raise NotImplementedError
 
@@ -175,7 +175,7 @@ class Model(Tier):
     rattle below it may settle."""
 
     # What trajectories and labels show of it, and in which units.
-    observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}  # noqa: ARG005
+    observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
     shows beside spin and energy, by names that `sweep.studies.trajectory` or `series` explains."""
     series: tuple[tuple[str, str, str], ...] = ()
@@ -205,7 +205,7 @@ class Model(Tier):
         return f"{self.name}@{self.origin.digest}" if self.origin else self.name
 
 
-def named(*fields: str) -> Any:
+def named(*fields: str):
     """A base for the constants of a model whose fields are put together from several lists, a `NamedTuple` class."""
     return namedtuple("Constants", fields)
 

@@ -18,7 +18,6 @@ What else was tried, with figures: docs/explanation/tried.md.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -104,7 +103,7 @@ class AdamsKernel(Kernel):
         reached = table["begin"] + table["done"] * table["step"]
         return np.where(table["done"] == table["goal"], t_end, reached)
 
-    def _set_method(self, table: Table, constants: Any) -> None:
+    def _set_method(self, table: Table, constants) -> None:
         """Set the weights of the formulas and the matrix P."""
         step = table["step"]
         rocking = self.form.rocking(constants)
@@ -147,7 +146,7 @@ class AdamsKernel(Kernel):
         """As `Kernel.carry`."""
         stretches.carry(self, images, self.tolerance)
 
-    def _make_run_block(self) -> Any:
+    def _make_run_block(self):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes.
 
         Each step appends a point to a history that begins with the eight points of the image.  So one step is

@@ -9,7 +9,6 @@ computed by itself, so it does not matter which ones.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -236,7 +235,7 @@ def compiled_start_up(form: StiffForm) -> Cached:
     advance = compile_lanes("advance", "group, points, ticks", _advance(form, at), known)
     size, dopri5_steps = _POINT_SIZE, _DOPRI5_STEPS
 
-    def run(group: Any, points: Any, steps: Any) -> None:
+    def run(group, points, steps):
         for n in range(dopri5_steps + 1):
             if n:
                 dopri5(group)

@@ -53,7 +53,7 @@ def places(point: Sequence[str]) -> dict[str, int]:
 
 
 @inline
-def correct(q: Any, g: Any, f: Any, weight: Any, P: Any) -> Any:
+def correct(q, g, f, weight, P):
     """(r, d): the residual r by which the corrector exceeds the rocking states q, and d = P r; four numbers each."""
     r0, r1 = g[0] + weight * f[0] - q[0], g[1] + weight * f[1] - q[1]
     r2, r3 = g[2] + weight * f[2] - q[2], g[3] + weight * f[3] - q[3]
@@ -64,7 +64,7 @@ def correct(q: Any, g: Any, f: Any, weight: Any, P: Any) -> Any:
     return (r0, r1, r2, r3), (d0, d1, d2, d3)
 
 
-def make_solve(form: StiffForm) -> Any:
+def make_solve(form: StiffForm):
     """Inline (q, g, e, b, p, weight, per_weight, gamma, P) -> (states, slopes, spin, (num, den) of R, power).
 
     This is the new point, from the sums over the history.
@@ -84,7 +84,7 @@ def make_solve(form: StiffForm) -> Any:
     slow, newton, power = form.slow, form.newton, form.power
 
     @inline
-    def solve(q: Any, g: Any, e: Any, b: Any, p: Any, weight: Any, per_weight: Any, gamma: Any, P: Any) -> Any:
+    def solve(q, g, e, b, p, weight, per_weight, gamma, P):
         f, geometry = slow(q[0], q[1], q[2], q[3], q[4], e[0], e[1], p)
         v0, v1, num, den = newton(q[0], q[1], e[0], e[1], geometry, p, gamma, b[0], b[1])
         _, d = correct(q, g, f, weight, P)

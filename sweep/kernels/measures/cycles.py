@@ -8,7 +8,6 @@ that is perfectly periodic.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -33,11 +32,11 @@ class Cycles(Measurement):
         ),
     }  # fmt: skip
 
-    def make_at_reversal(self, layout: Layout) -> Any:
+    def make_at_reversal(self, layout: Layout):
         NEWEST, BEFORE, FIRST, SUM, SQUARES = map(layout.at, self.quantities)
 
         @inline
-        def at_reversal(group: Any, lane: int, reverses: Any, count: Any, crossing: Any) -> None:
+        def at_reversal(group, lane, reverses, count, crossing):
             newest, before, first = group[NEWEST + lane], group[BEFORE + lane], group[FIRST + lane]
             length = crossing - before
             begins, counts = reverses & (count == 3.0), reverses & (count > 2.5)

@@ -6,7 +6,6 @@ dE/dt = -μ R |v_p|² holds exactly, so a violation is an error that a run measu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -33,20 +32,20 @@ class EnergyError(Measurement):
         )
     }
 
-    def make_step(self, layout: Layout, at_reversal: Any) -> Any:
+    def make_step(self, layout: Layout, at_reversal):
         WORK = layout.at("work")
 
         @inline
-        def step(group: Any, lane: int, accepted: Any, spin: Any, steady: Any, work: Any, h: Any, now: Any) -> None:
+        def step(group, lane, accepted, spin, steady, work, h, now):
             group[WORK + lane] += work if accepted else 0.0
 
         return step
 
-    def make_look(self, layout: Layout) -> Any:
+    def make_look(self, layout: Layout):
         WORK, VIOLATION, START = map(layout.at, (*self.quantities, "energy_start"))
 
         @inline
-        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
+        def look(group, lane, running, ended, spin, rattle, J, total):
             violation = abs(total + group[WORK + lane] - group[START + lane])
             worst = group[VIOLATION + lane]
             group[VIOLATION + lane] = violation if violation > worst else worst

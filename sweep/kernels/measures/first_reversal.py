@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -29,11 +28,11 @@ class FirstReversal(Measurement):
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"first_reversal": np.nan}
 
-    def make_at_reversal(self, layout: Layout) -> Any:
+    def make_at_reversal(self, layout: Layout):
         FIRST = layout.at("first_reversal")
 
         @inline
-        def at_reversal(group: Any, lane: int, reverses: Any, count: Any, crossing: Any) -> None:
+        def at_reversal(group, lane, reverses, count, crossing):
             first = reverses & (count == 1.0)
             group[FIRST + lane] = crossing if first else group[FIRST + lane]
 

@@ -15,7 +15,6 @@ less, beside what the distance oscillates by.  See `docs/explanation/regimes.md`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -53,13 +52,13 @@ class Lyapunov(Measurement):
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"bin_width": 1.0}
 
-    def make_look(self, layout: Layout) -> Any:
+    def make_look(self, layout: Layout):
         WIDTH, LOOKS, SUM, FULL, FIRST, GREW, DONE = map(
             layout.at, ("bin_width", "bin_looks", "bin_growth", "full_bins", "bin0", GROWTH, "done")
         )
 
         @inline
-        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
+        def look(group, lane, running, ended, spin, rattle, J, total):
             # A block that the end has cut short does not count.
             if running & (group[DONE + lane] % BLOCK == 0.0):
                 group[SUM + lane] += group[GREW + lane]

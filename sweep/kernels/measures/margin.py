@@ -12,7 +12,6 @@ Of a trajectory that settles, the slow equations tell what its spin does from th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -55,13 +54,13 @@ class Margin(Measurement):
         ),
     }
 
-    def make_look(self, layout: Layout) -> Any:
+    def make_look(self, layout: Layout):
         OVERSHOOT, NEAREST, _, COUNTED, TIME, SIZE, TIME_BEFORE, SIZE_BEFORE = map(layout.at, self.quantities)
         CLOSED, PERIOD, COUNT = map(layout.at, ("closed_window", "period", "reversals"))
         DONE, STEP, PHASE, SHIFTED = map(layout.at, ("done", "step", "phase", "shifted"))
 
         @inline
-        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
+        def look(group, lane, running, ended, spin, rattle, J, total):
             period, count = group[PERIOD + lane], group[COUNT + lane]
             size = abs(group[CLOSED + lane]) / period
             # When the window closed; if half a window has closed since then, `shifted` is 0.
@@ -102,7 +101,7 @@ class Margin(Measurement):
 
 
 @inline
-def _vertex(t1: float, v1: float, t2: float, v2: float) -> float:
+def _vertex(t1, v1, t2, v2):
     """The extreme of the parabola through (0, 0), (t1, v1) and (t2, v2)."""
     a = (v1 / t1 - v2 / t2) / (t1 - t2)
     b = v1 / t1 - a * t1

@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -136,7 +136,7 @@ class Measurement:
         """
         return {}
 
-    def make_step(self, layout: Layout, at_reversal: Any) -> Any:
+    def make_step(self, layout: Layout, at_reversal):
         """Inline (group, lane, accepted, spin, steady, work, h, now) -> None, called after every step.
 
         accepted : whether the step counts; if not, no quantity may change
@@ -151,24 +151,24 @@ class Measurement:
         measurement that detects reversals.
         """
 
-    def make_at_reversal(self, layout: Layout) -> Any:
+    def make_at_reversal(self, layout: Layout):
         """Inline (group, lane, reverses, count, crossing) -> None, called after every step.
 
         `reverses` says whether a reversal was detected in this step; if not, no quantity may change.  `count` is the
         number of reversals so far, including this one, and `crossing` its time.
         """
 
-    def make_note(self, layout: Layout) -> Any:
+    def make_note(self, layout: Layout):
         """Inline (group, number) -> None, called when all lanes have taken the step of this number in their block."""
 
-    def make_may_settle(self, layout: Layout) -> Any:
+    def make_may_settle(self, layout: Layout):
         """Inline (group, lane, spin, at_rest) -> bool: whether what is measured is final if the rattle only decays.
 
         A trajectory settles only if this holds for all measurements.  `at_rest` says that spin and rattle are
         exactly zero.
         """
 
-    def make_look(self, layout: Layout) -> Any:
+    def make_look(self, layout: Layout):
         """Inline (group, lane, running, ended, spin, rattle, J, total) -> None, called at every look.
 
         running : whether the trajectory was running before the look
@@ -179,7 +179,7 @@ class Measurement:
         total : energy above rest, rattle + J spin²/2
         """
 
-    def make_compare(self, layout: Layout) -> Any:
+    def make_compare(self, layout: Layout):
         """Inline (group, lane, shared) -> None, called after every look with the numbers `shared`."""
 
     def skip(self, table: Table, stretch: Stretch) -> None:

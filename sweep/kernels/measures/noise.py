@@ -13,7 +13,6 @@ dopri5: of 35 that were flagged, 33 had a reversal whose time was off by more th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -64,7 +63,7 @@ class NoiseLimited(Measurement):
         rates = growth_coefficients(columns).reshape(len(_RATES), -1)
         return dict(zip((*_LOGS, *_RATES), (*logs, *rates), strict=True)) | {"tracked_spin": columns["n0"]}
 
-    def make_look(self, layout: Layout) -> Any:
+    def make_look(self, layout: Layout):
         """Follows the modes from one look to the next, as `Measurement.make_look`."""
         LOG0, LOG1, DEPTH0, DEPTH1 = map(layout.at, (*_LOGS, *_DEPTHS))
         TRACKED, SPIN, COUNTED, FLAG = map(layout.at, self.quantities[-4:])
@@ -73,7 +72,7 @@ class NoiseLimited(Measurement):
         deep = float(np.log(DEPTH))
 
         @inline
-        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
+        def look(group, lane, running, ended, spin, rattle, J, total):
             # The trajectory ends at this look, with a rattle that is large enough to count.
             last = ended & (2.0 * rattle / J > SEEN * spin * spin)
             closed, done, count = group[CLOSED + lane], group[DONE + lane], group[COUNT + lane]

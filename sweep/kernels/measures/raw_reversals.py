@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
@@ -23,11 +22,11 @@ class RawReversals(Measurement):
         spin, _, _ = model.energy(model.start(columns), model.constants.of(columns))
         return {"earlier_spin": spin}
 
-    def make_step(self, layout: Layout, at_reversal: Any) -> Any:
+    def make_step(self, layout: Layout, at_reversal):
         COUNT, EARLIER = map(layout.at, self.quantities)
 
         @inline
-        def step(group: Any, lane: int, accepted: Any, spin: Any, steady: Any, work: Any, h: Any, now: Any) -> None:
+        def step(group, lane, accepted, spin, steady, work, h, now):
             earlier = group[EARLIER + lane]
             group[COUNT + lane] += 1.0 if accepted & (spin * earlier < 0.0) else 0.0
             group[EARLIER + lane] = spin if accepted else earlier

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -44,11 +43,11 @@ class ReversalTimes(Measurement):
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return dict.fromkeys((*LATEST, *self.times), np.nan)
 
-    def make_at_reversal(self, layout: Layout) -> Any:
+    def make_at_reversal(self, layout: Layout):
         NEWEST, SECOND, THIRD = map(layout.at, LATEST)
 
         @inline
-        def at_reversal(group: Any, lane: int, reverses: Any, count: Any, crossing: Any) -> None:
+        def at_reversal(group, lane, reverses, count, crossing):
             newest, second = group[NEWEST + lane], group[SECOND + lane]
             group[THIRD + lane] = second if reverses else group[THIRD + lane]
             group[SECOND + lane] = newest if reverses else second
@@ -56,12 +55,12 @@ class ReversalTimes(Measurement):
 
         return at_reversal
 
-    def make_look(self, layout: Layout) -> Any:
+    def make_look(self, layout: Layout):
         COUNT, RECORDED, FIRST, NEWEST = map(layout.at, ("reversals", "recorded", self.times[0], LATEST[0]))
         most, kept = self.count, len(LATEST)
 
         @inline
-        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
+        def look(group, lane, running, ended, spin, rattle, J, total):
             count = int(group[COUNT + lane])
             for k in range(int(group[RECORDED + lane]), min(count, most)):
                 age = count - 1 - k

@@ -11,7 +11,6 @@ marked: it depends on where the windows begin.  Both kinds of window consist of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -50,13 +49,13 @@ class Reversals(Measurement):
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"period": model.slower_period(columns), "shifted": 1.0, "last_reversal": np.nan}
 
-    def make_step(self, layout: Layout, at_reversal: Any) -> Any:
+    def make_step(self, layout: Layout, at_reversal):
         PERIOD, PHASE, HALF, EARLIER, SHIFTED, CLOSED, CLOSED_SHIFTED, COUNT, COUNT_SHIFTED, LAST = map(
             layout.at, self.quantities
         )
 
         @inline
-        def step(group: Any, lane: int, accepted: Any, spin: Any, steady: Any, work: Any, h: Any, now: Any) -> None:
+        def step(group, lane, accepted, spin, steady, work, h, now):
             period, shifted = group[PERIOD + lane], group[SHIFTED + lane]
             phase, half, earlier = group[PHASE + lane] + h, group[HALF + lane], group[EARLIER + lane]
             over = phase - 0.5 * period
@@ -83,11 +82,11 @@ class Reversals(Measurement):
 
         return step
 
-    def make_may_settle(self, layout: Layout) -> Any:
+    def make_may_settle(self, layout: Layout):
         CLOSED, CLOSED_SHIFTED = layout.at("closed_window"), layout.at("closed_shifted")
 
         @inline
-        def may_settle(group: Any, lane: int, spin: Any, at_rest: Any) -> Any:
+        def may_settle(group, lane, spin, at_rest):
             # If the signs differ, a reversal is still to come: the average over a window has yet to follow the spin
             # through zero.
             followed = (spin * group[CLOSED + lane] > 0.0) & (spin * group[CLOSED_SHIFTED + lane] > 0.0)

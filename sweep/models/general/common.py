@@ -16,7 +16,7 @@ from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Mode
 
 def record(
     surface: Surface, couples: Sequence[Couple] = (), more: Sequence[str] = (),
-    of_more: Callable[[Columns], tuple[Array, ...]] = lambda columns: (),  # noqa: ARG005
+    of_more: Callable[[Columns], tuple[Array, ...]] = lambda columns: (),
 ) -> type[Any]:  # fmt: skip
     """The constants of a variant: of the surface, the inertia, its inverse and the couples, and `more`."""
     body = (*surface.constants, "g", *rigid_body.INERTIA, *(name.replace("J", "inv_J") for name in rigid_body.INERTIA))
@@ -37,7 +37,7 @@ def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
     return frozenset({COUNT, SPIN, ENERGY} | theory)
 
 
-def of_any_body(base: Model, name: str, surface: Surface, **made: Any) -> Model:
+def of_any_body(base: Model, name: str, surface: Surface, **made) -> Model:
     """The variant of `base` of this name; `made` are the fields that `slip` and `noslip` have of their own."""
     return replace(
         base,

@@ -38,17 +38,17 @@ class Couple:
 
 
 @inline
-def _damping(square: Any, p: Any) -> Any:  # noqa: ARG001
+def _damping(square, p):
     return p.damping
 
 
 @inline
-def _rolling(square: Any, p: Any) -> Any:
+def _rolling(square, p):
     return p.arm / rounded(np.sqrt(square), p.speed_rolling)
 
 
 @inline
-def _spinning(square: Any, p: Any) -> Any:
+def _spinning(square, p):
     return p.arm_spinning / rounded(np.sqrt(square), p.speed_spinning)
 
 
@@ -75,14 +75,14 @@ COUPLES: dict[str, Couple] = {
 }  # fmt: skip
 
 
-def damping_of(couples: Sequence[Couple]) -> Any:
+def damping_of(couples: Sequence[Couple]):
     """Inline, (ω, constants) -> the couple by itself, τ0, and the power that it takes."""
     resistance = _resistance([couple for couple in couples if not couple.needs_normal_force])
     # A product with 0.0 would remain: the compiler has to allow for infinity.  A sum with it does not.
     damps = resistance is not nothing
 
     @inline
-    def damping(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+    def damping(w1, w2, w3, p):
         c1, c2, c3, power = 0.0, 0.0, 0.0, 0.0
         if damps:
             square = w1 * w1 + w2 * w2 + w3 * w3
@@ -93,7 +93,7 @@ def damping_of(couples: Sequence[Couple]) -> Any:
     return damping
 
 
-def friction_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
+def friction_of(couples: Sequence[Couple], law: Law | None = None):
     """Inline, (v², ω, u, constants) -> (k, d, power): the friction -k v and the couple -d, per unit of normal force.
 
     The power is that of the couple.
@@ -106,7 +106,7 @@ def friction_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
     rolls, spins = rolling is not nothing, spinning is not nothing or bool(law and law.coupled)
 
     @inline
-    def friction(square: Any, w1: Any, w2: Any, w3: Any, u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+    def friction(square, w1, w2, w3, u1, u2, u3, p):
         n = u1 * w1 + u2 * w2 + u3 * w3
         k, m = of_slip(square, n * n, p)
         d1, d2, d3, power = 0.0, 0.0, 0.0, 0.0
@@ -122,13 +122,13 @@ def friction_of(couples: Sequence[Couple], law: Law | None = None) -> Any:
     return friction
 
 
-def _resistance(couples: Sequence[Couple]) -> Any:
+def _resistance(couples: Sequence[Couple]):
     return couples[0].resistance if couples else nothing
 
 
-def _without_couple(resistance: Any) -> Any:
+def _without_couple(resistance):
     @inline
-    def of_slip(square: Any, spin_square: Any, p: Any) -> Any:  # noqa: ARG001
+    def of_slip(square, spin_square, p):
         return resistance(square, p), 0.0
 
     return of_slip

@@ -48,7 +48,7 @@ _TINY = 1e-20
 
 
 @inline
-def tanh_ratio(square: Any) -> Any:
+def tanh_ratio(square):
     """tanh(x)/x from x², to 1e-15; x is real or has a tiny imaginary part.
 
     A call of the C library's tanh would keep the loop over lanes from being vectorised.  So tanh(x/32) is taken from
@@ -68,34 +68,34 @@ def tanh_ratio(square: Any) -> Any:
 
 
 @inline
-def rounded(x: Any, width: Any) -> Any:
+def rounded(x, width):
     """x from `width` on; below it a cubic, x²/s (1 - x/(3 s)) + s/3, that keeps away from zero."""
     t = np.minimum(x / width, 1.0)
     return np.maximum(x, width) + width * (t * t * (1.0 - t / 3.0) - 2.0 / 3.0)
 
 
 @inline
-def _viscous(square: Any, p: Any) -> Any:  # noqa: ARG001
+def _viscous(square, p):
     return p.mu
 
 
 @inline
-def _sqrt(square: Any, p: Any) -> Any:
+def _sqrt(square, p):
     return p.mu / np.sqrt(square + p.speed * p.speed)
 
 
 @inline
-def _tanh(square: Any, p: Any) -> Any:
+def _tanh(square, p):
     return p.mu / p.speed * tanh_ratio(square / (p.speed * p.speed))
 
 
 @inline
-def _cubic(square: Any, p: Any) -> Any:
+def _cubic(square, p):
     return p.mu / rounded(np.sqrt(square), p.speed)
 
 
 @inline
-def _stribeck(square: Any, p: Any) -> Any:
+def _stribeck(square, p):
     """From the static to the kinetic coefficient by the quintic 10 t³ - 15 t⁴ + 6 t⁵ of t = v / speed."""
     t = np.minimum(np.sqrt(square) / p.speed, 1.0)
     fallen = t * t * t * (10.0 - t * (15.0 - 6.0 * t))
@@ -108,7 +108,7 @@ _C = 3 * np.pi / 8
 
 
 @inline
-def over_circle(slip: Any, turn: Any) -> Any:
+def over_circle(slip, turn):
     """Force and couple of dry friction over a circle under the pressure of Hertz, as shares of μ N and of μ N ε.
 
     Where the circle, of radius ε, slips by v and turns by ε n at its rim, each of its points slips by itself.  The
@@ -139,7 +139,7 @@ def over_circle(slip: Any, turn: Any) -> Any:
 
 
 @inline
-def _contensou(square: Any, spin_square: Any, p: Any) -> Any:
+def _contensou(square, spin_square, p):
     """Dry friction over a circle of radius ε, with sqrt(v² + s²) in place of v."""
     slip, turn = np.sqrt(square + p.speed * p.speed), p.radius_contact * np.sqrt(spin_square + _TINY)
     force, couple = over_circle(slip, turn)

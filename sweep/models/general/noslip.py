@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 from sweep.jit import inline
 from sweep.models import attitude
@@ -34,7 +33,7 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
     drags = any(couple.needs_normal_force for couple in couples)
 
     @inline
-    def rhs(y: Any, p: Any) -> Any:
+    def rhs(y, p):
         u1, u2, w1, w2, w3 = y
         (u3, _), (x, y_, z), (du1, du2, _), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
         # s = v_0 - x_p', and h = g u + ω × s
@@ -59,7 +58,7 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         return (du1, du2, a1, a2, a3), (spin, power, R, denominator)
 
     @inline
-    def energy(y: Any, p: Any) -> Any:
+    def energy(y, p):
         u1, u2, w1, w2, w3 = y
         return slipping_energy((u1, u2, w1, w2, w3, 0.0, 0.0), p)
 

@@ -8,7 +8,6 @@ in any units: gravity g is one of the constants.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -102,7 +101,7 @@ def slower_period(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
 
 
 @inline
-def momentum(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+def momentum(w1, w2, w3, p):
     """J ω."""
     L1 = p.J11 * w1 + p.J12 * w2 + p.J13 * w3
     L2 = p.J12 * w1 + p.J22 * w2 + p.J23 * w3
@@ -110,14 +109,14 @@ def momentum(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
 
 
 @inline
-def gyroscopic(w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+def gyroscopic(w1, w2, w3, p):
     """-ω × J ω."""
     L1, L2, L3 = momentum(w1, w2, w3, p)
     return w3 * L2 - w2 * L3, w1 * L3 - w3 * L1, w2 * L1 - w1 * L2
 
 
 @inline
-def about_centre(t1: Any, t2: Any, t3: Any, p: Any) -> Any:
+def about_centre(t1, t2, t3, p):
     """J⁻¹ t: ω' by a torque about the centre of mass."""
     a1 = p.inv_J11 * t1 + p.inv_J12 * t2 + p.inv_J13 * t3
     a2 = p.inv_J12 * t1 + p.inv_J22 * t2 + p.inv_J23 * t3
@@ -125,7 +124,7 @@ def about_centre(t1: Any, t2: Any, t3: Any, p: Any) -> Any:
 
 
 @inline
-def about_contact(t1: Any, t2: Any, t3: Any, x: Any, y: Any, z: Any, p: Any) -> Any:
+def about_contact(t1, t2, t3, x, y, z, p):
     """J_P⁻¹ t with J_P = J + |x_p|² - x_p x_pᵀ, by the adjugate: ω' by a torque about a contact point at rest."""
     P11, P22, P33 = p.J11 + y * y + z * z, p.J22 + z * z + x * x, p.J33 + x * x + y * y
     P12, P13, P23 = p.J12 - x * y, p.J13 - x * z, p.J23 - y * z
@@ -138,7 +137,7 @@ def about_contact(t1: Any, t2: Any, t3: Any, x: Any, y: Any, z: Any, p: Any) -> 
 
 
 @cache
-def energy_on(surface: Surface) -> Any:
+def energy_on(surface: Surface):
     """Inline (states of `slip`, constants) -> (spin n, energy of the rattle, J33), per unit mass.
 
     As `sweep.models.ellipsoid.energy`; but if J13 or J23 does not vanish, one term is n² times a small quantity.
@@ -146,7 +145,7 @@ def energy_on(surface: Surface) -> Any:
     contact, elevation = surface.contact, surface.elevation
 
     @inline
-    def energy(y: Any, p: Any) -> Any:
+    def energy(y, p):
         u1, u2, w1, w2, w3, v1, v2 = y
         (u3, _), x_p, _, _ = contact(u1, u2, w1, w2, w3, p)
         height = p.g * elevation(u1, u2, u3, p)

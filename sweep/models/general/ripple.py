@@ -16,8 +16,6 @@ If the third axis of the ellipsoid is no axis of inertia, the spin ripples in fi
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from sweep.jit import inline
@@ -50,7 +48,7 @@ def _form(columns: Columns, surface: Surface) -> tuple[Array, ...]:
 
 
 @inline
-def slipping(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
+def slipping(y, p, k):
     """n - n*, with M to first order in the rattle."""
     u1, u2, w1, w2, w3, v1, v2 = y
     M1 = k[4] * w1 + k[5] * w2 + k[7] * v2 + k[8] * w3 * u1
@@ -59,7 +57,7 @@ def slipping(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
 
 
 @inline
-def rolling(y: Any, p: Any, k: Any) -> Any:
+def rolling(y, p, k):
     """As `slipping`, without slip."""
     u1, u2, w1, w2, w3 = y
     return slipping((u1, u2, w1, w2, w3, 0.0, 0.0), p, k)

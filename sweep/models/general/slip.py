@@ -19,7 +19,6 @@ The contact point stays in the plane, v_p · u = 0.  With u' = u × ω the deriv
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -42,7 +41,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
     contact, friction, damping = surface.contact, friction_of(couples, law), damping_of(couples)
 
     @inline
-    def rhs(y: Any, p: Any) -> Any:
+    def rhs(y, p):
         u1, u2, w1, w2, w3, v1, v2 = y
         (u3, inv_u3), (x, y_, z), du, dx = contact(u1, u2, w1, w2, w3, p)
         v3 = -(v1 * u1 + v2 * u2) * inv_u3
@@ -56,7 +55,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
         slopes, spin, R, denominator = slip.motion(y, u3, v3, (x, y_, z), du, dx, (g1, g2), alpha, beta, p.g)
         return slopes, (spin, R * (k * square + turning) + lost, R, denominator)
 
-    def observe(y: Array, p: Any) -> dict[str, Array]:
+    def observe(y, p):
         return {**noslip.seen(contact, rhs, y, p), "slip_1": y[5], "slip_2": y[6]}
 
     def fastest_decay(columns: Columns) -> Array:
@@ -88,7 +87,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
     )  # fmt: skip
 
 
-def _with_and_without(law: Law) -> Any:
+def _with_and_without(law: Law):
     """As a law that saturates leaves the body free when it slips fast, motions without friction matter as well."""
 
     def extremes(columns: Columns) -> tuple[Columns, ...]:

@@ -50,7 +50,7 @@ def body(measured: Numbers, *, whole: bool) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def mass_of(measured: Numbers, volume: Any) -> Any:
+def mass_of(measured: Numbers, volume):
     """Return the mass that was measured, or that of the density."""
     return measured["mass"] if "mass" in measured else measured["density"] * volume
 

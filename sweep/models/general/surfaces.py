@@ -55,7 +55,7 @@ class Surface:
     """(columns) -> whether it lies elsewhere, shape (cells,)."""
     bounds: str
     """For which offsets upright rest is stable, in words."""
-    off: Callable[[Columns, Array, Array], Array] = lambda columns, x, y: np.zeros(np.shape(x), bool)  # noqa: ARG005
+    off: Callable[[Columns, Array, Array], Array] = lambda columns, x, y: np.zeros(np.shape(x), bool)
     """(columns, x, y) -> whether no point of it lies at x and y, shape (cells,); by default some does anywhere."""
     outline: str = ""
     """What holds of x and y within it, in words."""
@@ -78,7 +78,7 @@ def _ellipsoid_excess(columns: Columns) -> tuple[Array, Array]:
 
 
 @inline
-def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+def contact(u1, u2, w1, w2, w3, p):
     """As `Surface.contact`, of the ellipsoid."""
     a2, b2, c2 = p.a2, p.b2, p.c2
     u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
@@ -96,7 +96,7 @@ def contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
 
 
 @inline
-def _ellipsoid_elevation(u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+def _ellipsoid_elevation(u1, u2, u3, p):
     r = np.sqrt(p.a2 * u1 * u1 + p.b2 * u2 * u2 + p.c2 * u3 * u3)
     # r - c = (r² - c²) / (r + c) and 1 + u3 = (u1² + u2²) / (1 - u3)
     c = np.sqrt(p.c2)
@@ -123,7 +123,7 @@ def _paraboloid_excess(columns: Columns) -> tuple[Array, Array]:
 
 
 @inline
-def _paraboloid_contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> Any:
+def _paraboloid_contact(u1, u2, w1, w2, w3, p):
     u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
     inv_u3 = 1.0 / u3
     t1, t2 = u1 * inv_u3, u2 * inv_u3
@@ -135,7 +135,7 @@ def _paraboloid_contact(u1: Any, u2: Any, w1: Any, w2: Any, w3: Any, p: Any) -> 
 
 
 @inline
-def _paraboloid_elevation(u1: Any, u2: Any, u3: Any, p: Any) -> Any:
+def _paraboloid_elevation(u1, u2, u3, p):
     x, y = p.radius1 * u1 / u3, p.radius2 * u2 / u3
     # 1 + u3 = (u1² + u2²) / (1 - u3)
     return -0.5 * (x * u1 + y * u2) - p.h * (u1 * u1 + u2 * u2) / (1.0 - u3)

@@ -13,7 +13,6 @@ N² + A² + B², with N = sqrt(I3) n, and A^γ B, with γ = k4/k1, are conserved
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any
 
 import numpy as np
 
@@ -40,7 +39,7 @@ def start(columns: Columns) -> tuple[Array, ...]:
 
 
 @inline
-def rhs(y: Any, p: Any) -> Any:
+def rhs(y, p):
     A, B, n = y
     half_a1, half_a4 = p.half_m1 - n * p.half_k1, p.half_m4 + n * p.half_k4
     A2, B2 = A * A, B * B
@@ -49,7 +48,7 @@ def rhs(y: Any, p: Any) -> Any:
 
 
 @inline
-def energy(y: Any, p: Any) -> Any:
+def energy(y, p):
     A, B, n = y
     return n, 0.5 * (A * A + B * B), p.I3
 
@@ -68,5 +67,5 @@ MODEL = Model(
     upright=lambda spin: (0.0, 0.0, spin),
     rhs=rhs,
     energy=energy,
-    observe=lambda y, p: {"amplitude_1": y[0], "amplitude_2": y[1]},  # noqa: ARG005
+    observe=lambda y, p: {"amplitude_1": y[0], "amplitude_2": y[1]},
 )

@@ -10,8 +10,6 @@ above them lacks its friction terms: it has to be N = [[1/(J2 μ), -n], [n, 1/(J
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from sweep.jit import inline
@@ -49,7 +47,7 @@ def start(columns: Columns) -> tuple[Array, ...]:
 
 
 @inline
-def rhs(y: Any, p: Any) -> Any:
+def rhs(y, p):
     X, Y, dX, dY, n = y
     k1, k2, k3, k4, nu1, nu2, root, slip = p.k1, p.k2, p.k3, p.k4, p.nu1_squared, p.nu2_squared, p.root_J, p.slip
     ddX = -p.rate1_squared * X - (p.m1 - n * k1) * dX + (p.m2 + n * k2) * dY
@@ -64,7 +62,7 @@ def rhs(y: Any, p: Any) -> Any:
 
 
 @inline
-def energy(y: Any, p: Any) -> Any:
+def energy(y, p):
     X, Y, dX, dY, n = y
     rocking = dX * dX + dY * dY + p.rate1_squared * X * X + p.rate2_squared * Y * Y
     return n, 0.5 * rocking / p.gravity, p.I3
@@ -99,5 +97,5 @@ MODEL = Model(
     rhs=rhs,
     energy=energy,
     ripple=Ripple(FORM, ripple_coefficients, ripple_of_states),
-    observe=lambda y, p: {"mode_1": y[0], "mode_2": y[1]},  # noqa: ARG005
+    observe=lambda y, p: {"mode_1": y[0], "mode_2": y[1]},
 )

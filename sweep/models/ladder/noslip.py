@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections import namedtuple
 from functools import partial
-from typing import Any
 
 from sweep.jit import inline
 from sweep.models import attitude, ellipsoid
@@ -31,7 +30,7 @@ class Constants(namedtuple("Constants", "A11 A12 A22 A33 inv_I1 inv_I2 inv_I3"))
 
 
 @inline
-def rhs(y: Any, p: Any) -> Any:
+def rhs(y, p):
     u1, u2, w1, w2, w3 = y
     (u3, _), (x, y_, z), (du1, du2, _), (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
     I1, I2, I3 = 1.0 / p.inv_I1, 1.0 / p.inv_I2, 1.0 / p.inv_I3
@@ -58,7 +57,7 @@ def rhs(y: Any, p: Any) -> Any:
 
 
 @inline
-def energy(y: Any, p: Any) -> Any:
+def energy(y, p):
     u1, u2, w1, w2, w3 = y
     return ellipsoid.energy((u1, u2, w1, w2, w3, 0.0, 0.0), p)
 
@@ -70,14 +69,14 @@ def ripple_coefficients(columns: Columns) -> tuple[Array, ...]:
 
 
 @inline
-def _ripple(y: Any, p: Any, k: Any) -> Any:
+def _ripple(y, p, k):
     """K with M to first order in the rattle, which is all that K is good for."""
     u1, u2, w1, w2, w3 = y
     M1, M2 = k[4] * w1 + w3 * (p.A11 * u1 + p.A12 * u2), k[5] * w2 + w3 * (p.A12 * u1 + p.A22 * u2)
     return ripple(u1, u2, M1, M2, k)
 
 
-def seen(contact: Any, rhs: Any, y: Array, p: Any) -> dict[str, Array]:
+def seen(contact, rhs, y: Array, p) -> dict[str, Array]:
     """Compute what a trajectory of any body shows beside spin and energy: contact point and normal force."""
     _, point, _, _ = contact(*y[:5], p)
     _, (_, _, R, _) = rhs(y, p)

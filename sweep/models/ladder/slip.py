@@ -15,7 +15,6 @@ q = u × x_p is computed only once: (x_p × α) · u = q · α.
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any
 
 import numpy as np
 
@@ -51,7 +50,7 @@ def start(columns: Columns) -> tuple[Array, ...]:
 
 
 @inline
-def rhs(y: Any, p: Any) -> Any:
+def rhs(y, p):
     u1, u2, w1, w2, w3, v1, v2 = y
     (u3, inv_u3), (x, y_, z), du, dx = contact(u1, u2, w1, w2, w3, p)
     v3 = -(v1 * u1 + v2 * u2) * inv_u3
@@ -65,13 +64,13 @@ def rhs(y: Any, p: Any) -> Any:
 
 
 @inline
-def dissipation(R: Any, v1: Any, v2: Any, v3: Any, p: Any) -> Any:
+def dissipation(R, v1, v2, v3, p):
     """Power that friction dissipates, -R f · v_p >= 0."""
     return p.mu * R * (v1 * v1 + v2 * v2 + v3 * v3)
 
 
 @inline
-def motion(y: Any, u3: Any, v3: Any, x_p: Any, du: Any, dx: Any, g: Any, alpha: Any, beta: Any, gravity: Any) -> Any:
+def motion(y, u3, v3, x_p, du, dx, g, alpha, beta, gravity):
     """The derivatives of the states, n, R, and the Painlevé denominator, of a body with any inertia on any surface.
 
     Parameters
@@ -104,7 +103,7 @@ def ripple_coefficients(columns: Columns) -> tuple[Array, ...]:
 
 
 @inline
-def _ripple(y: Any, p: Any, k: Any) -> Any:
+def _ripple(y, p, k):
     """K with M to first order in the rattle, which is all that K is good for."""
     u1, u2, w1, w2, w3, v1, v2 = y
     M1 = k[4] * w1 + k[6] * v2 + w3 * (p.A11 * u1 + p.A12 * u2)

@@ -11,7 +11,7 @@ neglects is of the order of `bending` times n² + Σ e_k, and grows where the tw
 from __future__ import annotations
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -91,7 +91,7 @@ def _fits(constants: Constants, reach: Array) -> tuple[Array, Array, Array]:
 
 
 @called
-def _at(coefficients: Any, n: float) -> tuple[float, float]:
+def _at(coefficients, n):
     """The polynomials of both modes at a spin."""
     first, second = 0.0, 0.0
     for k in range(len(coefficients) - 1, -1, -1):
@@ -100,14 +100,14 @@ def _at(coefficients: Any, n: float) -> tuple[float, float]:
 
 
 @called
-def _change(e: float, r: float, s: float, step: float) -> Any:
+def _change(e, r, s, step):
     """How much a mode lowers the spin in a step in which it grows at a constant rate."""
     growth = 2.0 * r * step
     return s * e * (step if growth == 0.0 else np.expm1(growth) / (2.0 * r))
 
 
 @called
-def _step(r: tuple[float, float], s: tuple[float, float], e: tuple[float, float]) -> float:
+def _step(r, s, e):
     """Length of the next step."""
     turn0, turn1 = abs(s[0]) * e[0], abs(s[1]) * e[1]
     turn, least = turn0 + turn1, _FAINT * (turn0 + turn1)

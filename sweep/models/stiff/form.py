@@ -57,7 +57,7 @@ class StiffForm:
 
 
 @inline
-def slopes(u: Any, M: Any, v: Any, t: Any, x_p: Any, w: Any, du: Any, dx: Any, gravity: Any) -> Any:
+def slopes(u, M, v, t, x_p, w, du, dx, gravity):
     """`StiffForm.slow` from what a model computes on its way, without the torque of couples.
 
     Parameters
@@ -79,8 +79,8 @@ def slopes(u: Any, M: Any, v: Any, t: Any, x_p: Any, w: Any, du: Any, dx: Any, g
 
 @inline
 def newton_step(
-    u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, alpha: Any, T: Any, k: Any, g: Any, gamma: Any, b1: Any, b2: Any
-) -> Any:  # fmt: skip
+    u1, u2, v1, v2, geometry, alpha, T, k, g, gamma, b1, b2
+):  # fmt: skip
     """`StiffForm.newton` for ω' = α without contact force, T = 1 - [x_p] J⁻¹ [x_p], a resistance k, and gravity g.
 
     The Jacobian is that of R G, with dR/dv included.  The gyroscopic terms of v_p' are left out of it, because they
@@ -111,25 +111,25 @@ def newton_step(
     return v1 + d * (m22 * r1 - m12 * r2), v2 + d * (m11 * r2 - m21 * r1), num, den
 
 
-def subset(constants: type[Any], p: Any) -> Any:
+def subset(constants: type[Any], p):
     """Those of the constants `p` that another model has, as its record."""
     return constants(*(getattr(p, name) for name in constants._fields))
 
 
-def in_momentum(full: Model, constants: type[Any], momentum: Any, slow: Any, ripple: Ripple) -> Model:
+def in_momentum(full: Model, constants: type[Any], momentum, slow, ripple: Ripple) -> Model:
     """The model `full` in the variables `STATES`; the other arguments are as of `StiffForm` and `Model`."""
 
     def start(columns: Columns) -> tuple[Array, ...]:
         states: tuple[Array, ...] = momentum(full.start(columns), constants.of(columns))
         return states
 
-    def observe(y: Array, p: Any) -> dict[str, Array]:
+    def observe(y, p):
         return full.observe(velocities(slow, y, p), subset(full.constants, p))
 
     full_energy = full.energy
 
     @inline
-    def energy(y: Any, p: Any) -> Any:
+    def energy(y, p):
         u1, u2, M1, M2, M3, v1, v2 = y
         _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
         return full_energy((u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2), p)
@@ -139,7 +139,7 @@ def in_momentum(full: Model, constants: type[Any], momentum: Any, slow: Any, rip
     )  # fmt: skip
 
 
-def velocities(slow: Any, y: Array, p: Any) -> Array:
+def velocities(slow, y: Array, p) -> Array:
     """The states of the full model, shape (7, cells), from the `STATES` y: the inverse of `StiffForm.momentum`."""
     _, geometry = slow(*y, p)
     return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))

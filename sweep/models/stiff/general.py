@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -67,7 +66,7 @@ def _form_of(full: Model, couples: tuple[Couple, ...], surface: Surface) -> Stif
             return cls(*full.constants.of(columns), *(getattr(rocking, name) for name in ROCKING))
 
     @inline
-    def momentum(y: Any, p: Any) -> Any:
+    def momentum(y, p):
         u1, u2, w1, w2, w3, v1, v2 = y
         (_, inv_u3), (x, y_, z), _, _ = contact(u1, u2, 0.0, 0.0, 0.0, p)
         v3 = -(v1 * u1 + v2 * u2) * inv_u3
@@ -76,7 +75,7 @@ def _form_of(full: Model, couples: tuple[Couple, ...], surface: Surface) -> Stif
         return u1, u2, L1 - (y_ * g3 - z * g2), L2 - (z * g1 - x * g3), L3 - (x * g2 - y_ * g1), v1, v2
 
     @inline
-    def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) -> Any:
+    def slow(u1, u2, M1, M2, M3, v1, v2, p):
         # What is computed twice the compiler computes once.
         (u3, inv_u3), (x, y, z), _, _ = contact(u1, u2, 0.0, 0.0, 0.0, p)
         t1, t2 = u1 * inv_u3, u2 * inv_u3
@@ -91,7 +90,7 @@ def _form_of(full: Model, couples: tuple[Couple, ...], surface: Surface) -> Stif
         return (du1, du2, dM1 + c1, dM2 + c2, dM3 + c3), geometry
 
     @inline
-    def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
+    def newton(u1, u2, v1, v2, geometry, p, gamma, b1, b2):
         w1, w2, w3 = geometry.w1, geometry.w2, geometry.w3
         (m1, m2, m3), ((c1, c2, c3), _) = gyroscopic(w1, w2, w3, p), damping(w1, w2, w3, p)
         alpha = about_centre(m1 + c1, m2 + c2, m3 + c3, p)
@@ -99,7 +98,7 @@ def _form_of(full: Model, couples: tuple[Couple, ...], surface: Surface) -> Stif
         return newton_step(u1, u2, v1, v2, geometry, alpha, T, p.mu, p.g, gamma, b1, b2)
 
     @inline
-    def with_couples(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
+    def with_couples(R, v1, v2, geometry, p):
         _, lost = damping(geometry.w1, geometry.w2, geometry.w3, p)
         return power(R, v1, v2, geometry, p) + lost
 
@@ -120,7 +119,7 @@ def _form_of(full: Model, couples: tuple[Couple, ...], surface: Surface) -> Stif
 
 
 @inline
-def _compliance(x: Any, y: Any, z: Any, p: Any) -> Any:
+def _compliance(x, y, z, p):
     """T11, T12, T13, T22, T23, T33 of T = 1 - [x_p] J⁻¹ [x_p]: how a force accelerates the contact point."""
     i11, i22, i33, i12, i13, i23 = p.inv_J11, p.inv_J22, p.inv_J33, p.inv_J12, p.inv_J13, p.inv_J23
     # N = J⁻¹ [x_p], with [x_p] = ((0, -z, y), (z, 0, -x), (-y, x, 0))
@@ -134,12 +133,12 @@ def _compliance(x: Any, y: Any, z: Any, p: Any) -> Any:
 
 
 @inline
-def _rocking(p: Any) -> Any:
+def _rocking(p):
     return Rocking(p.B11, p.B12, p.B21, p.B22, 0.0, p.C12, p.C21, 0.0)
 
 
 @inline
-def _ripple(y: Any, p: Any, k: Any) -> Any:
+def _ripple(y, p, k):
     """As `sweep.models.general.ripple.slipping`, with ω1 and ω2 from M to first order in the rattle."""
     u1, u2, M1, M2, M3, v1, v2 = y
     w3 = M3 / p.J33

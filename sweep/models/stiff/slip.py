@@ -19,8 +19,6 @@ without a root or a quotient, so that a single division yields 1/r, 1/u3 and I_P
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from sweep.jit import inline
@@ -41,7 +39,7 @@ class Constants(named("I1", "I2", "I3", *slip.Constants._fields)):  # type: igno
 
 
 @inline
-def momentum(y: Any, p: Any) -> Any:
+def momentum(y, p):
     """The states (u1, u2, M1, M2, M3, v1, v2) from those of the slip model; `p` are `Constants`."""
     u1, u2, w1, w2, w3, v1, v2 = y
     u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
@@ -55,7 +53,7 @@ def momentum(y: Any, p: Any) -> Any:
 
 
 @inline
-def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) -> Any:
+def slow(u1, u2, M1, M2, M3, v1, v2, p):
     """The slow derivatives (u1', u2', M1', M2', M3'), and the `Geometry` that `newton` needs."""
     A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
     c3 = 1.0 - (u1 * u1 + u2 * u2)
@@ -92,7 +90,7 @@ def slow(u1: Any, u2: Any, M1: Any, M2: Any, M3: Any, v1: Any, v2: Any, p: Any) 
 
 
 @inline
-def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any, b1: Any, b2: Any) -> Any:
+def newton(u1, u2, v1, v2, geometry, p, gamma, b1, b2):
     x, y, z, w1, w2, w3 = geometry.x, geometry.y, geometry.z, geometry.w1, geometry.w2, geometry.w3
     i1, i2, i3 = p.inv_I1, p.inv_I2, p.inv_I3
     alpha = p.ratio1 * w2 * w3, p.ratio2 * w3 * w1, p.ratio3 * w1 * w2
@@ -103,7 +101,7 @@ def newton(u1: Any, u2: Any, v1: Any, v2: Any, geometry: Any, p: Any, gamma: Any
 
 
 @inline
-def power(R: Any, v1: Any, v2: Any, geometry: Any, p: Any) -> Any:
+def power(R, v1, v2, geometry, p):
     """Power of friction at a point with slip (v1, v2) and normal force R."""
     v3 = -(v1 * geometry.t1 + v2 * geometry.t2)
     return slip.dissipation(R, v1, v2, v3, p)

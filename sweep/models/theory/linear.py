@@ -6,14 +6,13 @@ At constant n it obeys a linear system.  At which spins it grows is in `sweep.mo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
 from sweep.models.model import Array, Columns, Model, stack
 
 
-def jacobian(model: Model, constants: Any, spin: Array) -> Array:
+def jacobian(model: Model, constants, spin: Array) -> Array:
     """Jacobian of the rattle at upright spin, shape (cells, m, m), where m is the number of states without the spin."""
     rattle = [i for i in range(len(model.states)) if i != model.spin_state]
     return derivative(lambda y: model.rhs(y, constants)[0], stack(model.upright(spin)), rattle)
@@ -33,12 +32,12 @@ def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, wh
     return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
 
 
-def growth_rate(model: Model, constants: Any, spin: Array) -> Array:
+def growth_rate(model: Model, constants, spin: Array) -> Array:
     """Largest real part of the rattle's eigenvalues, in sqrt(g/c), shape (cells,): positive where the rattle grows."""
     return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)).real.max(axis=-1))
 
 
-def rocking_rates(model: Model, constants: Any, spin: Array) -> Array:
+def rocking_rates(model: Model, constants, spin: Array) -> Array:
     """Re λ of the two modes of highest frequency, the slower first, in sqrt(g/c), shape (2, cells).
 
     In a model with slip these are the two rocking modes.

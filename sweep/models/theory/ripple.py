@@ -27,7 +27,6 @@ order.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -82,18 +81,18 @@ def ripple_free(of: Rocking, H: Array, P: Array, I3: Array) -> tuple[Array, ...]
     return K[:, 0, 0], K[:, 0, 1], K[:, 1, 0], K[:, 1, 1]
 
 
-def matrix(first: Any, second: Any, third: Any, fourth: Any) -> Array:
+def matrix(first, second, third, fourth) -> Array:
     """Matrices, shape (bodies, 2, 2), of their elements row by row."""
     return np.moveaxis(stack((first, second, third, fourth)), 0, -1).reshape(-1, 2, 2)
 
 
 @inline
-def ripple(u1: Any, u2: Any, M1: Any, M2: Any, k: Any) -> Any:
+def ripple(u1, u2, M1, M2, k):
     """Σ K_ij u_i M_j; `k` begins with the coefficients of `FORM`."""
     return (k[0] * u1 + k[2] * u2) * M1 + (k[1] * u1 + k[3] * u2) * M2
 
 
 @inline
-def ripple_of_states(y: Any, p: Any, k: Any) -> Any:  # noqa: ARG001
+def ripple_of_states(y, p, k):
     """`ripple` of a model whose first states are two coordinates and their momenta, or rates of unit mass."""
     return ripple(y[0], y[1], y[2], y[3], k)

@@ -12,7 +12,6 @@ which is 3.87.
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +32,7 @@ class Body(namedtuple("Body", "I1 I2 I3 A11 A12 A22 A33")):
 
 
 @inline
-def rocking(p: Any) -> Any:
+def rocking(p):
     """The rocking of the paper's body; `p` holds I1, I2 and A11 … A33."""
     A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
     inv_c = 1.0 / np.sqrt(A33)
@@ -66,7 +65,7 @@ def slower_period(columns: Columns) -> Array:
 
 
 @inline
-def implicit(weight: Any, of: Any) -> Any:
+def implicit(weight, of):
     """(1 - weight J)⁻¹ row by row, sixteen numbers, where J is the matrix of the rocking `of` in (u1, u2, M1, M2)."""
     B11, B12, B21, B22, C11, C12, C21, C22 = of
     b11, b12, b21, b22 = weight * B11, weight * B12, weight * B21, weight * B22

@@ -17,7 +17,6 @@ a = 1.5 … 50, |δ| <= 0.5, μ = 0.1 … 5000) and took three times as long.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -77,14 +76,14 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     return ranges
 
 
-def _is_steady(model: Model, constants: Any, spin: Array) -> Array:
+def _is_steady(model: Model, constants, spin: Array) -> Array:
     """Tell whether no rattle arises from upright `spin` by itself, shape (cells,)."""
     slopes, _ = model.rhs(tuple(stack(model.upright(spin))), constants)
     arising = np.abs(np.delete(stack(slopes), model.spin_state, axis=0)).max(axis=0)
     return np.asarray(arising <= 1e-12 * spin**2)
 
 
-def _polynomial(model: Model, constants: Any) -> tuple[Array, Array, Array]:
+def _polynomial(model: Model, constants) -> tuple[Array, Array, Array]:
     """J0, J1, J2 of J(n) = J0 + n J1 + n² J2, each of shape (cells, m, m)."""
     one = np.ones_like(constants[0])
     at_rest, plus, minus = (jacobian(model, constants, spin * one) for spin in (0, 1, -1))
@@ -118,7 +117,7 @@ def _compound(J: Array) -> Array:
     return np.asarray(J[:, p, i] * (q == j) - J[:, q, i] * (p == j) + J[:, q, j] * (p == i) - J[:, p, j] * (q == i))
 
 
-def _ends(model: Model, constants: Any, changes: Array, sign: int, limits: Array) -> tuple[Array, Array, Array]:
+def _ends(model: Model, constants, changes: Array, sign: int, limits: Array) -> tuple[Array, Array, Array]:
     """|spin| at the end of the range about zero, and at both ends of the next one, on the side of `sign`."""
     changes = np.sort(np.where((changes > 0) & (changes <= limits[:, None]), changes, np.inf), axis=-1)
     changes = np.append(changes, np.full((len(changes), 1), np.inf), axis=-1)

@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import cache
 from importlib import metadata
 from types import ModuleType
-from typing import Any
 
 from sweep.faults import fault_of
 from sweep.models.general import variants
@@ -56,7 +55,7 @@ def load(origin: Origin) -> Model | SlipWith:
     return replace(made, origin=origin, states=states, parameters=parameters)
 
 
-def _file(origin: Origin) -> Any:
+def _file(origin: Origin):
     module = ModuleType(f"sweep_model_{origin.digest[:16]}")
     module.__file__ = origin.place
     sys.modules[module.__name__] = module
@@ -74,7 +73,7 @@ def _file(origin: Origin) -> Any:
     return getattr(module, "MODEL", None)
 
 
-def _imported(origin: Origin) -> Any:
+def _imported(origin: Origin):
     try:
         return next(iter(metadata.entry_points(group=GROUP, name=origin.name))).load()
     except (ImportError, AttributeError) as error:

@@ -27,7 +27,7 @@ Faults = Iterator[tuple[Any, str]]
 """The function at fault, or None, and what is wrong and what to do."""
 
 
-def check(made: Any, origin: Origin) -> None:
+def check(made, origin: Origin) -> None:
     """Raise a `ConfigError` for the first fault of what a file or an entry point defines as its MODEL."""
     _refuse(_declared(made), origin)
 
@@ -58,7 +58,7 @@ def _refuse(faults: Faults, origin: Origin) -> None:
         raise fault_of(message, file=origin.place, line=line)
 
 
-def _declared(made: Any) -> Faults:
+def _declared(made) -> Faults:
     from sweep.models import TIERS
 
     if isinstance(made, SlipWith) and isinstance(made.law, Law):
@@ -105,12 +105,12 @@ def _names(name: str, taken: Collection[str], own: tuple[Parameter, ...], used: 
 def _values(model: Model, columns: Columns) -> Faults:
     cells = np.shape(next(iter(columns.values())))
 
-    def tuples(function: Any, name: str, value: Any, length: int) -> Faults:
+    def tuples(function, name, value, length):
         if not isinstance(value, tuple) or len(value) != length:
             given = f"{len(value)} values" if isinstance(value, tuple) else type(value).__name__
             yield function, f"{name} gives {given}; it has to give a tuple of {length}"
 
-    def one_a_cell(function: Any, name: str, value: Any) -> Faults:
+    def one_a_cell(function, name, value):
         if np.shape(value) != cells:
             yield function, f"{name} has the shape {np.shape(value)}; it has to be {cells}, as the columns are"
 
