@@ -18,7 +18,7 @@ from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, call_all, make_load
 from sweep.kernels.lanes import STABLE, make_advance, make_look
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
 _BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", "failed_at", *STABLE)
@@ -89,12 +89,13 @@ class Kernel:
         """
         at_reversal = call_all("at_reversal", "group, lane, reverses, count, crossing", self._hooks("make_at_reversal"))
         steps = self._hooks("make_step", at_reversal)
-        measure = call_all("measure", "group, lane, accepted, spin, steady, work, h, now", steps)
+        measure = call_all("measure", "group, lane, taken", steps)
         load, ripple = make_load(self.ripple, self.layout), self._ripple.value
 
         @inline
         def watch(group, lane, accepted, y, p, spin, work, h, now):
-            measure(group, lane, accepted, spin, spin - ripple(y, p, load(group, lane)), work, h, now)
+            steady = spin - ripple(y, p, load(group, lane))
+            measure(group, lane, Step(accepted, spin, steady, work, h, now))
 
         return watch
 
@@ -106,7 +107,7 @@ class Kernel:
         """Set up `advance` around `run_block`, compiled (group) -> None."""
         may_settle = all_true("may_settle", "group, lane, spin, at_rest", self._hooks("make_may_settle"))
         looks = self._hooks("make_look")
-        measure = call_all("measure", "group, lane, running, ended, spin, rattle, J, total", looks)
+        measure = call_all("measure", "group, lane, seen", looks)
         look = make_look(self.model, self.constants, self.layout, may_settle, measure, self.energy_gain)
         compare = call_all("compare", "group, lane, shared", self._hooks("make_compare"))
         advance = make_advance(run_block, look, compare, self.layout)

@@ -14,6 +14,7 @@ import numpy as np
 from sweep.jit import exactly_compiled, full_width, inline
 from sweep.kernels.codegen import make_load, make_rest, make_store
 from sweep.kernels.layout import LANES, Layout
+from sweep.kernels.measures.measurement import Look
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.model import ENERGY, Model, never_decided
 
@@ -103,7 +104,7 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, may_settle
     Parameters
     ----------
     may_settle : inline (group, lane, spin, at_rest) -> whether all measurements allow the trajectory to settle
-    measure : inline, what the measurements do at a look, with the arguments of `Measurement.make_look`
+    measure : inline (group, lane, seen), what the measurements do at a look (see `Measurement.make_look`)
     energy_gain : share by which the energy of a body may apparently grow from one look to the next
     """
     load_states, load_constants = make_load(model.states, layout), make_load(constants, layout, model.constants)
@@ -153,7 +154,7 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, may_settle
             )
             group[STATUS + lane] = DIVERGED if (running | failed) & false else status
             ended = (status != RUNNING) & (status != QUIET)
-            measure(group, lane, running, ended, spin, rattle, inertia, total)
+            measure(group, lane, Look(running, ended, spin, rattle, inertia, total))
             # The energy of the rattle may be negative: that of the spin is what it would be without rattle.
             store_states(group, lane, bounded & (abs(rattle) < NEGLIGIBLE), rest(y), y)
 

@@ -36,8 +36,8 @@ class EnergyError(Measurement):
         WORK = layout.at("work")
 
         @inline
-        def step(group, lane, accepted, spin, steady, work, h, now):
-            group[WORK + lane] += work if accepted else 0.0
+        def step(group, lane, taken):
+            group[WORK + lane] += taken.work if taken.accepted else 0.0
 
         return step
 
@@ -45,8 +45,8 @@ class EnergyError(Measurement):
         WORK, VIOLATION, START = map(layout.at, (*self.quantities, "energy_start"))
 
         @inline
-        def look(group, lane, running, ended, spin, rattle, J, total):
-            violation = abs(total + group[WORK + lane] - group[START + lane])
+        def look(group, lane, seen):
+            violation = abs(seen.total + group[WORK + lane] - group[START + lane])
             worst = group[VIOLATION + lane]
             group[VIOLATION + lane] = violation if violation > worst else worst
 

@@ -58,9 +58,9 @@ class Lyapunov(Measurement):
         )
 
         @inline
-        def look(group, lane, running, ended, spin, rattle, J, total):
+        def look(group, lane, seen):
             # A block that the end has cut short does not count.
-            if running & (group[DONE + lane] % BLOCK == 0.0):
+            if seen.running & (group[DONE + lane] % BLOCK == 0.0):
                 group[SUM + lane] += group[GREW + lane]
                 group[LOOKS + lane] += 1.0
                 if group[LOOKS + lane] == group[WIDTH + lane]:

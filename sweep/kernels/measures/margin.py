@@ -60,7 +60,7 @@ class Margin(Measurement):
         DONE, STEP, PHASE, SHIFTED = map(layout.at, ("done", "step", "phase", "shifted"))
 
         @inline
-        def look(group, lane, running, ended, spin, rattle, J, total):
+        def look(group, lane, seen):
             period, count = group[PERIOD + lane], group[COUNT + lane]
             size = abs(group[CLOSED + lane]) / period
             # When the window closed; if half a window has closed since then, `shifted` is 0.
@@ -69,7 +69,7 @@ class Margin(Measurement):
             first, middle, size1, size2 = group[TIME_BEFORE + lane], group[TIME + lane], size, group[SIZE + lane]
             size3 = group[SIZE_BEFORE + lane]
             # The first window counts however early the look: a run may settle there, with no other.
-            if running & (size > 0.0) & ((time > middle + 0.5 * period) | (size2 == 0.0)):
+            if seen.running & (size > 0.0) & ((time > middle + 0.5 * period) | (size2 == 0.0)):
                 new = count != group[COUNTED + lane]
                 overshoot, nearest = group[OVERSHOOT + lane], group[NEAREST + lane]
                 # The vertex of the parabola through the last three, if the middle one is an extreme.

@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -51,6 +51,40 @@ def measured(dtype: str, long_name: str, flag: str = "", along: str | None = Non
     """
     flags = {0: "firm", 1: flag} if flag else None
     return Variable(dtype, "1", long_name, flags, along=along, words=words, of_sound_runs=True)
+
+
+class Step(NamedTuple):
+    """The step that a lane has taken, as `Measurement.make_step` gets it."""
+
+    accepted: bool
+    """Whether the step counts; if not, no quantity may change."""
+    spin: float
+    """Before the step."""
+    steady: float
+    """Ripple-free spin before the step (`theory.ripple`); the spin itself unless a measurement `follows_ripple`."""
+    work: float
+    """Work of friction in the step; may be zero unless a measurement `follows_work`."""
+    h: float
+    """Length of the step."""
+    now: float
+    """Time at the end of the step."""
+
+
+class Look(NamedTuple):
+    """What a look has found of a lane, as `Measurement.make_look` gets it."""
+
+    running: bool
+    """Whether the trajectory was running before the look."""
+    ended: bool
+    """Whether it has ended now."""
+    spin: float
+    """At the time of the look."""
+    rattle: float
+    """Energy of the rattle."""
+    J: float
+    """Moment of inertia of the spin."""
+    total: float
+    """Energy above rest, rattle + J spin²/2."""
 
 
 @dataclass(frozen=True)
@@ -137,15 +171,7 @@ class Measurement:
         return {}
 
     def make_step(self, layout: Layout, at_reversal):
-        """Inline (group, lane, accepted, spin, steady, work, h, now) -> None, called after every step.
-
-        accepted : whether the step counts; if not, no quantity may change
-        spin : before the step
-        steady : ripple-free spin before the step (`theory.ripple`); the spin itself unless some measurement
-            has `follows_ripple`
-        work : work of friction in the step; may be zero unless some measurement has `follows_work`
-        h : length of the step
-        now : time at the end of the step
+        """Inline (group, lane, taken) -> None, called after every step with its `Step`.
 
         `at_reversal` calls what all measurements do at a reversal (see `make_at_reversal`).  It is for the
         measurement that detects reversals.
@@ -169,15 +195,7 @@ class Measurement:
         """
 
     def make_look(self, layout: Layout):
-        """Inline (group, lane, running, ended, spin, rattle, J, total) -> None, called at every look.
-
-        running : whether the trajectory was running before the look
-        ended : whether it has ended now
-        spin : at the time of the look
-        rattle : energy of the rattle
-        J : moment of inertia of the spin
-        total : energy above rest, rattle + J spin²/2
-        """
+        """Inline (group, lane, seen) -> None, called at every look with what it has found, a `Look`."""
 
     def make_compare(self, layout: Layout):
         """Inline (group, lane, shared) -> None, called after every look with the numbers `shared`."""

@@ -126,8 +126,8 @@ class Misfit(Measurement):
         NOTED = layout.at("noted_spin")
 
         @inline
-        def look(group: Any, lane: int, running: Any, ended: Any, spin: Any, rattle: Any, J: Any, total: Any) -> None:
-            group[NOTED + lane] = spin
+        def look(group: Any, lane: int, seen: Any) -> None:
+            group[NOTED + lane] = seen.spin
 
         return look
 

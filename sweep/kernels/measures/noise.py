@@ -72,9 +72,10 @@ class NoiseLimited(Measurement):
         deep = float(np.log(DEPTH))
 
         @inline
-        def look(group, lane, running, ended, spin, rattle, J, total):
+        def look(group, lane, seen):
+            spin, rattle = seen.spin, seen.rattle
             # The trajectory ends at this look, with a rattle that is large enough to count.
-            last = ended & (2.0 * rattle / J > SEEN * spin * spin)
+            last = seen.ended & (2.0 * rattle / seen.J > SEEN * spin * spin)
             closed, done, count = group[CLOSED + lane], group[DONE + lane], group[COUNT + lane]
             mean = closed / group[PERIOD + lane] if closed != 0.0 else spin
             n = 0.5 * (mean + group[SPIN + lane])
@@ -97,7 +98,7 @@ class NoiseLimited(Measurement):
             larger = log1 > log0
             reverses = count != group[COUNTED + lane]
             noise = (reverses | last) & ((depth1 if larger else depth0) < deep)
-            if running:
+            if seen.running:
                 group[LOG0 + lane], group[LOG1 + lane] = log0, log1
                 group[DEPTH0 + lane] = 0.0 if reverses & (not larger) else depth0
                 group[DEPTH1 + lane] = 0.0 if reverses & larger else depth1

@@ -26,10 +26,10 @@ class RawReversals(Measurement):
         COUNT, EARLIER = map(layout.at, self.quantities)
 
         @inline
-        def step(group, lane, accepted, spin, steady, work, h, now):
+        def step(group, lane, taken):
             earlier = group[EARLIER + lane]
-            group[COUNT + lane] += 1.0 if accepted & (spin * earlier < 0.0) else 0.0
-            group[EARLIER + lane] = spin if accepted else earlier
+            group[COUNT + lane] += 1.0 if taken.accepted & (taken.spin * earlier < 0.0) else 0.0
+            group[EARLIER + lane] = taken.spin if taken.accepted else earlier
 
         return step
 

@@ -60,7 +60,7 @@ class ReversalTimes(Measurement):
         most, kept = self.count, len(LATEST)
 
         @inline
-        def look(group, lane, running, ended, spin, rattle, J, total):
+        def look(group, lane, seen):
             count = int(group[COUNT + lane])
             for k in range(int(group[RECORDED + lane]), min(count, most)):
                 age = count - 1 - k

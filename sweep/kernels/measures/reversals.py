@@ -55,7 +55,8 @@ class Reversals(Measurement):
         )
 
         @inline
-        def step(group, lane, accepted, spin, steady, work, h, now):
+        def step(group, lane, taken):
+            accepted, steady, h = taken.accepted, taken.steady, taken.h
             period, shifted = group[PERIOD + lane], group[SHIFTED + lane]
             phase, half, earlier = group[PHASE + lane] + h, group[HALF + lane], group[EARLIER + lane]
             over = phase - 0.5 * period
@@ -68,7 +69,7 @@ class Reversals(Measurement):
             main, other = closes & (shifted == 0.0), closes & (shifted != 0.0)
             previous, previous_shifted = group[CLOSED + lane], group[CLOSED_SHIFTED + lane]
             reverses = main & (closed * previous < 0.0)
-            crossing = now - 0.5 * h - over - period * (0.5 + closed / (closed - previous))
+            crossing = taken.now - 0.5 * h - over - period * (0.5 + closed / (closed - previous))
             group[COUNT + lane] += 1.0 if reverses else 0.0
             group[COUNT_SHIFTED + lane] += 1.0 if other & (closed * previous_shifted < 0.0) else 0.0
             group[LAST + lane] = crossing if reverses else group[LAST + lane]
