@@ -32,7 +32,7 @@ ITERATIONS = 30
 def assembly(method: str) -> list[str]:
     """Lines of `run_block` for the paper's model with its default measurements."""
     made = make_kernel(method, MODELS["slip"], measures.default(MODELS["slip"]))
-    block = made._make_run_block()  # type: ignore[attr-defined]
+    block = made.stepper.make_run_block(made)
     block.compile((numba.float64[::1],))
     return str(next(iter(block.inspect_asm().values()))).splitlines()
 

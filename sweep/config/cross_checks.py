@@ -19,6 +19,7 @@ from sweep.grid import BODY, Array, distinct
 from sweep.kernels import measures, methods
 from sweep.kernels.differentiate import undifferentiable
 from sweep.kernels.measures import misfit
+from sweep.kernels.measures.measurement import TANGENT
 from sweep.models.general import starts, validity
 from sweep.models.general.surfaces import SURFACES
 from sweep.models.general.variants import BASES, INERTIA, Physics
@@ -148,7 +149,7 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
             yield f"the film {config.film_file} is of a {config.film.what}, and a misfit one of spins; use sweep fit"
         if last > end:
             yield f"the film {config.film_file} lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
-    elif kind.follows_tangent and isinstance(model, Model) and (reason := undifferentiable(model)):
+    elif TANGENT in kind.follows and isinstance(model, Model) and (reason := undifferentiable(model)):
         yield f"{name} cannot be measured on the {model.name} model: {reason}; leave it out"
 
 

@@ -44,7 +44,7 @@ KERNEL, IMAGES, ENDINGS, PATH, APPROACH = "kernel", "images", "endings", "path",
 
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
-    IMAGES: lambda kernel: kernel.filling(),
+    IMAGES: lambda kernel: kernel.stepper.filling(),
     ENDINGS: lambda kernel: (compiled_following(),) if MODES in kernel.model.offers else (),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
     APPROACH: lambda kernel: (compiled_approach(kernel.model),),

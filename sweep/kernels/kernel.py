@@ -9,7 +9,7 @@ handled a cell.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, call_all, make_load
 from sweep.kernels.lanes import STABLE, make_advance, make_look
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Step
+from sweep.kernels.measures.measurement import RIPPLE, Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
 _BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", "failed_at", *STABLE)
@@ -36,12 +36,13 @@ def steps_to(t_end: float | Array, step: Array) -> Array:
     return np.asarray(np.ceil(stretch / step) * (t_end / stretch))
 
 
-class Kernel:
-    """The layout of the images, and the compiled loop around a block of steps.
+class Stepper:
+    """How a method steps: the base of one class for each method (see `sweep.kernels.method`)."""
 
-    Each method has a subclass, whose constructor calls `_lay_out` and `_compile_with`
-    (see `sweep.kernels.method`).
-    """
+    method: str
+    """Its name in `METHODS`."""
+    model: Model
+    """The model in the variables in which it steps."""
 
     # Friction only takes energy away.  If a body gains more than this share from one look to the next, the
     # integration has gone wrong.  Over 40 bodies at 0.3 to 2 times the stability limit, 1e-5 (together with the
@@ -49,48 +50,78 @@ class Kernel:
     # to 1e-6.
     energy_gain = 1e-5
 
-    method: str
-    """Its name in `METHODS`."""
-    model: Model
-    layout: Layout
-    measurements: tuple[Measurement, ...]
-    measure: tuple[str, ...]
-    """The specs of the measurements."""
-    shared: Array
-    """What the measurements compare with."""
-    advancing: Cached
-    """The compiled function behind `advance`."""
+    def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
+        """Names of the quantities that it adds to an image, where the measurements ask for `follows`."""
+        return ()
 
-    def _lay_out(self, model: Model, measurements: Sequence[Measurement], more: Iterable[str] = ()) -> None:
-        """Name the quantities of an image: states, constants, what every kernel needs, measurements, and `more`."""
-        self.model, self.measurements = model, tuple(measurements)
-        self.measure = tuple(each.spec for each in measurements)
+    def make_run_block(self, kernel: Kernel):
+        """Compiled (group) -> None: takes `BLOCK` steps of all lanes."""
+        raise NotImplementedError
+
+    def images(
+        self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
+    ) -> Array:
+        """The images of `Kernel.images`, made with the help of `Kernel.start`."""
+        raise NotImplementedError
+
+    def carry(self, kernel: Kernel, images: Array) -> None:
+        """Carry the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""
+
+    def reached(self, table: Table, t_end: float | Array) -> Array:
+        """Times of the states, shape (cells,)."""
+        return np.asarray(table["done"] * t_end / table["goal"])
+
+    def model_states(self, states: Array, constants: Any) -> Array:
+        """The states as the right-hand side of the model takes them, shape (states, cells)."""
+        return states
+
+    def filling(self) -> tuple[Cached, ...]:
+        """The compiled functions that `images` calls."""
+        return ()
+
+
+class Kernel:
+    """A model, what is measured on it, and a stepper: the layout of the images, and the compiled loop around a block.
+
+    Attributes
+    ----------
+    measure : the specs of the measurements
+    follows : what the measurements need in each step, out of `WORK`, `RIPPLE` and `TANGENT`
+    constants : names of the quantities that hold the constants of the model
+    advancing : the compiled function behind `advance`
+    """
+
+    def __init__(self, stepper: Stepper, measurements: Sequence[Measurement]) -> None:
+        self.stepper, self.model, self.measurements = stepper, stepper.model, tuple(measurements)
+        self.method, self.measure = stepper.method, tuple(each.spec for each in measurements)
+        self.follows = frozenset[str]().union(*(each.follows for each in measurements))
+        self.constants = tuple(f"constant.{name}" for name in self.model.constants._fields)
         self.shared = next((each.shared for each in measurements if each.shared.size), np.empty((0, 0)))
-        self.constants = tuple(f"constant.{name}" for name in model.constants._fields)
-        measured = (name for each in self.measurements for name in each.quantities)
-        self._ripple = model.ripple if self.follows_ripple else NO_RIPPLE
-        self.ripple = tuple(f"ripple.{name}" for name in self._ripple.names)
-        self.layout = Layout((*model.states, *self.constants, *_BASE, *self.ripple, *measured, *more))
+        self._ripple = self.model.ripple if RIPPLE in self.follows else NO_RIPPLE
+        self._ripples = tuple(f"ripple.{name}" for name in self._ripple.names)
+        measured = (name for each in measurements for name in each.quantities)
+        more = stepper.quantities(self.follows)
+        self.layout = Layout((*self.model.states, *self.constants, *_BASE, *self._ripples, *measured, *more))
+        self.advancing = self._make_advancing()
 
-    @property
-    def follows_work(self) -> bool:
-        """True if a measurement needs the work of friction in each step."""
-        return any(each.follows_work for each in self.measurements)
+    def _make_advancing(self) -> Cached:
+        may_settle = all_true("may_settle", "group, lane, spin, at_rest", self.hooks("make_may_settle"))
+        measure = call_all("measure", "group, lane, seen", self.hooks("make_look"))
+        look = make_look(self.model, self.constants, self.layout, may_settle, measure, self.stepper.energy_gain)
+        compare = call_all("compare", "group, lane, shared", self.hooks("make_compare"))
+        advance = make_advance(self.stepper.make_run_block(self), look, compare, self.layout)
+        measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
+        name = f"{self.model.key}-{self.method}-{measured}"
+        return parallel(advance, "(f8[:, ::1], i8[::1], i8, b1, i8, f8[:, ::1])", name)
 
-    @property
-    def follows_ripple(self) -> bool:
-        """True if a measurement needs the ripple-free spin."""
-        return any(each.follows_ripple for each in self.measurements)
-
-    def _make_watch(self):
+    def make_watch(self):
         """Inline (group, lane, accepted, y, p, spin, work, h, now): what all measurements do after a step.
 
-        y, p, spin : states, constants and spin before the step; the others as in `Measurement.make_step`
+        y, p, spin : states, constants and spin before the step; the others as in `Step`
         """
-        at_reversal = call_all("at_reversal", "group, lane, reverses, count, crossing", self._hooks("make_at_reversal"))
-        steps = self._hooks("make_step", at_reversal)
-        measure = call_all("measure", "group, lane, taken", steps)
-        load, ripple = make_load(self.ripple, self.layout), self._ripple.value
+        at_reversal = call_all("at_reversal", "group, lane, reverses, count, crossing", self.hooks("make_at_reversal"))
+        measure = call_all("measure", "group, lane, taken", self.hooks("make_step", at_reversal))
+        load, ripple = make_load(self._ripples, self.layout), self._ripple.value
 
         @inline
         def watch(group, lane, accepted, y, p, spin, work, h, now):
@@ -99,22 +130,9 @@ class Kernel:
 
         return watch
 
-    def _hooks(self, make: str, *more) -> list[Any]:
-        """The functions that a hook of `Measurement` gives; `more` are its arguments beside the layout."""
+    def hooks(self, make: str, *more) -> list[Any]:
+        """The functions that a hook of `Measurement` gives; `more` are its arguments besides the layout."""
         return [hook for each in self.measurements if (hook := getattr(each, make)(self.layout, *more))]
-
-    def _compile_with(self, run_block) -> None:
-        """Set up `advance` around `run_block`, compiled (group) -> None."""
-        may_settle = all_true("may_settle", "group, lane, spin, at_rest", self._hooks("make_may_settle"))
-        looks = self._hooks("make_look")
-        measure = call_all("measure", "group, lane, seen", looks)
-        look = make_look(self.model, self.constants, self.layout, may_settle, measure, self.energy_gain)
-        compare = call_all("compare", "group, lane, shared", self._hooks("make_compare"))
-        advance = make_advance(run_block, look, compare, self.layout)
-        measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
-        name = f"{self.model.key}-{self.method}-{measured}"
-        types = "(f8[:, ::1], i8[::1], i8, b1, i8, f8[:, ::1])"
-        self.advancing = parallel(advance, types, name)
 
     def table(self, images: Array) -> Table:
         """`images`, accessed by the names of their quantities."""
@@ -132,9 +150,9 @@ class Kernel:
             next range below, and the next above; shape (6, cells).  NaN where there is no such range;
             by default there is none anywhere
         """
-        raise NotImplementedError
+        return self.stepper.images(self, columns, step, t_end, stable)
 
-    def _start(
+    def start(
         self, columns: Columns, step: Array, goal: Array, stable_step: Array | bool, stable: Array | None
     ) -> Array:
         """Images at t = 0, with all quantities set that do not start at zero, except those of the method."""
@@ -147,8 +165,8 @@ class Kernel:
         table["goal"], table["stable_step"], table["step"] = goal, stable_step, step
         table["energy_start"] = table["energy"] = rattle + 0.5 * inertia * spin**2
         table.set_columns(STABLE, np.nan if stable is None else stable.T)
-        if self.ripple:
-            table.set_columns(self.ripple, stack(self.model.ripple.of(columns)).T)
+        if self._ripples:
+            table.set_columns(self._ripples, stack(self.model.ripple.of(columns)).T)
         for each in self.measurements:
             for name, values in each.start(self.model, columns, rattle).items():
                 table[name] = values
@@ -162,7 +180,8 @@ class Kernel:
         self.advancing(images, cells, blocks, stop_when_settled, threads(), self.shared)
 
     def carry(self, images: Array) -> None:
-        """Carry the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""
+        """Carry the images that are `QUIET` to where steps are needed again."""
+        self.stepper.carry(self, images)
 
     def states(self, images: Array) -> Array:
         """The states, shape (states, cells)."""
@@ -177,21 +196,13 @@ class Kernel:
         """The ripple-free spin of the images, shape (cells,); the spin itself if no measurement needs the former."""
         table, (states, constants) = self.table(images), self.unpack(images)
         spin, _, _ = self.model.energy(states, constants)
-        return np.asarray(spin - self._ripple.value(states, constants, [table[name] for name in self.ripple]))
+        return np.asarray(spin - self._ripple.value(states, constants, [table[name] for name in self._ripples]))
 
     def model_states(self, images: Array) -> Array:
         """The states as the right-hand side of the model takes them, shape (states, cells)."""
-        return self.states(images)
+        return self.stepper.model_states(*self.unpack(images))
 
     def times(self, images: Array, t_end: float | Array) -> Array:
         """Times at which the images have ended, in sqrt(c/g), shape (cells,)."""
         table = self.table(images)
-        return np.where(table["failed_at"] > 0, table["failed_at"], self._reached(table, t_end))
-
-    def _reached(self, table: Table, t_end: float | Array) -> Array:
-        """Times of the states, shape (cells,)."""
-        return np.asarray(table["done"] * t_end / table["goal"])
-
-    def filling(self) -> tuple[Cached, ...]:
-        """The compiled functions that `images` calls."""
-        return ()
+        return np.where(table["failed_at"] > 0, table["failed_at"], self.stepper.reached(table, t_end))

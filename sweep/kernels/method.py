@@ -1,35 +1,33 @@
 """Defines what an integration method is, and tells how to add one.
 
 An explicit Runge-Kutta method is a record in `sweep.kernels.tableau`.  Any other is a `Method` record and a subclass of
-`sweep.kernels.kernel.Kernel`, in a file of its own, like `runge_kutta`; enter the record in `METHODS` of
+`sweep.kernels.kernel.Stepper`, in a file of its own, like `runge_kutta`; enter the record in `METHODS` of
 `sweep.kernels.methods`.  The configuration, the choice of the cheapest method, the provenance and the benchmark then
-know it.  Times and steps are in sqrt(c/g),
-spins in sqrt(g/c).
+know it.  Times and steps are in sqrt(c/g), spins in sqrt(g/c).
 
-The constructor of the kernel calls three functions of `Kernel`, in this order:
+A `Kernel` is a stepper with measurements.  The stepper names its `method` and its `model`, and implements
 
-1. `_lay_out` names the quantities of an image, among them any that the method adds, such as weights or a history.
-2. `_make_watch` gives the inline function that has to be called after every step of every lane, for the measurements.
-3. `_compile_with` takes the compiled function `run_block`, (group) -> None, which takes `BLOCK` steps of all lanes.
+1. `quantities`, what the method adds to an image, such as weights or a history;
+2. `images`, which makes images at t = 0 with the help of `Kernel.start`;
+3. `make_run_block`, the compiled function (group) -> None that takes `BLOCK` steps of all lanes.  After every step of
+   every lane it calls the inline function of `Kernel.make_watch`, for the measurements.
 
-In `run_block` a lane is active while its status is `RUNNING` and its `done` is below its `goal`.  An accepted step of
+In the block a lane is active while its status is `RUNNING` and its `done` is below its `goal`.  An accepted step of
 an active lane writes the states and adds one to `done`.  A step that fails leaves the states as they were and sets the
 status to `PARADOX`, `LIFT_OFF` or `DIVERGED`.  Lanes that are not active compute as well, but have to keep their
 states, `done` and status.
 
-A kernel has to name its `method`, and to implement `images`, which makes images at t = 0 with the help of `_start`.
-It overrides `filling` if `images` calls compiled functions, `_reached` if its images do not begin at t = 0,
+It overrides `filling` if `images` calls compiled functions, `reached` if its images do not begin at t = 0,
 `model_states` if its states are not those of the model, and `carry` if it can cross stretches of small rattle without
 steps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from sweep.kernels.kernel import Kernel
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.kernel import Stepper
 from sweep.models.model import Array, Columns, Model
 
 TOLERANCE = 1e-8
@@ -51,8 +49,8 @@ class Method:
     """The number that stands for it in datasets; it must never change."""
     summary: str
     """One line for the documentation."""
-    kernel: Callable[[Model, Sequence[Measurement], float], Kernel]
-    """(model, measurements, tolerance) -> the kernel, not compiled yet."""
+    stepper: Callable[[Model, float], Stepper]
+    """(model, tolerance) -> what takes its steps."""
     accurate_step: Callable[[Model, Columns, Array, float], Array]
     """(model, columns, motion, tolerance) -> the step that keeps the error in spin at t = 400 within the tolerance,
     shape (cells,), in sqrt(c/g), where `motion` is the `fastest_motion`."""

@@ -48,7 +48,7 @@ def make_kernel(
     method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE, film: Film | None = None
 ) -> Kernel:
     """The kernel of a method, not compiled yet, for a model and for measurements given by their specs."""
-    return METHODS[method].kernel(model, measures.chosen(measure, film), tolerance)
+    return Kernel(METHODS[method].stepper(model, tolerance), measures.chosen(measure, film))
 
 
 def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:

@@ -7,7 +7,6 @@ states, as plain assignments, which the compiler keeps in registers.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -16,40 +15,45 @@ from sweep.jit import exactly_compiled, full_width
 from sweep.kernels import tangent
 from sweep.kernels.codegen import call_all, compile_inline, make_load, make_store, tuple_of
 from sweep.kernels.differentiate import make_extended
-from sweep.kernels.kernel import Kernel, steps_to
+from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import TANGENT
 from sweep.kernels.method import TOLERANCE, Method
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
 from sweep.models.model import Array, Columns, Model
 
 
-class RungeKuttaKernel(Kernel):
-    """The `Kernel` of a tableau, for any model."""
+class RungeKutta(Stepper):
+    """Takes the steps of a tableau, for any model."""
 
-    def __init__(self, model: Model, tableau: Tableau, measurements: Sequence[Measurement]) -> None:
-        self.method, self.tableau = tableau.name, tableau
-        self.follows_tangent = any(each.follows_tangent for each in measurements)
-        self._lay_out(model, measurements, tangent.quantities(model) if self.follows_tangent else ())
-        run_block = self._make_run_block()
-        self._compile_with(self._with_tangent(run_block) if self.follows_tangent else run_block)
+    def __init__(self, model: Model, tableau: Tableau) -> None:
+        self.method, self.model, self.tableau = tableau.name, model, tableau
 
-    def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
+    def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
+        """Those of the tangent, if a measurement follows it."""
+        return tangent.quantities(self.model) if TANGENT in follows else ()
+
+    def images(
+        self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
+    ) -> Array:
         """As `Kernel.images`; the steps taken are no longer than `step` and divide `t_end` evenly."""
         goal = steps_to(t_end, step)
         stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
-        images = self._start(columns, t_end / goal, goal, stable_step, stable)
-        if self.follows_tangent:
-            table = self.table(images)
-            for name, values in tangent.start(self.model, self.states(images)).items():
+        images = kernel.start(columns, t_end / goal, goal, stable_step, stable)
+        if TANGENT in kernel.follows:
+            table = kernel.table(images)
+            for name, values in tangent.start(self.model, kernel.states(images)).items():
                 table[name] = values
         return images
 
-    def _with_tangent(self, run_block):
-        """Compiled (group) -> None: as `run_block`, and then the tangents take the same steps."""
+    def make_run_block(self, kernel: Kernel):
+        """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and then the tangents, if any, take the same."""
+        run_block = self._make_steps(kernel)
+        if TANGENT not in kernel.follows:
+            return run_block
         step = make_step(self.tableau, make_extended(self.model), 2 * len(self.model.states))
-        follow = tangent.make_follow(step, self.model, self.constants, self.layout)
+        follow = tangent.make_follow(step, self.model, kernel.constants, kernel.layout)
 
         @exactly_compiled
         def run_both(group):
@@ -58,14 +62,14 @@ class RungeKuttaKernel(Kernel):
 
         return run_both
 
-    def _make_run_block(self):
+    def _make_steps(self, kernel: Kernel):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and calls the measurements after each."""
-        model, layout = self.model, self.layout
+        model, layout = self.model, kernel.layout
         load_states = make_load(model.states, layout)
-        load_constants = make_load(self.constants, layout, model.constants)
+        load_constants = make_load(kernel.constants, layout, model.constants)
         store_states = make_store(model.states, layout)
-        step, watch = make_step(self.tableau, model.rhs, len(model.states)), self._make_watch()
-        note = call_all("note", "group, number", self._hooks("make_note"))
+        step, watch = make_step(self.tableau, model.rhs, len(model.states)), kernel.make_watch()
+        note = call_all("note", "group, number", kernel.hooks("make_note"))
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         block, lanes, wide = BLOCK, LANES, full_width()
 
@@ -130,7 +134,7 @@ def method(tableau: Tableau) -> Method:
         name=tableau.name,
         code=tableau.code,
         summary=tableau.summary,
-        kernel=lambda model, measurements, tolerance: RungeKuttaKernel(model, tableau, measurements),
+        stepper=lambda model, tolerance: RungeKutta(model, tableau),
         accurate_step=partial(_accurate_step, tableau),
         stable_step=lambda model, columns: np.asarray(longest / model.fastest_decay(columns)),
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",

@@ -28,6 +28,7 @@ from sweep.kernels import path
 from sweep.kernels.build import PATH
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK
+from sweep.kernels.measures.measurement import RIPPLE
 from sweep.kernels.methods import METHODS, PLAIN
 from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
@@ -392,7 +393,7 @@ def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
             along, across = series[x], series[y]
             series[x] = along * np.cos(angles) + across * np.sin(angles)
             series[y] = across * np.cos(angles) - along * np.sin(angles)
-    if kernel.follows_ripple:
+    if RIPPLE in kernel.follows:
         series["ripple_free_spin"] = kernel.steady_spin(images)
     if "energy_error" in kernel.measure:
         series["energy"] = rattle + 0.5 * inertia * spin**2

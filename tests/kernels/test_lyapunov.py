@@ -15,10 +15,11 @@ from support.kernels import finish, images_of, kernel
 import sweep
 from sweep.jit import inline
 from sweep.kernels.differentiate import make_extended
+from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.measures import chosen
 from sweep.kernels.measures.lyapunov import BINS
-from sweep.kernels.runge_kutta import RungeKuttaKernel
+from sweep.kernels.runge_kutta import RungeKutta
 from sweep.kernels.tableau import DOPRI5
 from sweep.models.ladder import noslip
 from sweep.models.model import SPIN, Model, stack, take
@@ -64,8 +65,8 @@ LORENZ = Model(
 
 
 @cache
-def _lorenz() -> RungeKuttaKernel:
-    return RungeKuttaKernel(LORENZ, DOPRI5, chosen(["lyapunov"]))
+def _lorenz() -> Kernel:
+    return Kernel(RungeKutta(LORENZ, DOPRI5), chosen(["lyapunov"]))
 
 
 def exponents(made: Any, body: dict[str, np.ndarray], step: float, t_end: float) -> dict[str, np.ndarray]:

@@ -166,7 +166,7 @@ def assembly(function: Any, *arguments: Any) -> str:
 )  # fmt: skip
 def test_the_loop_over_lanes_is_vector_instructions(method: str, model: str) -> None:
     made: Any = make(method, model)
-    found = assembly(made._make_run_block(), np.zeros(len(made.layout.names) * LANES))
+    found = assembly(made.stepper.make_run_block(made), np.zeros(len(made.layout.names) * LANES))
     # Twelve square roots and divisions a step of dopri5; the stiff method has a scalar loop as well, for a history that
     # overlaps the group, which it never does.
     divisions, roots = (12, 12) if method == "dopri5" else (3, 2)

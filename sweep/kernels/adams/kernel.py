@@ -17,8 +17,6 @@ What else was tried, with figures: docs/explanation/tried.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from sweep.jit import Cached, compiled, full_width
@@ -40,9 +38,10 @@ from sweep.kernels.adams.step import (
     places,
 )
 from sweep.kernels.codegen import compile_inline
-from sweep.kernels.kernel import Kernel, steps_to
+from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch
+from sweep.kernels.measures import measurement
+from sweep.kernels.measures.measurement import Stretch
 from sweep.kernels.method import Method
 from sweep.kernels.status import DIVERGED, RUNNING
 from sweep.models.model import MODES, Array, Columns, Model, stack
@@ -55,8 +54,8 @@ from sweep.models.theory.rocking import frequencies, implicit
 _HISTORY = tuple(name.format(slot) for slot in range(HISTORY) for name in POINT)
 
 
-class AdamsKernel(Kernel):
-    """The `Kernel` of this method; its states contain M in place of ω.
+class Adams(Stepper):
+    """Takes the steps of this method; its states contain M in place of ω.
 
     Where the rattle is so small that its linear modes describe it to within `tolerance` in spin, these
     carry the trajectory on, without steps (`sweep.kernels.adams.stretches`), if they are known (`MODES`).
@@ -69,37 +68,40 @@ class AdamsKernel(Kernel):
     # right to the tolerance.
     energy_gain = 1e-2
 
-    def __init__(self, form: StiffForm, measurements: Sequence[Measurement], tolerance: float) -> None:
-        self.form, self.tolerance = form, tolerance
-        powers = stretches.POWERS if any(each.follows_work for each in measurements) else ()
-        looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if MODES in form.full.offers else ()
-        method = ("gamma", "per_weight", *PREDICT, *CORRECT, *MATRIX)
-        self._lay_out(form.model, measurements, (*looks, "begin", "spin", *powers, *method, *_HISTORY))
-        self._compile_with(self._make_run_block())
+    def __init__(self, form: StiffForm, tolerance: float) -> None:
+        self.form, self.model, self.tolerance = form, form.model, tolerance
 
-    def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
+    def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
+        """What looks for small rattle need, the weights and the matrix P, and the history."""
+        looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if MODES in self.model.offers else ()
+        powers = stretches.POWERS if measurement.WORK in follows else ()
+        return (*looks, "begin", "spin", *powers, "gamma", "per_weight", *PREDICT, *CORRECT, *MATRIX, *_HISTORY)
+
+    def images(
+        self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
+    ) -> Array:
         """As `Kernel.images`, but the images are those at the end of start-up, at the time in `begin`."""
         levels = count_levels(self.form.slip_decay(columns), step)
         lead = duration(levels)
         steps = np.maximum(steps_to(t_end, step), lead + 1)
         goal, step = steps - lead, t_end / steps
-        images = self._start(columns, step, goal, True, stable)
-        table = self.table(images)
-        self._set_method(table, self.unpack(images)[1])
-        constants = table.columns(self.constants)
+        images = kernel.start(columns, step, goal, True, stable)
+        table = kernel.table(images)
+        self._set_method(table, kernel.unpack(images)[1])
+        constants = table.columns(kernel.constants)
         starts = stack(self.form.full.start(columns)).T
-        self._set_started(table, *start_up.start_up(self.form, step, constants, starts, levels))
-        if MODES in self.form.full.offers:
+        self._set_started(kernel, table, *start_up.start_up(self.form, step, constants, starts, levels))
+        if MODES in self.model.offers:
             self._set_looks(table, columns)
         return images
 
     def filling(self) -> tuple[Cached, ...]:
         return (start_up.compiled_start_up(self.form),)
 
-    def model_states(self, images: Array) -> Array:
-        return velocities(self.form.slow, *self.unpack(images))
+    def model_states(self, states: Array, constants) -> Array:
+        return velocities(self.form.slow, states, constants)
 
-    def _reached(self, table: Table, t_end: float | Array) -> Array:
+    def reached(self, table: Table, t_end: float | Array) -> Array:
         reached = table["begin"] + table["done"] * table["step"]
         return np.where(table["done"] == table["goal"], t_end, reached)
 
@@ -116,22 +118,22 @@ class AdamsKernel(Kernel):
         table["per_weight"] = 1 / correct[:, 0]
         table["gamma"] = BDF_GAMMA * step
 
-    def _set_started(self, table: Table, ended: Table, history: Array) -> None:
+    def _set_started(self, kernel: Kernel, table: Table, ended: Table, history: Array) -> None:
         """Set the state after start-up, and do what looks and measurements would have done during it."""
-        before = self.steady_spin(table.images)
+        before = kernel.steady_spin(table.images)
         table.set_columns(self.model.states, ended.columns(self.model.states))
         table.set_columns(_HISTORY, history[:, :, :-1].reshape(len(history), -1))
         table["begin"], table["status"] = ended["ticks"] * ended["spacing"], ended["status"]
-        if self.follows_work:
+        if measurement.WORK in kernel.follows:
             table.set_columns(stretches.POWERS, history[:, :-4:-1, -1])
-        spin, rattle, inertia = self.model.energy(*self.unpack(table.images))
+        spin, rattle, inertia = self.model.energy(*kernel.unpack(table.images))
         energy = rattle + 0.5 * inertia * spin**2
         grown = energy > table["energy_start"] * (1 + self.energy_gain)
         table["status"] = np.where(grown, DIVERGED, table["status"])
         table["energy"], table["spin"] = energy, spin
-        mean = (before + self.steady_spin(table.images)) / 2
+        mean = (before + kernel.steady_spin(table.images)) / 2
         stretch = Stretch(table["begin"], mean, spin, ended["work"], mode_energies=None)
-        for each in self.measurements:
+        for each in kernel.measurements:
             each.skip(table, stretch)
 
     def _set_looks(self, table: Table, columns: Columns) -> None:
@@ -142,19 +144,19 @@ class AdamsKernel(Kernel):
         table["quiet_after"] = stretches.first_look(columns, reach, time, goal, self.tolerance)
         table["bending"] = bending(columns)
 
-    def carry(self, images: Array) -> None:
+    def carry(self, kernel: Kernel, images: Array) -> None:
         """As `Kernel.carry`."""
-        stretches.carry(self, images, self.tolerance)
+        stretches.carry(kernel, images, self.tolerance)
 
-    def _make_run_block(self):
+    def make_run_block(self, kernel: Kernel):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes.
 
         Each step appends a point to a history that begins with the eight points of the image.  So one step is
         compiled, not one for each place in a ring of eight.  The history is not part of the group: LLVM sees then that
         no step reads from one what it has written to the other.
         """
-        known = names(self.form) | {"watch": self._make_watch(), "full_width": full_width(), "np": np}
-        first, size = self.layout.at(_HISTORY[0]), len(POINT) * LANES
+        known = names(self.form) | {"watch": kernel.make_watch(), "full_width": full_width(), "np": np}
+        first, size = kernel.layout.at(_HISTORY[0]), len(POINT) * LANES
         lines = [
             "full_width()",
             f"history = np.empty({(HISTORY + BLOCK) * size})",
@@ -162,13 +164,13 @@ class AdamsKernel(Kernel):
             f"    history[i] = group[{first} + i]",
             f"for oldest in range(0, {BLOCK * size}, {size}):",
             f"    for lane in range({LANES}):",
-            *(f"        {line}" for line in self._step_lines()),
+            *(f"        {line}" for line in self._step_lines(kernel)),
             f"for i in range({HISTORY * size}):",
             f"    group[{first} + i] = history[{BLOCK * size} + i]",
         ]
         return compiled(compile_inline("run_block", "group", lines, known))
 
-    def _step_lines(self) -> list[str]:
+    def _step_lines(self, kernel: Kernel) -> list[str]:
         """The source of one step, from eight points of the history, of which the first is at `oldest`, to the ninth.
 
         The lines are the body of the loop itself.  If they were a function of their own, LLVM would unroll the loop
@@ -179,9 +181,9 @@ class AdamsKernel(Kernel):
         def at(name: str) -> str:
             if name in points:
                 return f"history[oldest + {points[name]} + lane]"
-            return f"group[{self.layout.at(name)} + lane]"
+            return f"group[{kernel.layout.at(name)} + lane]"
 
-        if self.follows_work:
+        if measurement.WORK in kernel.follows:
             powers = ", ".join(map(at, stretches.POWERS))
             work = [f"p0, p1, p2 = {powers}", f"{powers} = power, p0, p1"]
             work += [f"work = {WORK.format('power', 'p0', 'p1', 'p2')}"]
@@ -220,18 +222,18 @@ def accurate_step(model: Model, columns: Columns, motion: Array, tolerance: floa
     return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, form.damping(columns)))
 
 
-def _kernel(model: Model, measurements: Sequence[Measurement], tolerance: float) -> AdamsKernel:
+def _stepper(model: Model, tolerance: float) -> Adams:
     form = form_of(model)
     assert form is not None
-    return AdamsKernel(form, measurements, tolerance)
+    return Adams(form, tolerance)
 
 
 METHOD = Method(
-    name=AdamsKernel.method,
+    name=Adams.method,
     code=1,
     summary="Adams formulas of orders eight and nine for the slow variables and BDF5 for the slip, for the slip model: "
     "friction does not limit its step",
-    kernel=_kernel,
+    stepper=_stepper,
     accurate_step=accurate_step,
     runs=lambda model: form_of(model) is not None,
     # On one thread start-up takes 8 to 11 µs, and a step of dopri5 22 ns.

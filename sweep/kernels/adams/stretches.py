@@ -27,7 +27,7 @@ import numpy as np
 from sweep.kernels.adams.step import HISTORY, SLIPS, SLOPES
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, Table
-from sweep.kernels.measures.measurement import Stretch
+from sweep.kernels.measures.measurement import WORK, Stretch
 from sweep.kernels.status import QUIET, RUNNING
 from sweep.models.ladder import slip
 from sweep.models.model import Array, Columns
@@ -286,7 +286,7 @@ def move(kernel: Kernel, images: Array, rattle: Rattle, steps: Array, lifts: Arr
     table.set_columns(_RATTLE, table.columns(_RATTLE) + rattle.changes(factors, rattle.amplitudes))
     table["M3"] += rattle.turned(after) - rattle.turned(rattle.amplitudes)
     _move_history(table, rattle, factors)
-    if kernel.follows_work:
+    if WORK in kernel.follows:
         _move_powers(table, kernel.unpack(images)[1])
     spin, energy, inertia = STIFF_MODEL.energy(*kernel.unpack(images))
     table["spin"] = spin

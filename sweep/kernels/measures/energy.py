@@ -11,7 +11,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch, measured
+from sweep.kernels.measures.measurement import WORK, Measurement, Stretch, measured
 from sweep.models.model import ENERGY, Array
 
 
@@ -20,7 +20,7 @@ class EnergyError(Measurement):
     summary = "largest violation of the energy balance: an error that a run measures by itself"
     asks = ENERGY
     by_default = True
-    follows_work = True
+    follows = frozenset({WORK})
     quantities = ("work", "violation")
 
     variables = {

@@ -20,7 +20,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, LANES, Layout, Table
-from sweep.kernels.measures.measurement import Measurement, measured
+from sweep.kernels.measures.measurement import TANGENT, Measurement, measured
 from sweep.kernels.tangent import GROWTH
 from sweep.models.model import SPIN, Array, Columns, Model
 
@@ -38,7 +38,8 @@ class Lyapunov(Measurement):
     summary = "largest Lyapunov exponent, with its statistical error, at three times the cost; with dopri5 alone"
     asks = SPIN
     cost = 3.0
-    follows_tangent = every_step = True
+    follows = frozenset({TANGENT})
+    every_step = True
     quantities = ("bin_width", "bin_looks", "bin_growth", "full_bins", *_BIN_NAMES)
 
     variables = {

@@ -53,6 +53,11 @@ def measured(dtype: str, long_name: str, flag: str = "", along: str | None = Non
     return Variable(dtype, "1", long_name, flags, along=along, words=words, of_sound_runs=True)
 
 
+WORK, RIPPLE, TANGENT = "work", "ripple", "tangent"
+"""What a measurement may follow: the work of friction, the ripple-free spin, or how fast a tangent grows
+(`sweep.kernels.tangent`)."""
+
+
 class Step(NamedTuple):
     """The step that a lane has taken, as `Measurement.make_step` gets it."""
 
@@ -61,9 +66,9 @@ class Step(NamedTuple):
     spin: float
     """Before the step."""
     steady: float
-    """Ripple-free spin before the step (`theory.ripple`); the spin itself unless a measurement `follows_ripple`."""
+    """Ripple-free spin before the step (`theory.ripple`); the spin itself unless a measurement follows the `RIPPLE`."""
     work: float
-    """Work of friction in the step; may be zero unless a measurement `follows_work`."""
+    """Work of friction in the step; may be zero unless a measurement follows the `WORK`."""
     h: float
     """Length of the step."""
     now: float
@@ -118,12 +123,8 @@ class Measurement:
     implements `make_at_reversal` needs "reversals"."""
     by_default: ClassVar[bool] = False
     """It is made if the configuration names no measurement, provided that the model supports it."""
-    follows_work: ClassVar[bool] = False
-    """It uses the work of friction in each step, which some methods compute only on request."""
-    follows_ripple: ClassVar[bool] = False
-    """It uses the ripple-free spin in each step."""
-    follows_tangent: ClassVar[bool] = False
-    """It uses how fast a tangent grows (`sweep.kernels.tangent`)."""
+    follows: ClassVar[frozenset[str]] = frozenset()
+    """What it uses in each step that is computed on request alone: `WORK`, `RIPPLE` or `TANGENT`."""
     every_step: ClassVar[bool] = False
     """It follows every step from t = 0 on, which needs a method that `Method.takes_every_step`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
@@ -157,7 +158,7 @@ class Measurement:
         """True if a kernel with it differs from one without: it has a quantity, or a hook in the loop."""
         hooks = ("make_step", "make_at_reversal", "make_note", "make_may_settle", "make_look", "make_compare")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
-        return bool(self.quantities) or own or self.follows_work or self.follows_ripple or self.follows_tangent
+        return bool(self.quantities or own or self.follows)
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.

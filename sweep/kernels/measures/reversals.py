@@ -16,7 +16,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch, measured
+from sweep.kernels.measures.measurement import RIPPLE, Measurement, Stretch, measured
 from sweep.models.model import COUNT, Array, Columns, Model
 
 
@@ -25,7 +25,7 @@ class Reversals(Measurement):
     summary = "number of spin reversals, the time of the last, and the spin averaged over the rattle"
     asks = COUNT
     by_default = True
-    follows_ripple = True
+    follows = frozenset({RIPPLE})
     quantities = (
         "period", "phase", "half", "earlier_half", "shifted", "closed_window", "closed_shifted",
         "reversals", "reversals_shifted", "last_reversal",
