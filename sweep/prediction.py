@@ -9,7 +9,8 @@ import numpy as np
 
 from sweep.grid import Array, Grid
 from sweep.kernels.measures.first_reversal import FirstReversal
-from sweep.models.general import reversal_time, variants
+from sweep.models.general import reversal_time
+from sweep.models.general.surfaces import ELLIPSOID
 from sweep.models.ladder import analytic
 from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
 from sweep.models.theory import stability
@@ -56,7 +57,7 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
     time, reason = np.full(n_c1.shape[1], np.nan), np.full(n_c1.shape[1], reversal_time.NOT_KNOWN)
     possible = np.flatnonzero(~model.impossible(columns))
     upper, lower = n_c1[:, possible] if "mu" in model.parameters else np.zeros((2, len(possible)))
-    *_, surface = variants.parts(model.name)
+    surface = model.variant.surface if model.variant else ELLIPSOID
     theirs = {name: values[possible] for name, values in columns.items()}
     time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
     return {"t_first_reversal_predicted": time, "reversal_time_reason": reason}

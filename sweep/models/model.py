@@ -193,6 +193,9 @@ class Model(Tier):
     units: str = OWN
     """What the numbers of a model that a user brings are in, for the labels: "paper", "SI" or "own"."""
 
+    variant: Any = None
+    """What a variant for any body is made of, its `sweep.models.general.common.Variant`; None for other models."""
+
     # What a user brings with it.
     own_parameters: tuple[Parameter, ...] = ()
     """Parameters that are not in `sweep.parameters`, of a model that a user brings."""

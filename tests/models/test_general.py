@@ -17,7 +17,7 @@ from sweep.models.general.bounds import strongest_grip
 from sweep.models.general.couples import COUPLES as KINDS
 from sweep.models.general.laws import LAWS, tanh_ratio
 from sweep.models.general.surfaces import ELLIPSOID, PARABOLOID, Surface
-from sweep.models.general.variants import variant
+from sweep.models.general.variants import named
 from sweep.models.ladder import noslip
 from sweep.models.model import LINEAR, Model, take
 from sweep.models.theory import linear, stability
@@ -302,4 +302,4 @@ def test_every_law_is_viscous_to_the_linear_theory() -> None:
 def test_unknown_variants() -> None:
     for name in ("slip+magic", "noslip+viscous", "averaged+viscous", "slip+viscous+magic"):
         with pytest.raises(KeyError):
-            variant(name)
+            named(name)

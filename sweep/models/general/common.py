@@ -3,15 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from sweep.models.general import rigid_body, validity
 from sweep.models.general.couples import Couple
-from sweep.models.general.surfaces import Surface
+from sweep.models.general.laws import Law
+from sweep.models.general.surfaces import ELLIPSOID, Surface
 from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, named, zeros
+
+SOLID = "solid"
+"""Stands in place of the law in the names of variants without slip."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What a variant of `slip` or `noslip` is made of."""
+
+    law: Law | None
+    """Of slip friction; None for a body that does not slip."""
+    couples: tuple[Couple, ...] = ()
+    surface: Surface = ELLIPSOID
+
+    @property
+    def name(self) -> str:
+        """Name the variant, as in datasets and in the cache of compiled code."""
+        base = ["slip", self.law.name] if self.law else ["noslip", SOLID]
+        shape = [self.surface.name] if self.surface != ELLIPSOID else []
+        return "+".join([*base, *(couple.name for couple in self.couples), *shape])
 
 
 def record(
@@ -37,11 +58,13 @@ def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
     return frozenset({COUNT, SPIN, ENERGY} | theory)
 
 
-def of_any_body(base: Model, name: str, surface: Surface, **made) -> Model:
-    """The variant of `base` of this name; `made` are the fields that `slip` and `noslip` have of their own."""
+def of_any_body(base: Model, variant: Variant, **made) -> Model:
+    """A variant of `base`; `made` are the fields that `slip` and `noslip` have of their own."""
+    surface = variant.surface
     return replace(
         base,
-        name=name,
+        name=variant.name,
+        variant=variant,
         summary=f"{base.summary}, for any body",
         slower_period=lambda columns: rigid_body.slower_period(columns, surface),
         # x and y are the axes of inertia of a body given by δ, and those of the surface otherwise.

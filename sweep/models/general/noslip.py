@@ -9,7 +9,6 @@ g u + v_g' + ω × v_g, whatever it has to be.  Its torque gives
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 
 from sweep.jit import inline
@@ -17,16 +16,16 @@ from sweep.models import attitude
 from sweep.models.general import rigid_body, starts
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay
-from sweep.models.general.common import of_any_body, offers, record
-from sweep.models.general.couples import Couple, damping_of, friction_of
+from sweep.models.general.common import Variant, of_any_body, offers, record
+from sweep.models.general.couples import damping_of, friction_of
 from sweep.models.general.rigid_body import about_contact, gyroscopic
-from sweep.models.general.surfaces import Surface
 from sweep.models.ladder import noslip
 from sweep.models.model import REVERSAL_TIME, Model, Ripple
 
 
-def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
-    """The variant of `noslip` of this name; `parameters` are those of the body and the start."""
+def rolling(variant: Variant, parameters: tuple[str, ...]) -> Model:
+    """A variant of `noslip`; `parameters` are those of the body and the start."""
+    couples, surface = variant.couples, variant.surface
     contact, slipping_energy = surface.contact, rigid_body.energy_on(surface)
     friction, damping = friction_of(couples), damping_of(couples)
     # A product with 0.0 would remain: the compiler has to allow for infinity.
@@ -63,7 +62,7 @@ def rolling(name: str, couples: Sequence[Couple], surface: Surface, parameters: 
         return slipping_energy((u1, u2, w1, w2, w3, 0.0, 0.0), p)
 
     return of_any_body(
-        noslip.MODEL, name, surface,
+        noslip.MODEL, variant,
         parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=bool(couples)) | {REVERSAL_TIME},
         constants=record(surface, couples),

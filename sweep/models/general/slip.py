@@ -18,8 +18,6 @@ The contact point stays in the plane, v_p · u = 0.  With u' = u × ω the deriv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from sweep.jit import inline
@@ -27,17 +25,18 @@ from sweep.models import attitude
 from sweep.models.general import rigid_body, starts
 from sweep.models.general import ripple as ripples
 from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
-from sweep.models.general.common import of_any_body, offers, record
-from sweep.models.general.couples import Couple, damping_of, friction_of
+from sweep.models.general.common import Variant, of_any_body, offers, record
+from sweep.models.general.couples import damping_of, friction_of
 from sweep.models.general.laws import Law
 from sweep.models.general.rigid_body import about_centre, gyroscopic
-from sweep.models.general.surfaces import Surface
 from sweep.models.ladder import noslip, slip
 from sweep.models.model import REVERSAL_TIME, Array, Columns, Model, Ripple
 
 
-def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, parameters: tuple[str, ...]) -> Model:
-    """The variant of `slip` of this name; `parameters` are those of the body and the start."""
+def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
+    """A variant of `slip`; `parameters` are those of the body and the start."""
+    law, couples, surface = variant.law, variant.couples, variant.surface
+    assert law
     contact, friction, damping = surface.contact, friction_of(couples, law), damping_of(couples)
 
     @inline
@@ -71,7 +70,7 @@ def slipping(name: str, law: Law, couples: Sequence[Couple], surface: Surface, p
 
     fields = (*law.parameters, *(() if law.linear_to is None else ("faint",)))
     return of_any_body(
-        slip.MODEL, name, surface,
+        slip.MODEL, variant,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=law.coupled is None) | ({REVERSAL_TIME} if law.name == "viscous" else set()),
         constants=record(surface, couples, fields, more),

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from functools import cache
 
 from sweep.models.general import rigid_body, starts
-from sweep.models.general.couples import COUPLES, Couple
+from sweep.models.general.common import SOLID, Variant
+from sweep.models.general.couples import COUPLES
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.noslip import rolling
 from sweep.models.general.slip import slipping
@@ -28,9 +29,6 @@ BASES = ("slip", "noslip")
 PAPER_LAW = "viscous"
 
 INERTIA = (*rigid_body.MOMENTS, *rigid_body.PRODUCTS)
-
-SOLID = "solid"
-"""Stands in place of the law in the names of variants without slip."""
 
 
 @dataclass(frozen=True)
@@ -55,33 +53,29 @@ def with_law(law: Law, *parameters: Parameter) -> SlipWith:
 
 
 @cache
-def variant(name: str, parameters: tuple[str, ...] = (), own: Law | None = None) -> Model:
-    """The model of a name, such as `slip+coulomb-tanh+sigma`.
+def made_of(variant: Variant, parameters: tuple[str, ...] = ()) -> Model:
+    """The model of a variant.
 
-    Parameters
-    ----------
-    parameters : those of the body and the start that it is asked to depend on; they make no difference to its kernel
-    own : the law that the name tells, if it is not one of `LAWS`
+    Its `parameters` are those of the body and the start that it is asked to depend on; they make no difference to its
+    kernel.
+    """
+    return slipping(variant, parameters) if variant.law else rolling(variant, parameters)
+
+
+def named(name: str, own: Law | None = None) -> Model:
+    """The model of a name, such as `slip+coulomb-tanh+sigma`; `own` is the law that it names if a user brings one.
 
     Raises
     ------
     KeyError
         if a part of the name is unknown.
     """
-    base, law, couples, surface = parts(name)
-    if base == "slip":
-        return slipping(name, own or LAWS[law], couples, surface, parameters)
-    if (base, law) == ("noslip", SOLID):
-        return rolling(name, couples, surface, parameters)
-    raise KeyError(name)
-
-
-def parts(name: str) -> tuple[str, str, list[Couple], Surface]:
-    """Read the name of a variant, or of another model: base, law, couples and surface."""
     base, _, rest = name.partition("+")
     law, *more = rest.split("+")
+    if base not in BASES or (base == "noslip") != (law == SOLID):
+        raise KeyError(name)
     surface = SURFACES[more.pop()] if more and more[-1] in SURFACES else ELLIPSOID
-    return base, law, [COUPLES[couple] for couple in more], surface
+    return made_of(Variant(None if law == SOLID else own or LAWS[law], tuple(COUPLES[each] for each in more), surface))
 
 
 @dataclass(frozen=True)
@@ -117,11 +111,9 @@ class Physics:
         system = ("mass", "gravity") if self.units == SI else ()
         by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
         start = by_angles if self.names & {*starts.ANGLES, *starts.SLIP} else starts.POINT
-        couples = [name for name, couple in COUPLES.items() if self.names & {*couple.parameters}]
+        couples = tuple(couple for couple in COUPLES.values() if self.names & {*couple.parameters})
         parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-        shape = [self.surface.name] if self.surface != ELLIPSOID else []
-        name = "+".join([base, self.law.name if base == "slip" else SOLID, *couples, *shape])
-        return variant(name, parameters, None if self.law.name in LAWS else self.law)
+        return made_of(Variant(self.law if base == "slip" else None, couples, self.surface), parameters)
 
     def misfits(self) -> dict[str, str]:
         """List the named parameters that do not go with the rest, and what to do about each."""

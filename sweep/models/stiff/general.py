@@ -19,9 +19,10 @@ from functools import cache
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.general import rigid_body, variants
+from sweep.models.general import rigid_body
 from sweep.models.general.bounds import couples_decay, strongest_grip
-from sweep.models.general.couples import Couple, damping_of
+from sweep.models.general.couples import damping_of
+from sweep.models.general.laws import LAWS
 from sweep.models.general.rigid_body import about_centre, about_contact, gyroscopic
 from sweep.models.general.surfaces import Surface
 from sweep.models.ladder import slip
@@ -46,14 +47,15 @@ def form_of(model: Model) -> StiffForm | None:
         return None
     if model.name == slip.MODEL.name:
         return PAPER_FORM
-    base, law, couples, surface = variants.parts(model.name)
-    if (base, law) != ("slip", "viscous") or any(couple.needs_normal_force for couple in couples):
+    of = model.variant
+    if of is None or of.law != LAWS["viscous"] or any(couple.needs_normal_force for couple in of.couples):
         return None
-    return _form_of(model, tuple(couples), surface)
+    return _form_of(model)
 
 
 @cache
-def _form_of(full: Model, couples: tuple[Couple, ...], surface: Surface) -> StiffForm:
+def _form_of(full: Model) -> StiffForm:
+    couples, surface = full.variant.couples, full.variant.surface
     contact, damping = surface.contact, damping_of(couples)
     fields = (*full.constants._fields, *ROCKING)
 
