@@ -112,14 +112,6 @@ def test_functions_are_compiled_for_the_arguments_that_they_get(monkeypatch: pyt
     assert signatures.keys() == set(made)
 
 
-def test_a_piece_that_does_not_exist_is_refused() -> None:
-    command = [sys.executable, "-m", "sweep.kernels.build", "theory", "dopri5", "averaged"]
-    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr
-        assert process.stderr.read().endswith("KeyError: 'theory'\n")
-        assert process.wait() == 1
-
-
 def test_measurements_without_a_place_in_the_kernel_share_it() -> None:
     def name(*measure: str) -> str:
         return str(kernel(measure=measure).advancing._cache._cache_file._index_name)

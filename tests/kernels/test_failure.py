@@ -52,11 +52,6 @@ def test_states_that_cannot_be_followed() -> None:
     assert (status, time) == (DIVERGED, 0.0)
 
 
-def test_a_body_that_is_in_the_air_at_once() -> None:
-    (status,), (time,) = met(columns(n0=30.0, x0=4.0, mu=20.0), 1.0)
-    assert (status, time) == (LIFT_OFF, 0.0)
-
-
 def test_each_cell_by_itself() -> None:
     bodies = {name: np.array([end[name] for end in ENDS.values()]) for name in columns()}
     together = met(bodies, 5.0)

@@ -1,17 +1,13 @@
 """No entry of a tableau is mistyped, and the end of its real stability is right."""
 
-import re
 from collections.abc import Iterator
-from dataclasses import replace
 from fractions import Fraction
 from math import prod
-from typing import Any
 
 import pytest
-from scipy.integrate import RK45
 
 from sweep.kernels.methods import METHODS
-from sweep.kernels.tableau import DOPRI5, TABLEAUS, Tableau
+from sweep.kernels.tableau import TABLEAUS, Tableau
 
 Tree = tuple["Tree", ...]
 """A rooted tree: the trees that its root carries, in order."""
@@ -74,37 +70,6 @@ def faults(tableau: Tableau) -> Iterator[str]:
 def test_no_entry_is_mistyped(tableau: Tableau) -> None:
     assert len(tableau.a) + 1 == len(tableau.b) == len(tableau.c)
     assert list(faults(tableau)) == []
-
-
-def test_equals_scipys_dormand_prince() -> None:
-    assert [[float(w) for w in row] for row in DOPRI5.a] == [list(RK45.A[i, :i]) for i in range(1, 6)]
-    assert [float(w) for w in DOPRI5.b] == list(RK45.B)
-
-
-def test_there_are_as_many_order_conditions_as_rooted_trees() -> None:
-    """Their numbers are those of Butcher (2016), table 300(I)."""
-    assert [len(trees(order)) for order in range(1, 8)] == [1, 1, 2, 4, 9, 20, 48]
-
-
-def shifted(row: tuple[Fraction, ...], *changes: int) -> tuple[Fraction, ...]:
-    """A row with thousandths added to its entries."""
-    more = (*changes, *[0] * (len(row) - len(changes)))
-    return tuple(w + Fraction(change, 1000) for w, change in zip(row, more, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        *(({"a": (*DOPRI5.a[:i], shifted(DOPRI5.a[i], 1), *DOPRI5.a[i + 1 :])}, "does not sum") for i in range(5)),
-        ({"a": (*DOPRI5.a[:3], shifted(DOPRI5.a[3], 1, -1), DOPRI5.a[4])}, "order condition"),
-        ({"b": shifted(DOPRI5.b, 1, 0, -1)}, r"order condition of the tree \(\(\),\) = 1/2"),
-        ({"order": 6}, "order condition"),
-        ({"real_stability": 3.0}, "real stability"),
-        ({"real_stability": 3.5}, "real stability"),
-    ],
-)
-def test_a_wrong_entry_is_found(wrong: dict[str, Any], words: str) -> None:
-    assert re.search(words, next(faults(replace(DOPRI5, **wrong))))
 
 
 def test_the_codes_of_methods_are_those_of_old_datasets() -> None:
