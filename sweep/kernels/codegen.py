@@ -14,13 +14,14 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from sweep.jit import compiled, full_width, inline
-from sweep.kernels.layout import LANES
+from sweep.kernels.layout import LANES, Layout, constants_of
+from sweep.models.model import Model
 
 GENERATED: dict[str, dict[str, Any]] = {}
 """What the names in each generated source are bound to, by the source's file name."""
 
 
-def make_load(names: Sequence[str], layout, record=None):
+def make_load(names: Sequence[str], layout: Layout, record=None):
     """Compiled (group, lane) -> the quantities `names` of one lane, as a tuple or as the `NamedTuple` `record`."""
     return make_gather("group, lane", (f"group[{layout.at(name)} + lane]" for name in names), record)
 
@@ -31,10 +32,20 @@ def make_gather(arguments: str, places: Iterable[str], record=None):
     return compile_inline("load", arguments, [f"return {made}"], {"record": record})
 
 
-def make_store(names: Sequence[str], layout):
+def make_store(names: Sequence[str], layout: Layout):
     """Compiled (group, lane, keep, new, old) -> None: sets the quantities `names` to `new` if `keep`, else to `old`."""
     lines = [f"group[{layout.at(name)} + lane] = new[{i}] if keep else old[{i}]" for i, name in enumerate(names)]
     return compile_inline("store", "group, lane, keep, new, old", lines, {})
+
+
+def make_access(model: Model, layout: Layout, states: Sequence[str] = ()):
+    """What a loop over lanes begins and ends with: functions that load the states and the constants, and store states.
+
+    They are those of `make_load` and `make_store`, for other `states` than the model's if some are named.
+    """
+    states = states or model.states
+    load_constants = make_load(constants_of(model), layout, model.constants)
+    return make_load(states, layout), load_constants, make_store(states, layout)
 
 
 def make_rest(n_states: int, spin_state: int):

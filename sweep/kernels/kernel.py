@@ -17,7 +17,7 @@ import numpy as np
 from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, call_all, make_load
 from sweep.kernels.lanes import STABLE, make_advance, make_look
-from sweep.kernels.layout import Layout, Table
+from sweep.kernels.layout import Layout, Table, constants_of
 from sweep.kernels.measures.measurement import RIPPLE, Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
@@ -95,7 +95,7 @@ class Kernel:
         self.stepper, self.model, self.measurements = stepper, stepper.model, tuple(measurements)
         self.method, self.measure = stepper.method, tuple(each.spec for each in measurements)
         self.follows = frozenset[str]().union(*(each.follows for each in measurements))
-        self.constants = tuple(f"constant.{name}" for name in self.model.constants._fields)
+        self.constants = constants_of(self.model)
         self.shared = next((each.shared for each in measurements if each.shared.size), np.empty((0, 0)))
         self._ripple = self.model.ripple if RIPPLE in self.follows else NO_RIPPLE
         self._ripples = tuple(f"ripple.{name}" for name in self._ripple.names)
@@ -107,7 +107,7 @@ class Kernel:
     def _make_advancing(self) -> Cached:
         may_settle = all_true("may_settle", "group, lane, spin, at_rest", self.hooks("make_may_settle"))
         measure = call_all("measure", "group, lane, seen", self.hooks("make_look"))
-        look = make_look(self.model, self.constants, self.layout, may_settle, measure, self.stepper.energy_gain)
+        look = make_look(self.model, self.layout, may_settle, measure, self.stepper.energy_gain)
         compare = call_all("compare", "group, lane, shared", self.hooks("make_compare"))
         advance = make_advance(self.stepper.make_run_block(self), look, compare, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)

@@ -7,12 +7,10 @@ the trajectory of a lane ends, its image is written back and the lane takes the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width, inline
-from sweep.kernels.codegen import make_load, make_rest, make_store
+from sweep.kernels.codegen import make_access, make_rest
 from sweep.kernels.layout import LANES, Layout
 from sweep.kernels.measures.measurement import Look
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
@@ -98,7 +96,7 @@ def make_advance(run_block, look, compare, layout: Layout):
     return advance
 
 
-def make_look(model: Model, constants: Sequence[str], layout: Layout, may_settle, measure, energy_gain: float):
+def make_look(model: Model, layout: Layout, may_settle, measure, energy_gain: float):
     """Compiled (group, stop_when_settled) -> None: checks all lanes between two blocks, and decides which ones end.
 
     Parameters
@@ -107,8 +105,7 @@ def make_look(model: Model, constants: Sequence[str], layout: Layout, may_settle
     measure : inline (group, lane, seen), what the measurements do at a look (see `Measurement.make_look`)
     energy_gain : share by which the energy of a body may apparently grow from one look to the next
     """
-    load_states, load_constants = make_load(model.states, layout), make_load(constants, layout, model.constants)
-    store_states = make_store(model.states, layout)
+    load_states, load_constants, store_states = make_access(model, layout)
     energy, rest = model.energy, make_rest(len(model.states), model.spin_state)
     saturates = bool(model.faint)
     will_settle = _make_will_settle(layout, may_settle, saturates)

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from sweep.jit import INTERPRETED
-from sweep.models.model import Array
+from sweep.models.model import Array, Model
 
 # Time per step and lane on one thread of a Zen 5 (slip model, AVX-512): 22.4 ns with 16 lanes, 24.2 ns with 8,
 # 24.4 ns with 32.  In plain Python idle lanes would cost as much as the others.
@@ -37,6 +37,11 @@ class Layout:
     def at(self, name: str) -> int:
         """Index in a group, as one array, at which the lanes of a quantity begin."""
         return self.index(name) * LANES
+
+
+def constants_of(model: Model) -> tuple[str, ...]:
+    """Names of the quantities that hold the constants of a model."""
+    return tuple(f"constant.{name}" for name in model.constants._fields)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 
 from sweep.jit import Cached, exactly_compiled, full_width, parallel
-from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
-from sweep.kernels.layout import LANES, Layout
+from sweep.kernels.codegen import compile_inline, make_access, tuple_of
+from sweep.kernels.layout import LANES, Layout, constants_of
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.samples import in_lanes
 from sweep.kernels.tableau import DOPRI5
@@ -51,9 +51,8 @@ def compiled_path(model: Model) -> Cached:
     from numba import prange
 
     n, moving = len(model.states), (*model.states, *_NAMES)
-    constants = tuple(f"constant.{name}" for name in model.constants._fields)
-    layout = Layout((*moving, *constants, "interval"))
-    load, load_constants = make_load(moving, layout), make_load(constants, layout, model.constants)
+    layout = Layout((*moving, *constants_of(model), "interval"))
+    load, load_constants, store = make_access(model, layout, moving)
     lines = [
         f"y = {tuple_of(f'z[{i}]' for i in range(n))}",
         "slopes, extras = rhs(y, p)",
@@ -61,8 +60,7 @@ def compiled_path(model: Model) -> Cached:
         f"return {tuple_of([*(f'slopes[{i}]' for i in range(n)), 'turning', 'along', 'across'])}, extras",
     ]
     extended = compile_inline("extended", "z, p", lines, {"rhs": model.rhs, "path": model.path})
-    store, step = make_store(moving, layout), make_step(DOPRI5, extended, len(moving))
-    INTERVAL, wide, lanes = layout.at("interval"), full_width(), LANES
+    step, INTERVAL, wide, lanes = make_step(DOPRI5, extended, len(moving)), layout.at("interval"), full_width(), LANES
 
     @exactly_compiled
     def follow(group, steps):

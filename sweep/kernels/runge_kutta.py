@@ -13,7 +13,7 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels import tangent
-from sweep.kernels.codegen import call_all, compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.codegen import call_all, compile_inline, make_access, tuple_of
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES
@@ -53,7 +53,7 @@ class RungeKutta(Stepper):
         if TANGENT not in kernel.follows:
             return run_block
         step = make_step(self.tableau, make_extended(self.model), 2 * len(self.model.states))
-        follow = tangent.make_follow(step, self.model, kernel.constants, kernel.layout)
+        follow = tangent.make_follow(step, self.model, kernel.layout)
 
         @exactly_compiled
         def run_both(group):
@@ -65,9 +65,7 @@ class RungeKutta(Stepper):
     def _make_steps(self, kernel: Kernel):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and calls the measurements after each."""
         model, layout = self.model, kernel.layout
-        load_states = make_load(model.states, layout)
-        load_constants = make_load(kernel.constants, layout, model.constants)
-        store_states = make_store(model.states, layout)
+        load_states, load_constants, store_states = make_access(model, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), kernel.make_watch()
         note = call_all("note", "group, number", kernel.hooks("make_note"))
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))

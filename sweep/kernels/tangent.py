@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
-from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.codegen import compile_inline, make_access, make_load, tuple_of
 from sweep.kernels.layout import BLOCK, LANES, Layout
 from sweep.models.model import Array, Model
 
@@ -41,17 +41,13 @@ def _places(model: Model) -> tuple[str, ...]:
     return tuple(f"{what}.{name}" for what in ("foot", "tangent") for name in model.states)
 
 
-def make_follow(step, model: Model, constants: tuple[str, ...], layout: Layout):
+def make_follow(step, model: Model, layout: Layout):
     """Compiled (group) -> None: lets the tangents of all lanes catch up with their trajectories.
 
-    Parameters
-    ----------
-    step : of the equations and their derivative, as made by `sweep.kernels.runge_kutta.make_step`
-    constants : names of the constants in the image
+    `step` is that of the equations and their derivative, as made by `sweep.kernels.runge_kutta.make_step`.
     """
     n, names = len(model.states), _places(model)
-    own, load, store = make_load(model.states, layout), make_load(names, layout), make_store(names, layout)
-    load_constants = make_load(constants, layout, model.constants)
+    own, (load, load_constants, store) = make_load(model.states, layout), make_access(model, layout, names)
     squares = " + ".join(f"z[{i}] * z[{i}]" for i in range(n, 2 * n))
     length = compile_inline("length", "z", [f"return np.sqrt({squares})"], {"np": np})
     # The states, and the tangent times a share.

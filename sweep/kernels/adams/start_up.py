@@ -27,14 +27,13 @@ from sweep.kernels.adams.step import (
     WORK,
     At,
     advance_lines,
-    constants,
     load_lines,
     names,
     places,
 )
 from sweep.kernels.adams.weights import plain_weights
 from sweep.kernels.codegen import compile_lanes
-from sweep.kernels.layout import LANES, Layout, Table
+from sweep.kernels.layout import LANES, Layout, Table, constants_of
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5
@@ -63,7 +62,7 @@ _POINTS, _POINT_SIZE = places(_POINT), len(_POINT) * LANES
 def layout(form: StiffForm) -> Layout:
     """The quantities that a group keeps of a trajectory."""
     more = ("spacing", "h", "status", "ticks", "work", "per_weight", *MATRIX)
-    return Layout((*form.model.states, *constants(form), *more))
+    return Layout((*form.model.states, *constants_of(form.model), *more))
 
 
 def count_levels(slip_decay: Array, step: Array) -> Array:

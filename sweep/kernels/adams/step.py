@@ -11,7 +11,7 @@ from typing import Any
 
 from sweep.jit import inline
 from sweep.kernels.codegen import tuple_of
-from sweep.kernels.layout import LANES
+from sweep.kernels.layout import LANES, constants_of
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
 from sweep.models.stiff.form import StiffForm
 
@@ -105,11 +105,6 @@ def make_solve(form: StiffForm):
     return solve
 
 
-def constants(form: StiffForm) -> tuple[str, ...]:
-    """The quantities of an image that hold the constants."""
-    return tuple(f"constant.{name}" for name in form.model.constants._fields)
-
-
 def names(form: StiffForm) -> dict[str, Any]:
     """Name what the generated lines refer to."""
     return {"solve": make_solve(form), "Constants": form.model.constants}
@@ -117,7 +112,10 @@ def names(form: StiffForm) -> dict[str, Any]:
 
 def load_lines(form: StiffForm, at: At) -> list[str]:
     """Lines that load the constants p and the states y."""
-    return [f"p = Constants{tuple_of(map(at, constants(form)))}", f"y = {tuple_of(map(at, form.model.states))}"]
+    return [
+        f"p = Constants{tuple_of(map(at, constants_of(form.model)))}",
+        f"y = {tuple_of(map(at, form.model.states))}",
+    ]
 
 
 def advance_lines(form: StiffForm, at: At) -> list[str]:
