@@ -96,7 +96,6 @@ class Kernel:
         self.method, self.measure = stepper.method, tuple(each.spec for each in measurements)
         self.follows = frozenset[str]().union(*(each.follows for each in measurements))
         self.constants = constants_of(self.model)
-        self.shared = next((each.shared for each in measurements if each.shared.size), np.empty((0, 0)))
         self._ripple = self.model.ripple if RIPPLE in self.follows else NO_RIPPLE
         self._ripples = tuple(f"ripple.{name}" for name in self._ripple.names)
         measured = (name for each in measurements for name in each.quantities)
@@ -108,11 +107,10 @@ class Kernel:
         may_settle = all_true("may_settle", "group, lane, spin, at_rest", self.hooks("make_may_settle"))
         measure = call_all("measure", "group, lane, seen", self.hooks("make_look"))
         look = make_look(self.model, self.layout, may_settle, measure, self.stepper.energy_gain)
-        compare = call_all("compare", "group, lane, shared", self.hooks("make_compare"))
-        advance = make_advance(self.stepper.make_run_block(self), look, compare, self.layout)
+        advance = make_advance(self.stepper.make_run_block(self), look, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
-        return parallel(advance, "(f8[:, ::1], i8[::1], i8, b1, i8, f8[:, ::1])", name)
+        return parallel(advance, "(f8[:, ::1], i8[::1], i8, b1, i8)", name)
 
     def make_watch(self):
         """Inline (group, lane, accepted, y, p, spin, work, h, now): what all measurements do after a step.
@@ -177,7 +175,7 @@ class Kernel:
 
         Returns after `blocks` blocks of steps in every lane, or earlier when all cells have ended.
         """
-        self.advancing(images, cells, blocks, stop_when_settled, threads(), self.shared)
+        self.advancing(images, cells, blocks, stop_when_settled, threads())
 
     def carry(self, images: Array) -> None:
         """Carry the images that are `QUIET` to where steps are needed again."""

@@ -34,11 +34,10 @@ MAX_ENERGY = 1e300
 NEGLIGIBLE = 1e-120
 
 
-def make_advance(run_block, look, compare, layout: Layout):
-    """Python function to be compiled: (images, cells, blocks, stop_when_settled, groups, shared) -> None.
+def make_advance(run_block, look, layout: Layout):
+    """Python function to be compiled: (images, cells, blocks, stop_when_settled, groups) -> None.
 
-    `run_block`, (group) -> None, and `look`, (group, stop_when_settled) -> None, are compiled functions; `compare`,
-    (group, lane, shared) -> None, is inline.
+    `run_block`, (group) -> None, and `look`, (group, stop_when_settled) -> None, are compiled functions.
     """
     from numba import prange
 
@@ -62,7 +61,7 @@ def make_advance(run_block, look, compare, layout: Layout):
             images[held[lane], row] = group[row * lanes + lane]
 
     @exactly_compiled
-    def run_group(images, cells, blocks, stop_when_settled, shared):
+    def run_group(images, cells, blocks, stop_when_settled):
         wide()
         # An idle lane computes on zeros.  What comes out is meaningless but harmless: its status keeps it from
         # being stored.
@@ -76,7 +75,6 @@ def make_advance(run_block, look, compare, layout: Layout):
             look(group, stop_when_settled)
             idle = 0
             for lane in range(lanes):
-                compare(group, lane, shared)
                 if group[status + lane] != RUNNING:
                     if held[lane] >= 0:
                         release(images, group, lane, held)
@@ -88,10 +86,10 @@ def make_advance(run_block, look, compare, layout: Layout):
             if held[lane] >= 0:
                 release(images, group, lane, held)
 
-    def advance(images, cells, blocks, stop_when_settled, groups, shared):
+    def advance(images, cells, blocks, stop_when_settled, groups):
         for g in prange(groups):
             wide()
-            run_group(images, cells[g::groups].copy(), blocks, stop_when_settled, shared)
+            run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
 
     return advance
 

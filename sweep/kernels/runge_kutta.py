@@ -13,7 +13,7 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels import tangent
-from sweep.kernels.codegen import call_all, compile_inline, make_access, tuple_of
+from sweep.kernels.codegen import compile_inline, make_access, tuple_of
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES
@@ -67,14 +67,13 @@ class RungeKutta(Stepper):
         model, layout = self.model, kernel.layout
         load_states, load_constants, store_states = make_access(model, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), kernel.make_watch()
-        note = call_all("note", "group, number", kernel.hooks("make_note"))
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         block, lanes, wide = BLOCK, LANES, full_width()
 
         @exactly_compiled
         def run_block(group):
             wide()
-            for number in range(block):
+            for _ in range(block):
                 for lane in range(lanes):
                     y = load_states(group, lane)
                     p = load_constants(group, lane)
@@ -87,7 +86,6 @@ class RungeKutta(Stepper):
                     failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
                     group[STATUS + lane] = failure if active & (not sound) else status
                     watch(group, lane, accepted, y, p, spin, work, h, (done + 1.0) * h)
-                note(group, number)
 
         return run_block
 
