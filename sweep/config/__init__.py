@@ -25,6 +25,7 @@ from sweep.faults import ConfigError, Fault
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
+from sweep.kernels.measures.measurement import TANGENT
 from sweep.models.general.laws import LAWS
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.general.variants import PAPER_LAW, Physics
@@ -236,7 +237,7 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
     """
     integrator, said, found = values.integrator, values.integrator.model_fields_set, dict[str, Any]()
     asked = [spec.partition("=")[0] for spec in values.measure or ()]
-    alone = any(MEASURES[name].every_step for name in asked)
+    alone = any(TANGENT in MEASURES[name].follows for name in asked)
     if "method" not in said or (alone and integrator.method == methods.AUTO):
         choice = isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
         found["method"] = methods.AUTO if choice and not alone else methods.PLAIN

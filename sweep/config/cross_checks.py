@@ -140,7 +140,7 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
         yield f"{name} cannot be measured on the {model.name} model; choose from {', '.join(possible)}"
     for needed in set(kind.needs) - {spec.partition("=")[0] for spec in config.measure}:
         yield f"{name} is measured with the {needed}; add {needed}"
-    if kind.every_step and method and not method.takes_every_step:
+    if TANGENT in kind.follows and method and not method.takes_every_step:
         able = either(each for each, found in methods.METHODS.items() if found.takes_every_step)
         yield f"{name} cannot be measured with method: {method.name}; choose {able}"
     elif kind is misfit.Misfit and config.film:

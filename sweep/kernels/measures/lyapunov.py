@@ -39,7 +39,6 @@ class Lyapunov(Measurement):
     asks = SPIN
     cost = 3.0
     follows = frozenset({TANGENT})
-    every_step = True
     quantities = ("bin_width", "bin_looks", "bin_growth", "full_bins", *_BIN_NAMES)
 
     variables = {

@@ -120,9 +120,8 @@ class Measurement:
     by_default: ClassVar[bool] = False
     """It is made if the configuration names no measurement, provided that the model supports it."""
     follows: ClassVar[frozenset[str]] = frozenset()
-    """What it uses in each step that is computed on request alone: `WORK`, `RIPPLE` or `TANGENT`."""
-    every_step: ClassVar[bool] = False
-    """It follows every step from t = 0 on, which needs a method that `Method.takes_every_step`."""
+    """What it uses in each step that is computed on request alone: `WORK`, `RIPPLE` or `TANGENT`.  A tangent needs a
+    method that `Method.takes_every_step`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
