@@ -22,14 +22,6 @@ def test_nearly_round_bodies_do_not_settle_ahead_of_a_reversal(method: str) -> N
     np.testing.assert_allclose(ours["t_last_reversal"], table["t_last_reversal"][rows], rtol=1e-3)
 
 
-def test_settled_means_that_nothing_changes_any_more() -> None:
-    cells = {"mu": [40.0, 60.0, 75.0], "n0": [0.05, 0.05, -0.004]}
-    ended, gone_on, _ = settled({"cases": cells}, 1.0, method="dopri5", t_end=9000)
-    assert (ended.t_stop < 0.7 * gone_on.t_stop).all()
-    spin = gone_on.spin_final
-    assert ((ended.n_c1_minus_linear < spin) & (spin < ended.n_c1_plus_linear)).all()
-
-
 def test_what_has_settled_beyond_n_c1_reverses_no_more() -> None:
     """Far beyond the paper's bodies, from 1 to 3.5 n_c1."""
     bodies, random = wide_bodies(200), np.random.default_rng(2)

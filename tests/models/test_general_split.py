@@ -7,7 +7,6 @@ from sweep.models import find
 from sweep.models.model import Columns
 from sweep.models.stiff import general as stiff_general
 from sweep.models.stiff.form import velocities
-from sweep.models.theory import linear
 from sweep.models.theory.rocking import frequencies, implicit
 
 COUNT = 40
@@ -88,13 +87,6 @@ def test_rocking_and_the_matrix_of_the_corrector_against_derivatives(name: str) 
     np.testing.assert_allclose(inverse @ (np.eye(4) - weight * J), np.eye(4) + 0 * J, atol=1e-12)
     both = np.sort(np.abs(np.linalg.eigvals(J).imag))[:, [0, -1]]
     np.testing.assert_allclose(np.transpose(frequencies(split.rocking(p))), both, rtol=1e-6, atol=1e-6)
-
-
-def test_products_of_inertia_with_the_vertical_are_allowed_for_in_the_frequencies() -> None:
-    skew, rolling, split = bodies(), find("noslip+solid"), stiff_general.form_of(find("slip+viscous"))
-    fastest = np.abs(np.linalg.eigvals(linear.jacobian(rolling, rolling.constants.of(skew), np.zeros(COUNT))).imag)
-    _, higher = frequencies(split.rocking(split.model.constants.of(skew)))
-    np.testing.assert_allclose(higher, fastest.max(axis=1), rtol=1e-12)
 
 
 def test_the_ripple_is_that_of_the_full_model() -> None:

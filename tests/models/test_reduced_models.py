@@ -76,13 +76,6 @@ def test_mirror_image_reverses_alike(name: str, write: Write) -> None:
         np.testing.assert_array_equal(one.reversals_predicted, image.reversals_predicted)
 
 
-def test_rolling_has_no_critical_spin(write: Write) -> None:
-    dataset = sweep.predict(write("model: noslip\n"))
-    assert np.isnan(dataset.n_c1_plus_linear)
-    assert np.isnan(dataset.n_c1_minus_linear)
-    assert not {"reversals_predicted", "n_c1_plus"} & set(dataset.data_vars)
-
-
 @given(small, small)
 def test_normal_coordinates_carry_the_potential_energy(x: float, y: float) -> None:
     body = columns(x0=x, y0=y)

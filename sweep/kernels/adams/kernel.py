@@ -31,7 +31,7 @@ from sweep.kernels.adams.step import (
     POINT,
     PREDICT,
     PREDICTOR_NODES,
-    WORK,
+    WORK_RULE,
     advance_lines,
     load_lines,
     names,
@@ -40,8 +40,7 @@ from sweep.kernels.adams.step import (
 from sweep.kernels.codegen import compile_inline
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES, Table
-from sweep.kernels.measures import measurement
-from sweep.kernels.measures.measurement import Stretch
+from sweep.kernels.measures.measurement import WORK, Stretch
 from sweep.kernels.method import Method
 from sweep.kernels.status import DIVERGED, RUNNING
 from sweep.models.model import MODES, Array, Columns, Model, stack
@@ -74,7 +73,7 @@ class Adams(Stepper):
     def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
         """What looks for small rattle need, the weights and the matrix P, and the history."""
         looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if MODES in self.model.offers else ()
-        powers = stretches.POWERS if measurement.WORK in follows else ()
+        powers = stretches.POWERS if WORK in follows else ()
         return (*looks, "begin", "spin", *powers, "gamma", "per_weight", *PREDICT, *CORRECT, *MATRIX, *_HISTORY)
 
     def images(
@@ -124,7 +123,7 @@ class Adams(Stepper):
         table.set_columns(self.model.states, ended.columns(self.model.states))
         table.set_columns(_HISTORY, history[:, :, :-1].reshape(len(history), -1))
         table["begin"], table["status"] = ended["ticks"] * ended["spacing"], ended["status"]
-        if measurement.WORK in kernel.follows:
+        if WORK in kernel.follows:
             table.set_columns(stretches.POWERS, history[:, :-4:-1, -1])
         spin, rattle, inertia = self.model.energy(*kernel.unpack(table.images))
         energy = rattle + 0.5 * inertia * spin**2
@@ -183,10 +182,10 @@ class Adams(Stepper):
                 return f"history[oldest + {points[name]} + lane]"
             return f"group[{kernel.layout.at(name)} + lane]"
 
-        if measurement.WORK in kernel.follows:
+        if WORK in kernel.follows:
             powers = ", ".join(map(at, stretches.POWERS))
             work = [f"p0, p1, p2 = {powers}", f"{powers} = power, p0, p1"]
-            work += [f"work = {WORK.format('power', 'p0', 'p1', 'p2')}"]
+            work += [f"work = {WORK_RULE.format('power', 'p0', 'p1', 'p2')}"]
         return [
             *load_lines(self.form, at),
             f"status, done, h, old = {at('status')}, {at('done')}, {at('step')}, {at('spin')}",

@@ -24,7 +24,7 @@ from sweep.kernels.adams.step import (
     PREDICTOR_NODES,
     SLIPS,
     SLOPES,
-    WORK,
+    WORK_RULE,
     At,
     advance_lines,
     load_lines,
@@ -215,7 +215,7 @@ def _advance(form: StiffForm, at: At) -> list[str]:
         *_begin_step(form, at),
         *advance_lines(form, at),
         f"{at('power8')} = power",
-        f"done = {WORK.format('power', at('power7'), at('power6'), at('power5'))}",
+        f"done = {WORK_RULE.format('power', at('power7'), at('power6'), at('power5'))}",
         *_end_step(at, "ticks"),
     ]
 

@@ -35,7 +35,7 @@ SLIPS = tuple(f"v{{}}_{i}" for i in range(2))
 POINT = (*SLOPES, *SLIPS)
 """Quantities of a point of the history, to be formatted with its slot: the slopes of (u, M), and the slip."""
 
-WORK = "h / 24.0 * (9.0 * {} + 19.0 * {} - 5.0 * {} + {})"
+WORK_RULE = "h / 24.0 * (9.0 * {} + 19.0 * {} - 5.0 * {} + {})"
 """The work of friction in a step by the Adams-Moulton formula of order four, to be formatted with its power at four
 points, newest first."""
 

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from sweep.jit import on_all_threads
-from sweep.kernels.layout import Table
+from sweep.kernels.layout import Table, constants_of
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.status import SETTLED
 from sweep.models.ladder import slip
@@ -23,7 +23,7 @@ from sweep.models.model import MODES, Array, stack
 from sweep.models.stiff.final_spin import Ending, ending
 from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum
 
-_NEEDED = {f"constant.{name}" for name in slip.Constants._fields}
+_NEEDED = {*constants_of(slip.MODEL)}
 
 _AT_A_TIME = 512
 """Cells whose ends one thread finds together, at 30 kB a cell while that goes on."""
