@@ -39,9 +39,9 @@ def make_store(names: Sequence[str], layout: Layout):
 
 
 def make_access(model: Model, layout: Layout, states: Sequence[str] = ()):
-    """What a loop over lanes begins and ends with: functions that load the states and the constants, and store states.
+    """Make what a loop over lanes begins and ends with: load the states, load the constants, store the states.
 
-    They are those of `make_load` and `make_store`, for other `states` than the model's if some are named.
+    See `make_load` and `make_store`; `states` stand in place of those of the model.
     """
     states = states or model.states
     load_constants = make_load(constants_of(model), layout, model.constants)

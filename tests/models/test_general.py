@@ -11,13 +11,12 @@ from support import cells as all_cells
 from support.physics import KANE_LEVINSON
 
 from sweep.models import find
-from sweep.models.general import rigid_body
+from sweep.models.general import rigid_body, variants
 from sweep.models.general import ripple as general_ripple
 from sweep.models.general.bounds import strongest_grip
 from sweep.models.general.couples import COUPLES as KINDS
 from sweep.models.general.laws import LAWS, tanh_ratio
 from sweep.models.general.surfaces import ELLIPSOID, PARABOLOID, Surface
-from sweep.models.general.variants import named
 from sweep.models.ladder import noslip
 from sweep.models.model import LINEAR, Model, take
 from sweep.models.theory import linear, stability
@@ -302,4 +301,4 @@ def test_every_law_is_viscous_to_the_linear_theory() -> None:
 def test_unknown_variants() -> None:
     for name in ("slip+magic", "noslip+viscous", "averaged+viscous", "slip+viscous+magic"):
         with pytest.raises(KeyError):
-            named(name)
+            variants.find(name)

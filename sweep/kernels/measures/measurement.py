@@ -72,7 +72,7 @@ class Step(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What a look has found of a lane, as `Measurement.make_look` gets it."""
+    """What a look finds in a lane, as `Measurement.make_look` gets it."""
 
     running: bool
     """Whether the trajectory was running before the look."""
@@ -120,7 +120,7 @@ class Measurement:
     by_default: ClassVar[bool] = False
     """It is made if the configuration names no measurement, provided that the model supports it."""
     follows: ClassVar[frozenset[str]] = frozenset()
-    """What it uses in each step that is computed on request alone: `WORK`, `RIPPLE` or `TANGENT`.  A tangent needs a
+    """What it needs in each step, which is computed only on request: `WORK`, `RIPPLE` or `TANGENT`.  A tangent needs a
     method that `Method.takes_every_step`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
@@ -183,7 +183,7 @@ class Measurement:
         """
 
     def make_look(self, layout: Layout):
-        """Inline (group, lane, seen) -> None, called at every look with what it has found, a `Look`."""
+        """Inline (group, lane, seen) -> None, called at every look with what it finds, a `Look`."""
 
     def skip(self, table: Table, stretch: Stretch) -> None:
         """Account, in `table`, for a stretch that its images have covered without steps: start-up or a leap.

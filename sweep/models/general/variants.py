@@ -53,7 +53,7 @@ def with_law(law: Law, *parameters: Parameter) -> SlipWith:
 
 
 @cache
-def made_of(variant: Variant, parameters: tuple[str, ...] = ()) -> Model:
+def make(variant: Variant, parameters: tuple[str, ...] = ()) -> Model:
     """The model of a variant.
 
     Its `parameters` are those of the body and the start that it is asked to depend on; they make no difference to its
@@ -62,7 +62,7 @@ def made_of(variant: Variant, parameters: tuple[str, ...] = ()) -> Model:
     return slipping(variant, parameters) if variant.law else rolling(variant, parameters)
 
 
-def named(name: str, own: Law | None = None) -> Model:
+def find(name: str, own: Law | None = None) -> Model:
     """The model of a name, such as `slip+coulomb-tanh+sigma`; `own` is the law that it names if a user brings one.
 
     Raises
@@ -75,7 +75,7 @@ def named(name: str, own: Law | None = None) -> Model:
     if base not in BASES or (base == "noslip") != (law == SOLID):
         raise KeyError(name)
     surface = SURFACES[more.pop()] if more and more[-1] in SURFACES else ELLIPSOID
-    return made_of(Variant(None if law == SOLID else own or LAWS[law], tuple(COUPLES[each] for each in more), surface))
+    return make(Variant(None if law == SOLID else own or LAWS[law], tuple(COUPLES[each] for each in more), surface))
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Physics:
         start = by_angles if self.names & {*starts.ANGLES, *starts.SLIP} else starts.POINT
         couples = tuple(couple for couple in COUPLES.values() if self.names & {*couple.parameters})
         parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-        return made_of(Variant(self.law if base == "slip" else None, couples, self.surface), parameters)
+        return make(Variant(self.law if base == "slip" else None, couples, self.surface), parameters)
 
     def misfits(self) -> dict[str, str]:
         """List the named parameters that do not go with the rest, and what to do about each."""
