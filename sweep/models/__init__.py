@@ -9,7 +9,7 @@ MODELS: dict[str, Model] = {module.MODEL.name: module.MODEL for module in (slip,
 
 def find(name: str) -> Model:
     """The model of a name: one of `MODELS`, or a variant such as `slip+coulomb-tanh+sigma`."""
-    return MODELS[name] if name in MODELS else variants.find(name)
+    return MODELS[name] if name in MODELS else variants.variant(name)
 
 
 TIERS: dict[str, Tier] = {**MODELS, analytic.MODEL.name: analytic.MODEL}

@@ -301,4 +301,4 @@ def test_every_law_is_viscous_to_the_linear_theory() -> None:
 def test_unknown_variants() -> None:
     for name in ("slip+magic", "noslip+viscous", "averaged+viscous", "slip+viscous+magic"):
         with pytest.raises(KeyError):
-            variants.find(name)
+            variants.variant(name)

@@ -62,7 +62,7 @@ def make(variant: Variant, parameters: tuple[str, ...] = ()) -> Model:
     return slipping(variant, parameters) if variant.law else rolling(variant, parameters)
 
 
-def find(name: str, own: Law | None = None) -> Model:
+def variant(name: str, own: Law | None = None) -> Model:
     """The model of a name, such as `slip+coulomb-tanh+sigma`; `own` is the law that it names if a user brings one.
 
     Raises

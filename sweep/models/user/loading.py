@@ -108,4 +108,4 @@ def find(origin: Origin, physics: Physics) -> Model:
 def compiled_as(origin: Origin, name: str) -> Model:
     """The model whose compiled code has the key "name@digest"."""
     made = load(origin)
-    return made if isinstance(made, Model) else replace(variants.find(name, made.law), origin=origin)
+    return made if isinstance(made, Model) else replace(variants.variant(name, made.law), origin=origin)
