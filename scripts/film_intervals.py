@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 from short_steps import bodies
 
 import sweep
-from sweep.kernels.measures.misfit import Film
+from sweep.config.film import Film
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from support import newton

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from sweep.config import Config, ConfigError, ConfigLike, load_config
+    from sweep.config.film import Film
     from sweep.engine.cluster import Cluster
     from sweep.engine.reporter import Reporter
     from sweep.explorer.server import Beside
-    from sweep.kernels.measures.misfit import Film
     from sweep.plots.animation import animate
     from sweep.plots.picture import plot
     from sweep.results.store import StoreError
@@ -284,7 +284,7 @@ def fit(
         where it may be negative.  All others have one value
     film : a table of numbers with a header: a time, and a spin ("spin (rad/s)"), what a phone on the body tells
         ("Gyroscope z (rad/s)") or a heading ("angle (deg)"); with a column "error", intervals follow from that, and
-        else from the residuals.  Or a `sweep.kernels.measures.misfit.Film`
+        else from the residuals.  Or a `sweep.config.film.Film`
     free : names of the parameters to find.  Of the film itself, film_delay, film_bias, film_lean_x and film_lean_y can
         be found too
     laws : laws of friction to compare, such as ``["viscous", "coulomb-tanh"]``.  Each takes from `config` what that

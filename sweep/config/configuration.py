@@ -15,11 +15,12 @@ from ruamel.yaml.compat import StringIO
 
 from sweep.config.distributions import Distribution
 from sweep.config.document import Document
+from sweep.config.film import Film
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
 from sweep.faults import Fault, Path
 from sweep.grid import CASE, SAMPLE, Grid
-from sweep.kernels.measures.misfit import Film, Misfit
+from sweep.kernels.measures.misfit import Misfit
 from sweep.models import TIERS
 from sweep.models.general import laws
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import get_args
 
@@ -11,7 +14,7 @@ import numpy as np
 
 from sweep.faults import ConfigError, Fault, brief, either
 from sweep.grid import Array
-from sweep.kernels.measures.misfit import Film, Seen
+from sweep.kernels.samples import Seen
 
 MOST_ROWS = 20_000
 """Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
@@ -30,6 +33,36 @@ _NAMES: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "heading": (_ANGLES, ("heading", "angle", "theta")),
     "error": ({}, ("error", "sigma", "uncertainty")),  # in a unit of what is seen
 }
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """What was seen, from its first instant on; arrays of shape (instants,)."""
+
+    time: Array
+    """Since the first instant, in the unit of time of the configuration: s in SI."""
+    value: Array
+    error: Array | None = None
+    """Standard error of each value, if the film gives it."""
+    what: Seen = "spin"
+    """What the values are: the spin; the angular velocity about the axis of the body that points upwards at rest; or
+    the angle in radian, without wraps, by which the body's x axis has turned, seen from above."""
+    left_out: int = 0
+    """Rows that hold no number, or that are too many."""
+
+    @property
+    def errors(self) -> Array:
+        """The standard errors, which are one if the film does not give them."""
+        return np.ones_like(self.time) if self.error is None else self.error
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of everything that determines a misfit."""
+        rows = np.stack([self.time, self.value, self.errors])
+        return hashlib.sha256(rows.tobytes() + self.what.encode()).hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Film) and self.sha256 == other.sha256
 
 
 def read(path: str | Path) -> Film:

@@ -18,6 +18,7 @@ from sweep.config import Config
 from sweep.engine import final
 from sweep.engine.errors import Errors
 from sweep.engine.executor import Work
+from sweep.engine.misfits import misfits
 from sweep.engine.plan import Part, Plan, kernel_of, steps_of
 from sweep.grid import Array
 from sweep.kernels.measures.sensitivity import SHORTER, Sensitivity
@@ -72,7 +73,7 @@ def verify(config: Config, cells: Array, first: Mapping[str, Array], work: Work)
 
 def results(job: Plan, errors: Errors | None, work: Work) -> dict[str, Array]:
     """Collect what was simulated, and what further runs tell of it, by name, each over all cells of `job`."""
-    found = job.results()
+    found = job.results() | misfits(job)
     if errors is None:
         return found | _counted(job, None, work)
     found |= {"spin_error": errors.told} | _counted(job, errors.reversals, work)

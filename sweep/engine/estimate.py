@@ -69,6 +69,8 @@ def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share
         method = METHODS[each.method]
         work = method.step_cost * relative * (theirs + method.start_up_cost)
         work *= 1 + 1 / method.companion if config.integrator.estimate_errors else 1
+        if config.film:
+            work += relative * config.film.time[-1] / automatic_step(PLAIN, config.equations, each.columns)[0]
         yield np.resize(work, round(len(work) * share))
     if config.verify:
         again = chosen[0]

@@ -158,7 +158,7 @@ def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
 
 def kernel_of(method: str, config: Config) -> Kernel:
     """The kernel of a method for the model and the measurements of a configuration."""
-    return _kernel(method, config.equations, config.measure, config.integrator.tolerance, config.film)
+    return _kernel(method, config.equations, config.measure, config.integrator.tolerance)
 
 
 def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:

@@ -2,9 +2,9 @@
 
     python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
-A PIECE is `kernel`, or what else runs need: `images` and `endings`, `path` for single trajectories, and `approach` once
-a trajectory has failed.  A MODEL that a user brings is "name@digest", and the record of its origin comes as a line of
-standard input.
+A PIECE is `kernel`, or what else runs need: `images` and `endings`, `samples` for a misfit, `path` for single
+trajectories, and `approach` once a trajectory has failed.  A MODEL that a user brings is "name@digest", and
+the record of its origin comes as a line of standard input.
 
 Processes, because the code that Numba executes right after compiling is not the code that it caches: functions that a
 kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of sums differ (seen
@@ -28,8 +28,10 @@ from sweep.interrupt import point
 from sweep.jit import Cached, compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compiled_approach
 from sweep.kernels.kernel import Kernel
+from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
 from sweep.kernels.path import compiled_path
+from sweep.kernels.samples import compiled_samples
 from sweep.models import find
 from sweep.models.model import MODES, Model
 from sweep.models.origin import Origin
@@ -40,18 +42,19 @@ from sweep.models.user.blame import blamed
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and where the model comes from."""
 
-KERNEL, IMAGES, ENDINGS, PATH, APPROACH = "kernel", "images", "endings", "path", "approach"
+KERNEL, IMAGES, ENDINGS, SAMPLES, PATH, APPROACH = "kernel", "images", "endings", "samples", "path", "approach"
 
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
     IMAGES: lambda kernel: kernel.filling(),
     ENDINGS: lambda kernel: (compiled_following(),) if MODES in kernel.model.offers else (),
+    SAMPLES: lambda kernel: (compiled_samples(kernel.model, "spin"),),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
     APPROACH: lambda kernel: (compiled_approach(kernel.model),),
 }
 """The compiled functions of each piece."""
 
-_SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, PATH: 4.0, APPROACH: 4.0}
+_SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, SAMPLES: 3.0, PATH: 4.0, APPROACH: 4.0}
 """Time to compile a piece that is no kernel (`scripts/run_costs.py`)."""
 
 _POLL = 0.05
@@ -103,7 +106,8 @@ def try_compiling(model: Model) -> None:
 
 def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """Name what the cache lacks to run `kernel`, by the arguments of this module, the longest first."""
-    for piece in (KERNEL, IMAGES, ENDINGS, *also):
+    samples = [SAMPLES] if Misfit.name in kernel.measure else []
+    for piece in (KERNEL, IMAGES, ENDINGS, *samples, *also):
         if any(function.is_missing() for function in _PIECES[piece](kernel)):
             method = kernel.method if piece in (KERNEL, IMAGES) else PLAIN
             measure = (each.spec for each in kernel.measurements if each.in_kernel and piece == KERNEL)

@@ -56,8 +56,6 @@ class Kernel:
     measurements: tuple[Measurement, ...]
     measure: tuple[str, ...]
     """The specs of the measurements."""
-    shared: Array
-    """What the measurements compare with."""
     advancing: Cached
     """The compiled function behind `advance`."""
 
@@ -65,7 +63,6 @@ class Kernel:
         """Name the quantities of an image: states, constants, what every kernel needs, measurements, and `more`."""
         self.model, self.measurements = model, tuple(measurements)
         self.measure = tuple(each.spec for each in measurements)
-        self.shared = next((each.shared for each in measurements if each.shared.size), np.empty((0, 0)))
         self.constants = tuple(f"constant.{name}" for name in model.constants._fields)
         measured = (name for each in self.measurements for name in each.quantities)
         self._ripple = model.ripple if self.follows_ripple else NO_RIPPLE
@@ -108,11 +105,10 @@ class Kernel:
         looks = self._hooks("make_look")
         measure = call_all("measure", "group, lane, running, ended, spin, rattle, J, total", looks)
         look = make_look(self.model, self.constants, self.layout, may_settle, measure, self.energy_gain)
-        compare = call_all("compare", "group, lane, shared", self._hooks("make_compare"))
-        advance = make_advance(run_block, look, compare, self.layout)
+        advance = make_advance(run_block, look, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
-        types = "(f8[:, ::1], i8[::1], i8, b1, i8, f8[:, ::1])"
+        types = "(f8[:, ::1], i8[::1], i8, b1, i8)"
         self.advancing = parallel(advance, types, name)
 
     def table(self, images: Array) -> Table:
@@ -158,7 +154,7 @@ class Kernel:
 
         Returns after `blocks` blocks of steps in every lane, or earlier when all cells have ended.
         """
-        self.advancing(images, cells, blocks, stop_when_settled, threads(), self.shared)
+        self.advancing(images, cells, blocks, stop_when_settled, threads())
 
     def carry(self, images: Array) -> None:
         """Carry the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""

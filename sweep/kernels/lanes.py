@@ -36,11 +36,10 @@ MAX_ENERGY = 1e300
 NEGLIGIBLE = 1e-120
 
 
-def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any:
-    """Python function to be compiled: (images, cells, blocks, stop_when_settled, groups, shared) -> None.
+def make_advance(run_block: Any, look: Any, layout: Layout) -> Any:
+    """Python function to be compiled: (images, cells, blocks, stop_when_settled, groups) -> None.
 
-    `run_block`, (group) -> None, and `look`, (group, stop_when_settled) -> None, are compiled functions; `compare`,
-    (group, lane, shared) -> None, is inline.
+    `run_block`, (group) -> None, and `look`, (group, stop_when_settled) -> None, are compiled functions.
     """
     from numba import prange
 
@@ -64,7 +63,7 @@ def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any
             images[held[lane], row] = group[row * lanes + lane]
 
     @exactly_compiled
-    def run_group(images: Any, cells: Any, blocks: int, stop_when_settled: bool, shared: Any) -> None:
+    def run_group(images: Any, cells: Any, blocks: int, stop_when_settled: bool) -> None:
         wide()
         # An idle lane computes on zeros.  What comes out is meaningless but harmless: its status keeps it from
         # being stored.
@@ -78,7 +77,6 @@ def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any
             look(group, stop_when_settled)
             idle = 0
             for lane in range(lanes):
-                compare(group, lane, shared)
                 if group[status + lane] != RUNNING:
                     if held[lane] >= 0:
                         release(images, group, lane, held)
@@ -90,10 +88,10 @@ def make_advance(run_block: Any, look: Any, compare: Any, layout: Layout) -> Any
             if held[lane] >= 0:
                 release(images, group, lane, held)
 
-    def advance(images: Any, cells: Any, blocks: int, stop_when_settled: bool, groups: int, shared: Any) -> None:
+    def advance(images: Any, cells: Any, blocks: int, stop_when_settled: bool, groups: int) -> None:
         for g in prange(groups):
             wide()
-            run_group(images, cells[g::groups].copy(), blocks, stop_when_settled, shared)
+            run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
 
     return advance
 

@@ -9,7 +9,6 @@ import numpy as np
 from sweep.kernels import measures, runge_kutta
 from sweep.kernels.adams import kernel as adams
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.measures.misfit import Film
 from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method
 from sweep.kernels.tableau import TABLEAUS
 from sweep.models.model import Array, Columns, Model
@@ -44,11 +43,9 @@ def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> 
     return np.array(names)[chosen], steps, rules
 
 
-def make_kernel(
-    method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE, film: Film | None = None
-) -> Kernel:
+def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:
     """The kernel of a method, not compiled yet, for a model and for measurements given by their specs."""
-    return METHODS[method].kernel(model, measures.chosen(measure, film), tolerance)
+    return METHODS[method].kernel(model, measures.chosen(measure), tolerance)
 
 
 def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:

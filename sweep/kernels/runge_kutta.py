@@ -15,7 +15,7 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels import tangent
-from sweep.kernels.codegen import call_all, compile_inline, make_load, make_store, tuple_of
+from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_of
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, steps_to
 from sweep.kernels.layout import BLOCK, LANES
@@ -66,14 +66,13 @@ class RungeKuttaKernel(Kernel):
         load_constants = make_load(self.constants, layout, model.constants)
         store_states = make_store(model.states, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), self._make_watch()
-        note = call_all("note", "group, number", self._hooks("make_note"))
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         block, lanes, wide = BLOCK, LANES, full_width()
 
         @exactly_compiled
         def run_block(group: Any) -> None:
             wide()
-            for number in range(block):
+            for _ in range(block):
                 for lane in range(lanes):
                     y = load_states(group, lane)
                     p = load_constants(group, lane)
@@ -86,7 +85,6 @@ class RungeKuttaKernel(Kernel):
                     failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
                     group[STATUS + lane] = failure if active & (not sound) else status
                     watch(group, lane, accepted, y, p, spin, work, h, (done + 1.0) * h)
-                note(group, number)
 
         return run_block
 

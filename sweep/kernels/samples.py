@@ -1,13 +1,14 @@
-"""Samples what is seen of many trajectories at instants that they share: no images, no looks, no counts.
+"""Samples what a film shows of many trajectories at instants that they share: no images, no looks, no counts.
 
-The steps are dopri5's, and a whole number of them leads from one instant to the next.  Trajectories side by side take
-the same number, so that those which differ little, as the columns of a Jacobian do, differ smoothly.
+The steps are dopri5's, and a whole number of them leads from one instant to the next.  The number follows from a cell's
+own step, so that cells with the same step, as the columns of a Jacobian have, differ smoothly, and no cell depends on
+those beside it.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,38 +17,47 @@ from sweep.kernels.codegen import compile_inline, make_load, make_store, tuple_o
 from sweep.kernels.layout import LANES, Layout
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.tableau import DOPRI5
+from sweep.models import attitude
 from sweep.models.model import Array, Columns, Model, stack
+
+Seen = Literal["spin", "gyroscope", "heading"]
+"""What a film can show."""
 
 
 def sampled(
     model: Model,
     columns: Columns,
     step: Array,
-    interval: float,
-    count: int,
-    seen: Any = None,
-    axis: Array | None = None,
+    times: Array,
+    what: Seen = "spin",
+    delay: Array | None = None,
+    longest_delay: float = 0.0,
 ) -> Array:
-    """Spins at the times 0, `interval`, …, shape (cells, count); NaN from where a body lifts off or a run diverges.
+    """Follow trajectories through the instants of a film, shape (cells, instants).
+
+    Values are NaN from where a body lifts off or a run diverges.  A model without attitude shows its spin to a
+    gyroscope, and its integral as the heading.
 
     Parameters
     ----------
     columns : physical parameters by name, each of shape (cells,)
-    step : the longest steps wanted, shape (cells,)
-    interval : from one instant to the next, in the model's unit of time, as `step`
-    count : number of instants
-    seen : in place of the spin: inline (states, spin, axis) -> number
-    axis : of the body, which `seen` needs; its components along the axes of the states, shape (3, cells)
+    step : the longest steps wanted, in the model's unit of time as `times`, shape (cells,)
+    times : the instants, ascending, of which none is negative, shape (instants,)
+    delay : from the start of each trajectory to `times` = 0, shape (cells,); by default there is none
+    longest_delay : the number of steps of the delay follows from this, so that it does not depend on the delay
     """
     if not len(step):
-        return np.empty((0, count))
-    axis = np.zeros((3, len(step))) if axis is None else axis
-    rows = np.concatenate([stack(model.start(columns)), stack(tuple(model.constants.of(columns))), axis])
-    order, steps, lanes = in_lanes(rows, np.ceil(interval / step).astype(np.int64))
-    spins = np.empty((len(steps), count, LANES))
-    _compiled(model, seen or _spin)(lanes, interval / steps, steps, spins)
-    found = np.empty((len(order), count))
-    found[order] = spins.transpose(0, 2, 1).reshape(-1, count)[: len(order)]
+        return np.empty((0, len(times)))
+    zero, angle = np.zeros_like(step), model.turned(columns)
+    early = zero if delay is None else longest_delay - delay
+    motion = (*model.start(columns), zero) if what == "heading" else model.start(columns)
+    own = np.cos(angle), np.sin(angle), step, early, zero, zero, zero
+    rows = stack((*motion, *model.constants.of(columns), *own))
+    order, _, lanes = in_lanes(rows, -step)
+    shown = np.empty((len(lanes), len(times), LANES))
+    compiled_samples(model, what)(lanes, np.diff(times, prepend=-longest_delay), shown)
+    found = np.empty((len(order), len(times)))
+    found[order] = shown.transpose(0, 2, 1).reshape(-1, len(times))[: len(order)]
     return found
 
 
@@ -73,37 +83,70 @@ def in_lanes(rows: Array, needed: Array) -> tuple[Array, Array, Array]:
     return order, steps, np.ascontiguousarray(lanes).reshape(groups, -1)
 
 
+@cache
+def compiled_samples(model: Model, what: Seen) -> Cached:
+    """Compiled (lanes, gaps, shown) -> None: `sampled` for groups of lanes."""
+    from numba import prange
+
+    heads = what == "heading"
+    states = (*model.states, "heading") if heads else model.states
+    constants = tuple(f"constant.{name}" for name in model.constants._fields)
+    layout = Layout((*states, *constants, "cos", "sin", "step", "early", "steps", "length", "lost"))
+    load, store = make_load(states, layout), make_store(states, layout)
+    load_constants, load_axis = make_load(constants, layout, model.constants), make_load(("cos", "sin"), layout)
+    both = {"constants": load_constants, "axis": load_axis}
+    load_both = compile_inline("load", "group, lane", ["return constants(group, lane), axis(group, lane)"], both)
+    load_known, rhs = (load_both, _with_heading(model)) if heads else (load_constants, model.rhs)
+    step, show = make_step(DOPRI5, rhs, len(states)), _make_show(model, what)
+    STEP, EARLY, STEPS, LENGTH, LOST = map(layout.at, ("step", "early", "steps", "length", "lost"))
+    wide, lanes = full_width(), LANES
+
+    @exactly_compiled
+    def follow(group: Any, gaps: Any, shown: Any) -> None:
+        wide()
+        for k in range(len(gaps)):
+            most = 0.0
+            for lane in range(lanes):
+                steps = np.ceil(gaps[k] / group[STEP + lane])
+                length = gaps[k] - (group[EARLY + lane] if k == 0 else 0.0)
+                group[STEPS + lane], group[LENGTH + lane] = steps, length / max(steps, 1.0)
+                most = max(most, steps)
+            for number in range(int(most)):
+                for lane in range(lanes):
+                    y = load(group, lane)
+                    new, _, _, sound, _, _ = step(y, load_known(group, lane), group[LENGTH + lane])
+                    active = number < group[STEPS + lane]
+                    store(group, lane, active, new, y)
+                    group[LOST + lane] = 1.0 if active & (not sound) else group[LOST + lane]
+            for lane in range(lanes):
+                value = show(load(group, lane), load_constants(group, lane))
+                shown[k, lane] = np.nan if group[LOST + lane] > 0.0 else value
+
+    def run(groups: Any, gaps: Any, shown: Any) -> None:
+        for g in prange(len(groups)):
+            follow(groups[g], gaps, shown[g])
+
+    return parallel(run, "(f8[:, ::1], f8[::1], f8[:, :, ::1])", f"samples-{what}-{model.key}")
+
+
+def _with_heading(model: Model) -> Any:
+    """Inline (states, (constants, axis)) -> slopes and extras as of `Model.rhs`, with the heading as the last state."""
+    n = len(model.states)
+    lines = [
+        "p, axis = q",
+        f"slopes, extras = rhs({tuple_of(f'z[{i}]' for i in range(n))}, p)",
+        f"return {tuple_of([*(f'slopes[{i}]' for i in range(n)), 'turning(z, extras[0], axis)'])}, extras",
+    ]
+    turning = attitude.turning if model.path else _spin
+    return compile_inline("extended", "z, q", lines, {"rhs": model.rhs, "turning": turning})
+
+
 @inline
 def _spin(y: Any, spin: Any, axis: Any) -> Any:  # noqa: ARG001
     return spin
 
 
-@cache
-def _compiled(model: Model, seen: Any) -> Cached:
-    """Compiled (lanes, h, steps, spins) -> None: `sampled` for groups of lanes."""
-    from numba import prange
-
-    constants, axis = tuple(f"constant.{name}" for name in model.constants._fields), ("axis_1", "axis_2", "axis_3")
-    layout, n = Layout((*model.states, *constants, *axis)), len(model.states)
-    load_states, load_axis = make_load(model.states, layout), make_load(axis, layout)
-    load_constants = make_load(constants, layout, model.constants)
-    store, step, wide, lanes = make_store(model.states, layout), make_step(DOPRI5, model.rhs, n), full_width(), LANES
-    lost = compile_inline("lost", "", [f"return {tuple_of(['np.nan'] * n)}"], {"np": np})
-
-    @exactly_compiled
-    def follow(group: Any, h: float, steps: int, spins: Any) -> None:
-        wide()
-        for k in range(len(spins)):
-            for i in range(steps):
-                for lane in range(lanes):
-                    y = load_states(group, lane)
-                    new, spin, _, sound, _, _ = step(y, load_constants(group, lane), h)
-                    store(group, lane, sound, new, lost())
-                    spins[k, lane] = seen(y, spin, load_axis(group, lane)) if i == 0 else spins[k, lane]
-
-    def run(groups: Any, h: Any, steps: Any, spins: Any) -> None:
-        for g in prange(len(groups)):
-            follow(groups[g], h[g], steps[g], spins[g])
-
-    types = "(f8[:, ::1], f8[::1], i8[::1], f8[:, :, ::1])"
-    return parallel(run, types, f"samples-{seen.__name__}-{model.key}")
+def _make_show(model: Model, what: Seen) -> Any:
+    """Inline (states, constants) -> what a film shows."""
+    shown = {"heading": "y[-1]", "gyroscope": "-y[4]" if model.path else ""}.get(what) or "energy(y, p)[0]"
+    return compile_inline("show", "y, p", [f"return {shown}"], {"energy": model.energy})

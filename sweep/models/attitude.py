@@ -64,16 +64,13 @@ def _rates(u1: Any, u3: Any, w1: Any, w3: Any, velocity: Any, along: Any, across
 
 @inline
 def turning(y: Any, spin: Any, axis: Any) -> Any:
-    """The rate at which an axis of the body turns, seen from above, of states that begin with (u1, u2, ω1, ω2, ω3)."""
-    (u1, u2, w1, w2, w3), (e1, e2, e3) = y[:5], axis
-    upright = e1 * u1 + e2 * u2 - e3 * np.sqrt(1 - u1 * u1 - u2 * u2)
-    return (spin - upright * (e1 * w1 + e2 * w2 + e3 * w3)) / (1 - upright * upright)
+    """The rate at which an axis of the body in its x-y plane, given by its components, turns, seen from above.
 
-
-@inline
-def rate(y: Any, spin: Any, axis: Any) -> Any:  # noqa: ARG001
-    """The angular velocity about an axis of the body, as a gyroscope on it tells; the arguments are as of `turning`."""
-    return axis[0] * y[2] + axis[1] * y[3] + axis[2] * y[4]
+    The states y begin with (u1, u2, ω1, ω2, ω3).
+    """
+    (u1, u2, w1, w2, _), (e1, e2) = y[:5], axis
+    upright = e1 * u1 + e2 * u2
+    return (spin - upright * (e1 * w1 + e2 * w2)) / (1 - upright * upright)
 
 
 def angles(u1: Array, u2: Array) -> tuple[Array, Array]:

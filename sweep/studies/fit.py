@@ -21,16 +21,16 @@ from scipy.stats import qmc
 
 from sweep.config import Config, ConfigError, Values
 from sweep.config.cross_checks import misplaced
+from sweep.config.film import Film
 from sweep.faults import brief, fault_of, suggestion
 from sweep.grid import BODY, Array
 from sweep.interrupt import deferred
-from sweep.kernels.measures.misfit import Film, Misfit
+from sweep.kernels.measures.misfit import Misfit
 from sweep.models.user.blame import blamed
 from sweep.results import dataset
 from sweep.results.provenance import provenance
-from sweep.studies.misfit import Ask, Minimum, Problem, minimise
+from sweep.studies.misfit import UNKNOWNS, Ask, Minimum, Problem, minimise
 from sweep.studies.search import require_certain
-from sweep.studies.sensor import UNKNOWNS, of_film
 from sweep.studies.together import together
 from sweep.variables import Variable
 
@@ -69,9 +69,9 @@ _TIED = 0.98
 @deferred()
 def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], None]) -> xr.Dataset:
     """The fit of the law of friction that `config` names."""
-    if not np.isfinite(film.rows).all():
+    if not np.isfinite([film.time, film.value, film.errors]).all():
         raise fault_of("the film holds a value that is no number; leave out such instants")
-    theirs = of_film(film)
+    theirs = _of_film(film)
     config = _one_body(config, free, theirs)
     began = time.perf_counter()
     if film.left_out:
@@ -108,6 +108,13 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
     if more := [name for name in config.axes if name not in free]:
         raise ConfigError([config.fault(config.table[more[0]].place, "has several values; free it, or give one")])
     return config
+
+
+def _of_film(film: Film) -> dict[str, tuple[float, float]]:
+    """The ranges in which `UNKNOWNS` are sought, by name."""
+    delay, most = float(film.time[-1]) / 10, float(np.abs(film.value).max()) / 10
+    # No film shows where a heading counts from, so that it has no bias.
+    return {"film_delay": (0.0, delay)} | ({} if film.what == "heading" else {"film_bias": (-most, most)})
 
 
 def _range(config: Config, name: str) -> tuple[float, float]:
@@ -248,7 +255,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
     best, film, names = minima[0], problem.film, list(problem.free)
     covariance, variance = _covariance(problem, best), _variance(problem, best)
     deviation, rows = np.sqrt(np.diag(covariance)), len(film.time)
-    fitted = film.value + problem.residuals(best.place[None])[0] * problem.error
+    fitted = film.value + problem.residuals(best.place[None])[0] * problem.film.errors
     told, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
         f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})

@@ -15,10 +15,9 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, load_config
-from sweep.config.film import read
+from sweep.config.film import Film, read
 from sweep.engine.reporter import Reporter
 from sweep.faults import brief, fault_of, suggestion
-from sweep.kernels.measures.misfit import Film
 from sweep.models.general.laws import LAWS, Law
 from sweep.parameters import SI
 from sweep.studies.fit import fit

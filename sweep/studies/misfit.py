@@ -12,20 +12,17 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 from sweep.config import Config
+from sweep.config.film import Film
 from sweep.grid import Array
 from sweep.interrupt import point
-from sweep.kernels.measures.misfit import Film
 from sweep.kernels.methods import PLAIN, automatic_step
 from sweep.kernels.samples import sampled
-from sweep.models.theory.linear import fastest_motion
-from sweep.studies.sensor import UNKNOWNS, seen_by
 
-# Samples per radian of the fastest motion, so that splines through them are good to 1e-6 of a ripple.
-_SAMPLES = 8.0
+UNKNOWNS = ("film_delay", "film_bias")
+"""What a fit may find of a film besides the parameters of the body, by the names that the option --free takes."""
 
 # Half the distance of two columns of the Jacobian, as a share of a parameter's range.  With 3e-6 the search in a film
 # of seven reversals in 5 s, which amplify errors, ended at ten times the misfit.
@@ -39,9 +36,6 @@ _LOST = 10.0
 
 # A minimum is found when a step changes misfit or place by less than a share, or there is no slope; and the most steps.
 _ENOUGH, _FLAT, _MOST_STEPS = 1e-9, 1e-14, 50
-
-# Error of the spins: far below that of any film.
-_TOLERANCE = 1e-8
 
 
 class Minimum(NamedTuple):
@@ -67,24 +61,16 @@ class Problem:
     config: Config
     film: Film
     free: Mapping[str, tuple[float, float]]
-    """The free parameters, those of `sweep.studies.sensor` too, and the ends of the ranges in which they are sought."""
+    """The free parameters, those of `UNKNOWNS` too, and the ends of the ranges in which they are sought."""
     trajectories: int = 0
     """How many were computed."""
     _steps: dict[tuple[float, ...], float] = field(default_factory=dict)
     """Steps by rounded places."""
 
     def __post_init__(self) -> None:
-        """Choose the instants at which trajectories are sampled: those of an even film are among them."""
-        model = self.config.equations
         self.low, self.high = (np.array(ends) for ends in zip(*self.free.values(), strict=True))
         self.ratio = self.low > 0
         """Where a range of positive numbers is divided evenly in its logarithm."""
-        ends = self.columns(np.linspace(0, 1, 3)[:, None] * np.ones(len(self.free)))
-        fastest = float(np.nanmax(fastest_motion(model, ends)))
-        frames = np.diff(self.film.time)
-        frame = float(np.median(frames[frames > 0]))
-        self.interval = frame / np.ceil(frame * _SAMPLES * fastest)
-        self.error = np.ones(len(self.film.time)) if self.film.error is None else self.film.error
 
     def values(self, places: Array) -> Array:
         """The free parameters at places, of the same shape (..., free)."""
@@ -102,30 +88,25 @@ class Problem:
         return {name: np.ascontiguousarray(each) for name, each in zip(self.free, self.values(places).T, strict=True)}
 
     def curves(self, places: Array, times: Array, steps: Array | None = None) -> Array:
-        """What a film would see of the trajectories at `places`, shape (cells, times); NaN if one is lost before.
+        """What a film shows of the trajectories at `places`, shape (cells, times); NaN for one that is lost.
 
         Without `steps`, of shape (cells,), each takes its automatic one.
         """
         model, columns, found = self.config.equations, self.columns(places), self._found(places)
         self.trajectories += len(places)
-        count = int(np.ceil((times[-1] + self.free.get("film_delay", (0, 0))[1]) / self.interval)) + 4
-        spins, possible = np.full((len(places), count), np.nan), np.flatnonzero(~model.impossible(columns))
-        columns, theirs = ({name: v[possible] for name, v in each.items()} for each in (columns, found))
-        steps = automatic_step(PLAIN, model, columns, _TOLERANCE)[0] if steps is None else steps[possible]
-        spins[possible] = sampled(
-            model, columns, steps, self.interval, count, *seen_by(model, self.film, columns, theirs)
-        )
+        curves, possible = np.full((len(places), len(times)), np.nan), np.flatnonzero(~model.impossible(columns))
+        columns, found = ({name: v[possible] for name, v in each.items()} for each in (columns, found))
+        steps = automatic_step(PLAIN, model, columns)[0] if steps is None else steps[possible]
+        longest = self.free.get("film_delay", (0.0, 0.0))[1]
+        shown = sampled(model, columns, steps, times, self.film.what, found.get("film_delay"), longest)
+        shown[np.isnan(shown).any(axis=1)] = np.nan
+        curves[possible] = shown + found.get("film_bias", np.zeros(len(possible)))[:, None]
         point()
-        curves = np.full((len(places), len(times)), np.nan)
-        delay, bias = (found.get(name, np.zeros(len(places))) for name in ("film_delay", "film_bias"))
-        for i in np.flatnonzero(np.isfinite(spins).all(axis=1)):
-            spline = CubicSpline(np.arange(count) * self.interval, spins[i])
-            curves[i] = (spline.antiderivative() if self.film.what == "heading" else spline)(times + delay[i]) + bias[i]
         return curves
 
     def residuals(self, places: Array, instants: int | None = None, steps: Array | None = None) -> Array:
         """(computed - seen) / error at all or the first `instants` of the film, shape (cells, instants)."""
-        seen, error = self.film.value[:instants], self.error[:instants]
+        seen, error = self.film.value[:instants], self.film.errors[:instants]
         away = self.curves(places, self.film.time[:instants], steps) - seen
         if self.film.what == "heading":  # no film tells where a heading counts from
             away -= np.average(away, axis=1, weights=error**-2.0)[:, None]
@@ -144,7 +125,7 @@ class Problem:
             model, columns = self.config.equations, self.columns(places)
             possible = ~model.impossible(columns)
             columns = {name: values[possible] for name, values in columns.items()}
-            self._steps[key] = float(automatic_step(PLAIN, model, columns, _TOLERANCE)[0].min(initial=np.inf))
+            self._steps[key] = float(automatic_step(PLAIN, model, columns)[0].min(initial=np.inf))
         return self._steps[key]
 
 

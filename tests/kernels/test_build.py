@@ -105,10 +105,10 @@ def test_functions_are_compiled_for_the_arguments_that_they_get(monkeypatch: pyt
 
     monkeypatch.setattr(Cached, "__call__", count)
     run_cells([ENDS[LIFT_OFF], {}], method="adams", t_end=2000.0)
-    sampled(MODELS["slip"], columns(), np.full(1, 0.1), 1.0, 2)
+    sampled(MODELS["slip"], columns(), np.full(1, 0.1), np.arange(2.0))
     sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, t_end=10.0)
     assert signatures == dict.fromkeys(signatures, 1)
-    made = ("make_advance", "compiled_start_up", "_follow", "compiled_approach", "_compiled", "compiled_path")
+    made = ("make_advance", "compiled_start_up", "_follow", "compiled_approach", "compiled_samples", "compiled_path")
     assert signatures.keys() == set(made)
 
 

@@ -9,7 +9,7 @@ from support import Write, newton
 from support.cli import invoke
 
 import sweep
-from sweep.kernels.measures.misfit import Film
+from sweep.config.film import Film
 
 STONE = """\
 name: stone

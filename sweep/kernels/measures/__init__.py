@@ -10,7 +10,7 @@ from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.measures.lyapunov import Lyapunov
 from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Measurement
-from sweep.kernels.measures.misfit import Film, Misfit
+from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.measures.noise import NoiseLimited
 from sweep.kernels.measures.raw_reversals import RawReversals
 from sweep.kernels.measures.resting_spin import RestingSpin
@@ -27,15 +27,14 @@ _KINDS: tuple[type[Measurement], ...] = (
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}
 
 
-def chosen(specs: Iterable[str], film: Film | None = None) -> tuple[Measurement, ...]:
+def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
     """The measurements for specs such as "reversals" or "reversal_times=12", in the order of `MEASURES`."""
     settings = {name: value for name, _, value in (spec.partition("=") for spec in specs)}
     found = {name: kind for name, kind in MEASURES.items() if name in settings}
     return tuple(
-        Misfit(film) if kind is Misfit
-        else kind(int(settings[name])) if settings[name] else kind()  # type: ignore[call-arg]
+        kind(int(settings[name])) if kind.bounds and settings[name] else kind()  # type: ignore[call-arg]
         for name, kind in found.items()
-    )  # fmt: skip
+    )
 
 
 def possible(tier: Tier) -> tuple[str, ...]:

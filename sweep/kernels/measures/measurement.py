@@ -10,10 +10,8 @@ them in hooks, all of which are optional:
     start              once, when the images are made
     make_step          for one lane after every step
     make_at_reversal   for one lane after every step, by way of the measurement `reversals`
-    make_note          for all lanes after every step
     make_may_settle    for one lane at every look, before it is decided whether the trajectory ends
     make_look          for one lane at every look, after that decision
-    make_compare       for one lane after every look, with numbers that all trajectories share
     skip               for many images, when they have covered a stretch without steps
     mode_lost          for many images, when the lift of a mode has failed
     read               once, when the trajectories have ended
@@ -35,8 +33,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
-
-import numpy as np
 
 from sweep.kernels.layout import Layout, Table
 from sweep.models.model import Array, Columns, Model
@@ -104,11 +100,6 @@ class Measurement:
         return ()
 
     @property
-    def shared(self) -> Array:
-        """Numbers that all trajectories share, for `make_compare`, of two dimensions.  One measurement has some."""
-        return np.empty((0, 0))
-
-    @property
     def spec(self) -> str:
         """The words by which it is asked for: its name, or "name=setting" if it has a setting."""
         return "=".join([self.name, *map(str, vars(self).values())])
@@ -121,7 +112,7 @@ class Measurement:
     @property
     def in_kernel(self) -> bool:
         """True if a kernel with it differs from one without: it has a quantity, or a hook in the loop."""
-        hooks = ("make_step", "make_at_reversal", "make_note", "make_may_settle", "make_look", "make_compare")
+        hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_look")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
         return bool(self.quantities) or own or self.follows_work or self.follows_ripple or self.follows_tangent
 
@@ -158,9 +149,6 @@ class Measurement:
         number of reversals so far, including this one, and `crossing` its time.
         """
 
-    def make_note(self, layout: Layout) -> Any:
-        """Inline (group, number) -> None, called when all lanes have taken the step of this number in their block."""
-
     def make_may_settle(self, layout: Layout) -> Any:
         """Inline (group, lane, spin, at_rest) -> bool: whether what is measured is final if the rattle only decays.
 
@@ -178,9 +166,6 @@ class Measurement:
         J : moment of inertia of the spin
         total : energy above rest, rattle + J spin²/2
         """
-
-    def make_compare(self, layout: Layout) -> Any:
-        """Inline (group, lane, shared) -> None, called after every look with the numbers `shared`."""
 
     def skip(self, table: Table, stretch: Stretch) -> None:
         """Account, in `table`, for a stretch that its images have covered without steps: start-up or a leap.
