@@ -72,7 +72,7 @@ def test_all_other_numbers_are_those_of_a_run_without(config: Path) -> None:
 
 
 def test_a_run_that_fails_has_none(config: Path) -> None:
-    found = sweep.run(config, n0=5.0, x0=[0.01, 5.0], mu=60, step="auto")
+    found = sweep.run(config, n0=[0.05, 5.0], mu=60, step="auto")
     assert found.status.values.ravel().tolist() == [TIME_LIMIT, LIFT_OFF]
     assert np.isfinite(found.misfit).values.ravel().tolist() == [True, False]
 
