@@ -1,4 +1,4 @@
-"""Progress of a run on the terminal and in a notebook."""
+"""Shows the progress of a run on the terminal and in a notebook, with the bars of rich."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
-from typing import Any
+from importlib.util import find_spec
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -27,7 +27,7 @@ def shown(progress: bool | None, reporter: Reporter | None = None) -> AbstractCo
     """
     if reporter or not (in_notebook() if progress is None else progress):
         return nullcontext(reporter or Reporter())
-    return Notebook() if in_notebook() else Terminal()
+    return Terminal()
 
 
 def in_notebook() -> bool:
@@ -52,11 +52,13 @@ class _Console(Console):
 class Terminal(Reporter):
     """A bar with what is done and the time left, of cells also failures and trajectories per second.
 
-    Where there is no terminal, it is a line, a minute apart and at the end.
+    Where no bar can move, as in the log of a job, it is a line, a minute apart and at the end.  In a notebook the bar
+    moves if ipywidgets is installed, which rich needs there.
     """
 
     def __init__(self, quiet: bool = False) -> None:
-        self.console = _Console(stderr=True, quiet=quiet, highlight=False)
+        widgets = in_notebook() and find_spec("ipywidgets") is not None
+        self.console = _Console(stderr=True, quiet=quiet, highlight=False, force_jupyter=widgets)
         self.last: Done | None = None
         self._bar: Progress | None = None
         self._told = False
@@ -116,51 +118,3 @@ def _line(unit: str, console: Console) -> Progress:
     cells = TextColumn("{task.fields[failed]} failed · {task.fields[rate]:.3g} trajectories/s ·", table_column=whole)
     parts = [TextColumn(f"{count} {unit}", table_column=whole), BarColumn(), *([cells] if unit == "cells" else [])]
     return Progress(*parts, left, TextColumn("left"), console=console)
-
-
-class Notebook(Reporter):
-    """A bar under the cell of a notebook, drawn by the browser."""
-
-    def __init__(self) -> None:
-        self._output: Any = None
-        self._drawn = 0.0
-        self._last: Done | None = None
-
-    def __enter__(self) -> Notebook:
-        self._open = ExitStack()
-        self._open.enter_context(showing(self._compiling))
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._open.close()
-        if self._last:
-            self._draw(self._words(self._last), self._last)
-
-    @contextmanager
-    def _compiling(self) -> Iterator[None]:
-        self._draw(_COMPILING)
-        yield
-
-    def note(self, message: str) -> None:
-        print(message)
-
-    def chunk(self, progress: Done) -> None:
-        self._last = progress
-        if time.monotonic() - self._drawn > 0.1:
-            self._draw(self._words(progress), progress)
-
-    def _words(self, progress: Done) -> str:
-        failed = f" · {progress.failed} failed" if progress.unit == "cells" else ""
-        return f"{progress.done:.0f}/{progress.cells:.0f} {progress.unit}{failed} · {progress.seconds:.1f} s"
-
-    def _draw(self, words: str, progress: Done | None = None) -> None:
-        """Show a bar and `words`, in place of those shown before."""
-        from IPython.display import HTML, display
-
-        bar = f'<progress value="{progress.done}" max="{progress.cells}"></progress> ' if progress else ""
-        shown = HTML(f"{bar}<code>{words}</code>")
-        if self._output is None:
-            self._output = display(shown, display_id=True)
-        else:
-            self._output.update(shown)
-        self._drawn = time.monotonic()

@@ -3,7 +3,9 @@
 import sys
 import types
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
@@ -167,46 +169,43 @@ def test_a_bar_is_shown_where_it_is_asked_for(capfd: pytest.CaptureFixture[str])
 
 
 @pytest.fixture
-def notebook(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """As in a notebook: what is displayed there, with what takes its place."""
-    shown: list[str] = []
-
-    class Handle:
-        def __init__(self) -> None:
-            self.place = len(shown) - 1
-
-        def update(self, html: str) -> None:
-            shown[self.place] = html
-
-    def display(html: str, *, display_id: bool) -> Handle:
-        assert display_id
-        shown.append(html)
-        return Handle()
-
-    ipython, inside = types.ModuleType("IPython"), types.ModuleType("IPython.display")
+def notebook(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a notebook whose kernel lacks ipywidgets."""
+    ipython = types.ModuleType("IPython")
     ipython.get_ipython = lambda: types.SimpleNamespace(kernel=None)  # type: ignore[attr-defined]
-    inside.HTML, inside.display = str, display  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "IPython", ipython)
-    monkeypatch.setitem(sys.modules, "IPython.display", inside)
-    return shown
 
 
-def test_a_notebook_shows_a_bar_unasked(notebook: list[str], capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("notebook")
+def test_a_notebook_shows_progress_unasked(capfd: pytest.CaptureFixture[str]) -> None:
     sweep.run(SAID, progress=False)
-    assert notebook == []
-    sweep.run(SAID)
-    (shown,) = notebook
-    assert '<progress value="4" max="4">' in shown
-    assert "4/4 cells · 0 failed" in shown
-    sweep.trajectory(SAID)
-    assert "sqrt(c/g)" in notebook[1]
     assert tuple(capfd.readouterr()) == ("", "")
+    sweep.run(SAID)
+    out, err = capfd.readouterr()
+    assert (out, "4/4 cells" in err) == ("", True)
 
 
-def test_a_python_prompt_is_no_notebook(notebook: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("notebook")
+def test_a_notebook_with_widgets_shows_a_bar_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = list[object]()
+
+    class Output(nullcontext[None]):
+        clear_output = staticmethod(lambda wait: None)  # noqa: ARG005
+
+    for name in ("ipywidgets", "IPython.display"):
+        module = types.ModuleType(name)
+        module.__spec__ = ModuleSpec(name, None)
+        vars(module).update(Output=Output, display=shown.append)
+        monkeypatch.setitem(sys.modules, name, module)
+    sweep.run(SAID)
+    assert isinstance(shown[0], Output)
+
+
+@pytest.mark.usefixtures("notebook")
+def test_a_python_prompt_is_no_notebook(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(sys.modules["IPython"], "get_ipython", lambda: types.SimpleNamespace())
     sweep.run(SAID)
-    assert notebook == []
+    assert tuple(capfd.readouterr()) == ("", "")
 
 
 HALVES: dict[str, list[dict[str, Any]]] = {
