@@ -7,13 +7,13 @@ from functools import partial
 from html import escape
 
 import numpy as np
-from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, TextInput
+from bokeh.models import Button, Column, Div, Row, Slider, TextInput
 
-from sweep.explorer.colours import CURVES
 from sweep.explorer.controls import BARE, WIDGETS, on
 from sweep.explorer.runner import Curve
 from sweep.explorer.slices import Source
 from sweep.explorer.state import MAX_CELLS, Cell, number
+from sweep.explorer.style import CURVES
 from sweep.parameters import Parameter
 from sweep.plots import labels
 
@@ -27,8 +27,6 @@ class CellControls:
     ) -> None:  # fmt: skip
         self._edit = edit
         self._quiet = False
-        self.keep = Checkbox(label="keep the curves when another cell is clicked", active=False, name="keep")
-        """Whether a click adds a cell rather than replacing those drawn."""
         self._rows = [self._row(k, activate, remove) for k in range(MAX_CELLS)]
         self._title = Div(text="", margin=(8, 0, 0, 0))
         self._end = Div(text="", margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
@@ -40,7 +38,7 @@ class CellControls:
         typed = [one.field for one in inputs if not one.slider]
         self._editor = Column(self._title, *dragged, Row(*typed, sizing_mode="stretch_width", styles=wrap),
                               sizing_mode="stretch_width", visible=False, name="parameters")  # fmt: skip
-        self.root = Column(self.keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
+        self.root = Column(*(row for row, _ in self._rows), self._end, self._editor, name="chosen",
                            stylesheets=[WIDGETS], sizing_mode="stretch_width", visible=bool(base))  # fmt: skip
 
     def show(self, cells: Sequence[Cell], names: Sequence[str], active: int) -> None:

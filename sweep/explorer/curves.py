@@ -11,11 +11,10 @@ from bokeh import models
 from bokeh.core.properties import value
 from bokeh.plotting import figure
 
-from sweep.explorer import axes
-from sweep.explorer.colours import CURVES
 from sweep.explorer.player import Player
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
+from sweep.explorer.style import CURVES, GRID, SOFT, style
 from sweep.grid import Array
 from sweep.plots import labels, theory
 
@@ -25,7 +24,7 @@ _STRETCHES = 3000
 _OVER_TIME = ("spin", "energy", "dissipated")
 
 _LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.0,
-           "label_text_color": axes.SOFT, "border_line_color": None}  # fmt: skip
+           "label_text_color": SOFT, "border_line_color": None}  # fmt: skip
 
 
 class Curves:
@@ -39,12 +38,12 @@ class Curves:
         self.spin.add_layout(models.Legend(items=items, location="top_right", name="curve legend", **_LEGEND))
         self.spin.y_range.renderers = [item.renderers[0] for item in items]  # critical spins may be far away
         for words, dash in (("energy above rest", "solid"), ("work against friction", "dashed")):
-            self.energy.line([np.nan], [np.nan], color=axes.SOFT, line_dash=dash, legend_label=words)
+            self.energy.line([np.nan], [np.nan], color=SOFT, line_dash=dash, legend_label=words)
         self.energy.legend.update(location="right", **_LEGEND)
         self._critical = models.ColumnDataSource({"spin": [], "time": [], "dash": [], "symbol": []})
-        self.spin.hspan("spin", source=self._critical, line_color=axes.SOFT, line_dash="dash", level="underlay")
+        self.spin.hspan("spin", source=self._critical, line_color=SOFT, line_dash="dash", level="underlay")
         self.spin.text("time", "spin", "symbol", source=self._critical, text_font_size="11px", text_align="right",
-                       text_color=axes.SOFT)  # fmt: skip
+                       text_color=SOFT)  # fmt: skip
         self._played: tuple[Curve | None, float] | None = None
         self.player = Player([self.spin, self.energy])
 
@@ -135,6 +134,6 @@ def _figure(height: int, name: str) -> Any:
         active_drag="box_zoom", toolbar_location="right", name=name, outline_line_color=None,
     )  # fmt: skip
     plot.toolbar.update(logo=None, autohide=True)
-    plot.grid.grid_line_color = axes.GRID
-    axes.style(plot)
+    plot.grid.grid_line_color = GRID
+    style(plot)
     return plot

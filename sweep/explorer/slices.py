@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -14,17 +14,14 @@ import xarray as xr
 
 from sweep.axis import Axis
 from sweep.grid import Array
-from sweep.plots import labels, marks, quantities, theory
-from sweep.plots.description import Map, along, describe, table
+from sweep.plots import labels, marks, quantities
+from sweep.plots.description import Map, along, describe
 from sweep.results.kind import BOUNDARIES, FIT, INDICES, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
 
 IN_MEMORY = 2_000_000
 """Cells up to which a dataset is read as a whole; of a larger one, each slice is read when it is shown."""
-
-_HOW = {"linear": "eigenvalues", "simulated": "simulation", "reason": "whether found"}
-"""How a critical spin was found, by what follows its name."""
 
 
 class PlacedAxis(Axis):
@@ -89,10 +86,6 @@ class Source:
 
     def words(self, name: str) -> str:
         """Say what a variable or an axis is."""
-        if name.startswith("n_c") and name.count("_") > 1:
-            _, _, _, *how = name.split("_")
-            words = ", ".join([_HOW.get(h, h) for h in how] or ["formula"])
-            return f"{theory.symbol(name)}, {words}"
         return labels.words(self.cell, name)
 
     def label(self, name: str) -> str:
@@ -101,17 +94,8 @@ class Source:
 
     def map(self, name: str, x: str, y: str, at: Mapping[str, int]) -> Map:
         """Read the map of a variable over `x` and `y`, at an index of each other axis; a row if `y` is empty."""
-        return describe(self._part(x, y, at), name, x, y)
-
-    def tables(self, names: Iterable[str], x: str, y: str, at: Mapping[str, int]) -> dict[str, Array]:
-        """The values of variables over the cells of such a map, each of shape (y, x)."""
-        part = self._part(x, y, at)
-        axes = [self.axes[d] if d else Axis("", np.zeros(1)) for d in (x, y)]
-        return {name: table(quantities.field(part, name), *axes) for name in names}
-
-    def _part(self, x: str, y: str, at: Mapping[str, int]) -> xr.Dataset:
-        """The slice over `x` and `y`; of a large file, each variable is read when it is asked for."""
-        return self.dataset.isel({d: at.get(d, 0) for d in self.axes if d not in (x, y)})
+        part = self.dataset.isel({d: at.get(d, 0) for d in self.axes if d not in (x, y)})
+        return describe(part, name, x, y)
 
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:
         """The parameters `names` of the cell at `index`, as far as the dataset tells them."""

@@ -21,18 +21,14 @@ from sweep.plots.quantities import subject
 MAX_CELLS = 6
 """Curves over each other; as many as there are colours that everybody can tell apart."""
 
-_BUTTONS = 6
-"""Values of an axis that have a button each; more share a slider."""
-
 LIMITS = {"low": "from", "high": "to"}
 """The ends of the colour scale, and what the page calls them."""
-
-COUNTS = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
-"""The variables that have a button each, and what it says."""
 
 Cell = Mapping[str, float]
 """The parameters of a trajectory."""
 
+_ENDED = ("beside",)
+"""Keys of links of older versions, which are left out."""
 
 PALETTES = ("", "viridis", "cividis", "inferno", "turbo", "gray", "PuOr_r", "coolwarm")
 """Names of matplotlib's that can be chosen; without one a variable has its own."""
@@ -51,8 +47,6 @@ class State:
     """One of the source's variables."""
     at: Mapping[str, int] = field(default_factory=dict)
     """The index on each axis that is not drawn."""
-    beside: str = ""
-    """The variable of a second map, if there is one."""
     cells: tuple[Cell, ...] = ()
     palette: str = ""
     spacing: str = ""
@@ -74,8 +68,6 @@ class Choice:
     options: Sequence[str]
     words: Sequence[str]
     """The options as the page says them."""
-    buttons: int = 0
-    """The number of options, from the first on, that have a button each; the others share a list or a slider."""
     axis: Axis | None = None
     """The axis of the dataset on which the options are places."""
 
@@ -108,19 +100,15 @@ class Choice:
 
 def choices(source: Source) -> dict[str, Choice]:
     """All that can be chosen of the map of a dataset, by name."""
-    counts = [n for n in COUNTS if n in source.variables]
-    others = [n for n in source.variables if n not in counts]
-    words = [*(COUNTS[n] for n in counts), *map(source.words, others)]
     axes = list(source.axes), [source.words(d) for d in source.axes]
-    found = [Choice("show", "variable", [*counts, *others], words, len(counts))]
-    found.append(Choice("beside", "beside it", ["", *counts, *others], ["nothing", *words]))
+    found = [Choice("show", "variable", source.variables, [*map(source.words, source.variables)])]
     found.append(Choice("x", "horizontal axis", *axes))
     if len(source.axes) > 1:
         found.append(Choice("y", "vertical axis", *axes))
     for name, axis in source.axes.items():
         unit = labels.si_unit(source.dataset, name)
         exact, short = [f"{v:.12g}" for v in axis.values], [f"{labels.number(v)}{unit}" for v in axis.values]
-        found.append(Choice(name, source.words(name), exact, short, len(exact) * (len(exact) <= _BUTTONS), axis))
+        found.append(Choice(name, source.words(name), exact, short, axis))
     found.append(Choice("palette", "palette", PALETTES, ["its own", *PALETTES[1:]]))
     found.append(Choice("spacing", "colours", list(_SPACINGS), list(_SPACINGS.values())))
     return {choice.name: choice for choice in found}
@@ -173,9 +161,9 @@ def read(
             state = state.limited(key, limit)
         elif key in LIMITS:
             faults.append(f"{key}={brief(values[-1])} is no number")
-        elif key != "cell":
-            known_keys = ", ".join([*all_choices, *LIMITS])
-            faults.append(f"{brief(key)} is no part of an address; there are {known_keys} and cell")
+        elif key not in ("cell", *_ENDED):
+            expected = ", ".join([*all_choices, *LIMITS, "cell"])
+            faults.append(f"unknown URL parameter '{brief(key)}'; expected one of {expected}")
     asked = query.get("cell", ())
     cells = [(text, _cell(text, base, known)) for text in asked[:MAX_CELLS]]
     faults += [f"cell={brief(text)}: {cell}" for text, cell in cells if isinstance(cell, str)]
