@@ -61,13 +61,13 @@ class Curves:
         if (chosen, end) != self._played:
             self._played = chosen, end
             self.player.show(chosen, CURVES[active], end)
-        spins = theory.levels(chosen.dataset) if chosen else []
-        self._critical.data = {
-            "spin": [at for _, _, at, _ in spins],
-            "time": [end * (0.93 if name == "n_c1" else 1.0) for name, *_ in spins],  # they often lie close together
-            "dash": [theory.OVER_TIME[name] for name, *_ in spins],
-            "symbol": [sign for _, sign, *_ in spins],
-        }
+            spins = theory.levels(chosen.dataset) if chosen else []
+            self._critical.data = {
+                "spin": [at for _, _, at, _ in spins],
+                "time": [end * (0.93 if name == "n_c1" else 1.0) for name, *_ in spins],  # they often lie close
+                "dash": [theory.OVER_TIME[name] for name, *_ in spins],
+                "symbol": [sign for _, sign, *_ in spins],
+            }
 
     def _label(self, one: xr.Dataset) -> None:
         """Label the axes, in the units of a trajectory."""

@@ -17,8 +17,6 @@ from sweep.explorer import view
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
 
-ADDRESS = "127.0.0.1"
-
 PORTS = range(5006, 5106)
 """Tried in turn where no port is asked for, so that a link to the only explorer holds."""
 
@@ -58,8 +56,8 @@ def serve(source: Source, setup: Setup | None, port: int | None, *, browser: boo
     ended.wait()
 
 
-def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int | None = None) -> Beside:
-    """Serve until it is closed or this process ends, and return at once."""
+def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int | None = 0) -> Beside:
+    """Serve until it is closed or this process ends, and return at once; by default at any port that is free."""
     _quieten()
     began, ended = Future[tuple[str, asyncio.AbstractEventLoop]](), asyncio.Event()
 
@@ -88,12 +86,11 @@ def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int
 
 
 def _server(source: Source, setup: Setup | None, port: int | None) -> Server:
-    """Bokeh's server on the port, or on the first that is free; pages of other origins are refused."""
+    """Bokeh's server on a port, or on the first of `PORTS` that is free; it refuses pages of other sites."""
     fill = view.make(source, setup)
-    for each in [port] if port else PORTS:
+    for each in PORTS if port is None else [port]:
         try:
-            hosts = [f"{host}:{each}" for host in ("localhost", ADDRESS)]
-            return Server(fill, address=ADDRESS, port=each, allow_websocket_origin=hosts)
+            return Server(fill, address="127.0.0.1", port=each)
         except OSError as error:
             last = error
     raise OSError(last.errno, last.strerror, f"port {port or f'{PORTS[0]} to {PORTS[-1]}'}")

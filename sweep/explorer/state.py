@@ -27,13 +27,11 @@ LIMITS = {"low": "from", "high": "to"}
 Cell = Mapping[str, float]
 """The parameters of a trajectory."""
 
-_ENDED = ("beside",)
+_ENDED = ("beside", "spacing")
 """Keys of links of older versions, which are left out."""
 
 PALETTES = ("", "viridis", "cividis", "inferno", "turbo", "gray", "PuOr_r", "coolwarm")
 """Names of matplotlib's that can be chosen; without one a variable has its own."""
-
-_SPACINGS = {"": "by the values", "linear": "linear", "log": "logarithmic"}
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,6 @@ class State:
     """The index on each axis that is not drawn."""
     cells: tuple[Cell, ...] = ()
     palette: str = ""
-    spacing: str = ""
     low: float | None = None
     high: float | None = None
     """What the visitor has chosen of the colour scale; the rest is as in pictures."""
@@ -110,7 +107,6 @@ def choices(source: Source) -> dict[str, Choice]:
         exact, short = [f"{v:.12g}" for v in axis.values], [f"{labels.number(v)}{unit}" for v in axis.values]
         found.append(Choice(name, source.words(name), exact, short, axis))
     found.append(Choice("palette", "palette", PALETTES, ["its own", *PALETTES[1:]]))
-    found.append(Choice("spacing", "colours", list(_SPACINGS), list(_SPACINGS.values())))
     return {choice.name: choice for choice in found}
 
 
@@ -164,12 +160,15 @@ def read(
         elif key not in ("cell", *_ENDED):
             expected = ", ".join([*all_choices, *LIMITS, "cell"])
             faults.append(f"unknown URL parameter '{brief(key)}'; expected one of {expected}")
-    asked = query.get("cell", ())
-    cells = [(text, _cell(text, base, known)) for text in asked[:MAX_CELLS]]
-    faults += [f"cell={brief(text)}: {cell}" for text, cell in cells if isinstance(cell, str)]
+    asked, cells = query.get("cell", ()), list[Cell]()
+    for text in asked[:MAX_CELLS]:
+        try:
+            cells.append(_cell(text, base, known))
+        except ValueError as fault:
+            faults.append(f"cell={brief(text)}: {fault}")
     if len(asked) > MAX_CELLS:
         faults.append(f"{len(asked)} cells are too many; the first {MAX_CELLS} are drawn")
-    return replace(state, cells=tuple(cell for _, cell in cells if not isinstance(cell, str))), faults
+    return replace(state, cells=tuple(cells)), faults
 
 
 def wrong_value(parameter: Parameter, value: float) -> str:
@@ -179,18 +178,18 @@ def wrong_value(parameter: Parameter, value: float) -> str:
     return f"{parameter.name} has to be {parameter.allowed}"
 
 
-def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell | str:
-    """The cell that an address names, or what is wrong with it."""
+def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell:
+    """The cell that an address names; `ValueError` if there is none."""
     if not base:
-        return "this file has no configuration from which a trajectory could be run"
+        raise ValueError("this file has no configuration from which a trajectory could be run")
     cell = dict(base)
     for pair in text.split(",", len(base)):
         name, _, value = pair.partition(":")
         if name not in cell:
-            return f"{brief(name)} is no parameter; there are {', '.join(cell)}"
+            raise ValueError(f"{brief(name)} is no parameter; there are {', '.join(cell)}")
         cell[name] = number(value)
         if fault := wrong_value(known[name], cell[name]):
-            return fault
+            raise ValueError(fault)
     return cell
 
 

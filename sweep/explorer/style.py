@@ -9,12 +9,11 @@ import base64
 import io
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from bokeh.models import CustomJSTickFormatter, FixedTicker
-from matplotlib.colors import BoundaryNorm, LogNorm, Normalize, to_hex
+from matplotlib.colors import BoundaryNorm, LogNorm, to_hex
 from matplotlib.image import imsave
 
 from sweep.explorer.slices import PlacedAxis
@@ -22,7 +21,7 @@ from sweep.explorer.state import State
 from sweep.grid import Array
 from sweep.plots import marks, scales
 from sweep.plots.description import Map, common_scale
-from sweep.plots.scales import SEQUENTIAL, Scale, colour_map
+from sweep.plots.scales import Scale
 
 SOFT = "#77828d"
 """A grey that can be read on a light page and on a dark one."""
@@ -95,18 +94,12 @@ def scale_of(part: Map, state: State) -> Scale:
     if part.flags:
         return scales.flags(part.flags, palette)
     shown = part.shown[np.isfinite(part.shown)].astype(float)
-    if state.spacing == "log":
-        shown = shown[shown > 0]
-    if not shown.size:
+    if (state.low, state.high) == (None, None) or not shown.size:
         return common_scale([part], cmap=palette)
     low = shown.min() if state.low is None else state.low
     high = shown.max() if state.high is None else state.high
-    given = (state.low, state.high) != (None, None) and low < high and (low > 0 or part.name != "ratio")
-    scale = common_scale([part], (low, high) if given else None, palette)
-    norm = {"linear": Normalize, "log": LogNorm}.get(state.spacing)
-    if norm is None or not (low < high and (low > 0 or norm is Normalize)):
-        return scale
-    return replace(scale, norm=norm(low, high), ticks=None, colours=colour_map(palette or SEQUENTIAL))
+    possible = low < high and (low > 0 or part.name != "ratio")
+    return common_scale([part], (low, high) if possible else None, palette)
 
 
 def is_logarithmic(scale: Scale) -> bool:

@@ -131,11 +131,9 @@ class View:
             return
         fault = states.wrong_value(self._known[name], value)
         self._faults = [fault] if fault else []
-        if fault:
-            self._draw_progress()
-        else:
+        if not fault:
             self._drawn.change({**self._drawn.cells[self._drawn.active], name: value})
-            self._draw_cells()
+        self._draw_cells()
 
     def _activate(self, k: int) -> None:
         self._drawn.active = k
@@ -150,10 +148,9 @@ class View:
         self._document.add_next_tick_callback(partial(self._hear, job))
 
     def _hear(self, job: Job) -> None:
-        if self._drawn.hear(job):
-            self._draw_curves()
         if not job.dropped:
             self._faults = [job.fault] if job.fault else self._faults
+            self._draw_curves()
             self._draw_progress()
 
     def _draw_cells(self) -> None:

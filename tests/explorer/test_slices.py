@@ -10,7 +10,6 @@ import xarray as xr
 from sweep.explorer import slices, state, style
 from sweep.explorer.slices import PlacedAxis, Source, open_source
 from sweep.kernels.status import LIFT_OFF
-from sweep.plots import marks
 from sweep.results.store import StoreError
 
 
@@ -22,14 +21,6 @@ def test_a_slice_is_the_selection(name: str, x: str, y: str, source: Source, ope
     expected = whole.broadcast_like(opened["status"]).isel({rest: 1}).transpose(y, x).values
     part = source.map(name, x, y, {rest: 1})
     np.testing.assert_array_equal(part.values, expected)
-
-
-def test_kinds_are_those_of_the_figures(source: Source, opened: xr.Dataset) -> None:
-    part = source.map("reversals", "mu", "b", {"n0": 1})
-    for kind, where in marks.marks(opened.isel(n0=1), "reversals").items():
-        np.testing.assert_array_equal(part.marks[kind], where.transpose("b", "mu").values, kind)
-    assert part.marks["failed"][0, 0]
-    assert len(part.shown) == 19
 
 
 def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
