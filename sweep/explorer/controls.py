@@ -27,7 +27,7 @@ class MapControls:
     """The widgets of all choices: which variable is shown, over which axes, and where on the others."""
 
     def __init__(self, source: Source, change: Callable[[Callable[[State], State]], None]) -> None:
-        """`change` is told how the visitor changes the state."""
+        """`change` is called with what the visitor makes of the state."""
         self._source, self._change = source, change
         self._choices = choices(source)
         self._widgets = {name: self._widget(choice) for name, choice in self._choices.items()}

@@ -48,7 +48,7 @@ class Curves:
         self.player = Player([self.spin, self.energy])
 
     def show(self, curves: Sequence[Curve | None], names: Sequence[str], active: int) -> None:
-        """Draw the curves, one a place, with what the legend says of them; the critical spins are those of `active`."""
+        """Draw the curves, one a place, with their names in the legend; the critical spins are those of `active`."""
         for k, slot in enumerate(self._slots):
             slot.show(curves[k] if k < len(curves) else None, names[k] if k < len(curves) else "")
         present = [curve.dataset for curve in curves if curve]
@@ -103,7 +103,7 @@ class _Slot:
         self.item.update(label=value(name), visible=curve is not None)
 
     def _put(self, curve: Curve | None) -> None:
-        """Send a curve to the browser; what it does not tell is NaN."""
+        """Send a curve to the browser; a series that it lacks is NaN."""
         one, reversals = (
             (curve.dataset, curve.reversals) if curve else (xr.Dataset({"time": ("time", [])}), np.zeros(0))
         )
@@ -111,12 +111,12 @@ class _Slot:
             name: (one[name].values if name in one else np.full(one.sizes["time"], np.nan)).astype("float32")
             for name in ("time", *_OVER_TIME)
         }
-        at = _told([columns[name] for name in _OVER_TIME])
+        at = _drawn_samples([columns[name] for name in _OVER_TIME])
         self.series.data = {name: column[at] for name, column in columns.items()}
         self.reversals.data = {"x": reversals, "y": np.zeros(len(reversals))}
 
 
-def _told(series: Sequence[Array]) -> Array:
+def _drawn_samples(series: Sequence[Array]) -> Array:
     """The samples to draw: of each stretch the lowest and the highest of each series, so that no peak is lost."""
     count = len(series[0])
     stretch = -(-count // _STRETCHES)

@@ -12,12 +12,12 @@ class Drawn:
     """At most `MAX_CELLS` cells in the order in which they were chosen, one of which is active."""
 
     def __init__(self, cells: Iterable[Cell], runner: Runner | None, tell: Callable[[Job], None]) -> None:
-        """`tell` is called with each job that has news, on the runner's thread."""
+        """`tell` is called with each job that has news, on the thread of the runner."""
         self._runner, self._tell = runner, tell
         self._jobs: list[Job] = []
         self.active = 0
         for cell in cells:
-            self.add(cell, beside=True)
+            self.add(cell, keep=True)
 
     @property
     def cells(self) -> list[Cell]:
@@ -28,9 +28,9 @@ class Drawn:
         """As far as they have been run."""
         return [job.curve for job in self._jobs]
 
-    def add(self, cell: Cell, *, beside: bool) -> None:
-        """Choose another cell, and run it; it replaces those chosen before unless it goes `beside` them."""
-        while self._jobs and (not beside or len(self._jobs) == MAX_CELLS):
+    def add(self, cell: Cell, *, keep: bool) -> None:
+        """Choose another cell, and run it; it replaces those chosen before, unless these are to be kept."""
+        while self._jobs and (not keep or len(self._jobs) == MAX_CELLS):
             self.remove(0)
         self._jobs.append(self._begun(cell))
         self.active = len(self._jobs) - 1

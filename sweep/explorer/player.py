@@ -71,7 +71,7 @@ class Player:
         return models.Column(self._slider, row, sizing_mode="stretch_width", name="player", stylesheets=[WIDGETS])
 
     def show(self, curve: Curve | None, colour: str, end: float) -> None:
-        """Show the body of a curve, if it tells how that is turned; the slider goes to the time `end`."""
+        """Show the body of a curve, if it has the turns of the body; the slider goes to the time `end`."""
         self._slider.update(end=end, step=end / 2000)
         self.figure.visible = self.controls.visible = curve is not None and "heading" in curve.dataset
         if not curve or not self.figure.visible:

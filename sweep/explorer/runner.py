@@ -73,7 +73,7 @@ class Job(Reporter):
     over: bool = False
     """True if there is nothing more to come."""
     dropped: bool = False
-    """Set by whoever no longer waits: the run is not begun, or ends at its next chunk, and nothing more is told."""
+    """Set by whoever stops waiting: the run is not begun, or ends at its next chunk; `tell` is not called again."""
     t_end: float = 1.0
     """The time at which the run ends."""
     rest: Iterator[Curve] = field(default_factory=lambda: iter(()))
@@ -81,13 +81,13 @@ class Job(Reporter):
     _told: float = 0.0
 
     def news(self, delay: str = "") -> None:
-        """Tell that something has changed, unless nobody waits."""
+        """Report that something has changed, unless nobody waits."""
         self.delay, self._told = delay, time.perf_counter()
         if not self.dropped:
             self.tell(self)
 
     def chunk(self, progress: Progress) -> None:
-        """Tell how far the run is; ends it by `Dropped` if nobody waits."""
+        """Report how far the run is; end it by `Dropped` if nobody waits."""
         if self.dropped:
             raise Dropped
         self.share = max(self.share, progress.done / self.t_end)
@@ -159,7 +159,7 @@ class Runner:
             return
         except ConfigError as error:
             job.fault = error.faults[0].message if error.faults else str(error)
-        except Exception as error:  # told on the page: this thread has to go on
+        except Exception as error:  # shown on the page: this thread has to go on
             job.fault = printable(f"{type(error).__name__}: {error}")
         job.over = job.over or bool(job.fault)
         if not job.over:

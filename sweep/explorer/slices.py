@@ -1,4 +1,4 @@
-"""A dataset as the explorer needs it: its axes, its variables, maps of them, and what there is to tell of a cell."""
+"""A dataset as the explorer needs it: its axes, its variables, maps of them, and the values of a cell in words."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Source:
 
     @cached_property
     def cell(self) -> xr.Dataset:
-        """One cell with all that is derived, which tells of the variables what no number does."""
+        """One cell with all that is derived, for the names, units and types of the variables."""
         return quantities.with_derived(self.dataset.isel({d: slice(1) for d in self.axes}).load())
 
     def dims_of(self, name: str) -> set[str]:
@@ -98,12 +98,12 @@ class Source:
         return describe(part, name, x, y)
 
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:
-        """The parameters `names` of the cell at `index`, as far as the dataset tells them."""
+        """The parameters `names` of the cell at `index`, as far as the dataset has them."""
         there = self.dataset.coords
         return {name: float(there[name].isel(index, missing_dims="ignore")) for name in names if name in there}
 
     def describe(self, index: Mapping[str, int]) -> dict[str, str]:
-        """All that the dataset tells of the cell at `index`: each variable in words, and its value with its unit."""
+        """All values of the cell at `index`: each variable in words, and its value with its unit."""
         cell = quantities.with_derived(self.dataset.isel({d: index.get(d, 0) for d in self.dims}).load())
         told = {self.words(n): self._value(cell, n) for n in self.variables}
         kinds = marks.marks(cell, self.variables[0])

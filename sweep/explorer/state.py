@@ -1,4 +1,4 @@
-"""The state of the page, the choices that change it, and the address that tells it.
+"""The state of the page, the choices that change it, and the address that holds it.
 
 Every value that comes from an address or from a browser is checked here.
 """
@@ -19,7 +19,7 @@ from sweep.plots import labels
 from sweep.plots.quantities import subject
 
 MAX_CELLS = 6
-"""Curves over each other; as many as there are colours that everybody can tell apart."""
+"""Curves over each other; as many as there are colours that everybody can distinguish."""
 
 LIMITS = {"low": "from", "high": "to"}
 """The ends of the colour scale, and what the page calls them."""
@@ -64,7 +64,7 @@ class Choice:
     title: str
     options: Sequence[str]
     words: Sequence[str]
-    """The options as the page says them."""
+    """The options in the words of the page."""
     axis: Axis | None = None
     """The axis of the dataset on which the options are places."""
 

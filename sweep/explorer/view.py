@@ -100,7 +100,7 @@ class View:
         return {**index, self.state.y: j} if self.state.y else index
 
     def _point(self) -> None:
-        """Tell about the cell under the pointer, or else about the chosen one."""
+        """Show the values of the cell under the pointer, or else of the chosen one."""
         index = self._place(self._shown.probe)
         if index is None:
             self._cell.text = str(PARTS.hint("" if self._setup else why_still(self._source)))
@@ -122,7 +122,7 @@ class View:
             self._activate(self._drawn.cells.index(cell))
             return
         self._faults = []
-        self._drawn.add(cell, beside=bool(self._shown.request.data["add"][0]))
+        self._drawn.add(cell, keep=bool(self._shown.request.data["add"][0]))
         self._draw_cells()
 
     def _edit(self, name: str, value: float) -> None:
@@ -184,7 +184,7 @@ class View:
         self._chosen.tell(curves)
 
     def _names(self) -> list[str]:
-        """Name each cell by what tells it from the others."""
+        """Name each cell by what distinguishes it from the others."""
         cells, base = self._drawn.cells, self._base
         varied = [n for n in base if n not in self._source.dims and any(cell[n] != base[n] for cell in cells)]
         varied = [*(n for n in self._source.dims if n in base), *varied]

@@ -454,7 +454,7 @@ def test_parameters_leave_the_grid(visit: Open) -> None:
     wait_for_curves(page, 1)
     enter(page, "parameter mu", "63.5", "mu:63.5")
     wait(page, "curve legend", "/μ = 63.5.*reversals/.test(m.items[0].label.value)")
-    curve = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=63.5, b=4, n0=0.05)
+    curve = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=63.5, b=4, n0=0.05, t_end=1500)
     spin = model(page, "spin", "[...m.renderers[0].data_source.data.spin]")
     assert spin[100] == pytest.approx(float(curve["spin"][0, 100]), abs=0.02)
     control(page, "drag b", "[role=slider]").focus()
