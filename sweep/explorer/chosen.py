@@ -7,13 +7,13 @@ from functools import partial
 from html import escape
 
 import numpy as np
-from bokeh.models import Button, Checkbox, Column, Div, Row, Slider, TextInput
+from bokeh.models import Button, Column, Div, Row, Slider, TextInput
 
-from sweep.explorer.colours import CURVES
 from sweep.explorer.controls import BARE, WIDGETS, on
 from sweep.explorer.runner import Curve
 from sweep.explorer.slices import Source
 from sweep.explorer.state import MAX_CELLS, Cell, number
+from sweep.explorer.style import CURVES
 from sweep.parameters import Parameter
 from sweep.plots import labels
 
@@ -27,10 +27,7 @@ class CellControls:
     ) -> None:  # fmt: skip
         self._edit = edit
         self._quiet = False
-        self.keep = Checkbox(label="keep the curves when another cell is clicked", active=False, name="keep")
-        """Whether a click adds a cell rather than replacing those drawn."""
         self._rows = [self._row(k, activate, remove) for k in range(MAX_CELLS)]
-        self._title = Div(text="", margin=(8, 0, 0, 0))
         self._end = Div(text="", margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
         ordered = [*(n for n in source.dims if n in base), *(n for n in base if n not in source.dims)]
         self._inputs = {name: _Input(source, known[name], partial(self._edited, name)) for name in ordered}
@@ -38,9 +35,9 @@ class CellControls:
         inputs = self._inputs.values()
         dragged = [Row(one.field, one.slider, sizing_mode="stretch_width", styles=wrap) for one in inputs if one.slider]
         typed = [one.field for one in inputs if not one.slider]
-        self._editor = Column(self._title, *dragged, Row(*typed, sizing_mode="stretch_width", styles=wrap),
+        self._editor = Column(*dragged, Row(*typed, sizing_mode="stretch_width", styles=wrap),
                               sizing_mode="stretch_width", visible=False, name="parameters")  # fmt: skip
-        self.root = Column(self.keep, *(row for row, _ in self._rows), self._end, self._editor, name="chosen",
+        self.root = Column(*(row for row, _ in self._rows), self._end, self._editor, name="chosen",
                            stylesheets=[WIDGETS], sizing_mode="stretch_width", visible=bool(base))  # fmt: skip
 
     def show(self, cells: Sequence[Cell], names: Sequence[str], active: int) -> None:
@@ -51,7 +48,6 @@ class CellControls:
                 button.button_type = "primary" if k == active else "default"
         self._editor.visible = bool(cells)
         if cells:
-            self._title.text = f"<b>Parameters of {active + 1}</b>"
             self._quiet = True
             for name, controls in self._inputs.items():
                 controls.put(cells[active][name])
@@ -93,11 +89,8 @@ class _Input:
         self.slider: Slider | None = None
         if axis is None or len(axis.values) < 2:
             return
-        first, last = axis.straight(axis.values[[0, -1]])
-        wider = axis.bent(np.array([first, last]) + np.array([-0.1, 0.1]) * (last - first))
-        ends = [w if parameter.allows(w) else v for w, v in zip(wider, axis.values[[0, -1]], strict=True)]
-        low, high = map(float, axis.straight(np.array(ends)))
-        self.slider = Slider(start=low, end=high, step=float(last - first) / 1000, value=low, title=None,
+        first, last = map(float, axis.straight(axis.values[[0, -1]]))
+        self.slider = Slider(start=first, end=last, step=(last - first) / 1000, value=first, title=None,
                              show_value=False, sizing_mode="stretch_width", min_width=100, name=f"drag {name}",
                              stylesheets=[BARE])  # fmt: skip
         on(self.slider, "value", lambda place: edited(float(axis.bent(np.array(place)))))

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from bokeh.models import Column, CustomJS, Div, RadioButtonGroup, Row, Select, Slider, TextInput
+from bokeh.models import CustomJSTickFormatter, Row, Select, Slider, TextInput
 
 from sweep.explorer.slices import Source
 from sweep.explorer.state import LIMITS, Choice, State, choices, number
-from sweep.plots import labels
 
 WIDGETS = ":host { color: #1b2733; color-scheme: light; filter: var(--widgets) }"
 """Of the outermost widgets, which a dark page inverts."""
@@ -29,24 +27,38 @@ class MapControls:
     """The widgets of all choices: which variable is shown, over which axes, and where on the others."""
 
     def __init__(self, source: Source, change: Callable[[Callable[[State], State]], None]) -> None:
-        """`change` is told how the visitor changes the state."""
+        """`change` is called with what the visitor makes of the state."""
         self._source, self._change = source, change
         self._choices = choices(source)
-        self._widgets = {name: _Widgets(choice, partial(self._pick, choice)) for name, choice in self._choices.items()}
+        self._widgets = {name: self._widget(choice) for name, choice in self._choices.items()}
         self._limits = {name: self._limit(name, words) for name, words in LIMITS.items()}
-        self.root = Row(children=[*(w.root for w in self._widgets.values()), *self._limits.values()], name="controls",
+        self.root = Row(children=[*self._widgets.values(), *self._limits.values()], name="controls",
                         stylesheets=[WIDGETS], sizing_mode="stretch_width",
                         styles={"gap": "10px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 
     def show(self, state: State) -> None:
         """Let the widgets say what is shown."""
         along = self._source.dims_of(state.show) | set(self._source.dims)
-        for name, widgets in self._widgets.items():
-            widgets.show(self._choices[name].of(state))
-            widgets.root.visible = name not in self._source.axes or name in along - {state.x, state.y}
+        for name, choice in self._choices.items():
+            k = choice.of(state)
+            self._widgets[name].value = k if choice.axis else choice.options[k]
+            self._widgets[name].visible = not choice.axis or name in along - {state.x, state.y}
         for name, field in self._limits.items():
             limit = getattr(state, name)
             field.value = "" if limit is None else f"{limit:.6g}"
+
+    def _widget(self, choice: Choice) -> Slider | Select:
+        """A slider over the indices of an axis, which shows the value there, or else a list."""
+        common: dict[str, Any] = {"title": choice.title, "name": choice.name, "stylesheets": [BARE]}
+        if choice.axis:
+            value = CustomJSTickFormatter(args={"words": list(choice.words)}, code="return words[tick]")
+            slider = Slider(start=0, end=len(choice.words) - 1, step=1, value=0, width=190, format=value, **common)
+            on(slider, "value_throttled", partial(self._pick, choice))
+            return slider
+        named = list(zip(choice.options, choice.words, strict=True))
+        choose = Select(options=named, width=250 if choice.name == "show" else 150, **common)
+        on(choose, "value", lambda option: self._pick(choice, choice.find(option)))
+        return choose
 
     def _pick(self, choice: Choice, k: Any) -> None:
         """Take an option that the browser sent, which may be anything."""
@@ -64,45 +76,3 @@ class MapControls:
 
         on(field, "value", put)
         return field
-
-
-class _Widgets:
-    """Buttons, a list or a slider, or buttons and a list, for the options of a choice."""
-
-    def __init__(self, choice: Choice, pick: Callable[[Any], None]) -> None:
-        self._choice, n = choice, choice.buttons
-        name, title = choice.name, "" if n else choice.title
-        self._buttons = RadioButtonGroup(labels=list(choice.words[:n]), visible=n > 0, name=f"buttons {name}",
-                                         stylesheets=[BARE])  # fmt: skip
-        on(self._buttons, "active", pick)
-        self._more: Slider | Select | None = None
-        if n < len(choice.options) and choice.axis:
-            self._more = _slider(choice)
-            on(self._more, "value_throttled", pick)
-        elif n < len(choice.options):
-            hint = [("", f"another {choice.title} …")] if n else []
-            named = [*hint, *zip(choice.options[n:], choice.words[n:], strict=True)]
-            self._more = Select(title=title, options=named, value="", width=250 if n else 150, name=name,
-                                stylesheets=[BARE])  # fmt: skip
-            on(self._more, "value", lambda option: pick(choice.find(option)))
-        row = Row(self._buttons, *([self._more] if self._more else []), styles={"gap": "6px", "flex-wrap": "wrap"})
-        heading = Div(text=html.escape(choice.title), styles={"font-size": "12px", "color": "#5b6875"}, margin=0)
-        self.root = Column(heading, row) if n else row
-
-    def show(self, k: int) -> None:
-        """Let the widgets say that option `k` is chosen."""
-        self._buttons.active = k if k < self._choice.buttons else None
-        if isinstance(self._more, Slider):
-            self._more.update(value=k, title=f"{labels.symbol(self._choice.name)} = {self._choice.words[k]}")
-        elif self._more:
-            self._more.value = self._choice.options[k] if k >= self._choice.buttons else ""
-
-
-def _slider(choice: Choice) -> Slider:
-    """A slider over the indices of an axis, which says the value while it is dragged."""
-    slider = Slider(start=0, end=len(choice.words) - 1, step=1, value=0, width=190, show_value=False, name=choice.name,
-                    stylesheets=[BARE])  # fmt: skip
-    args = {"values": list(choice.words), "symbol": labels.symbol(choice.name)}
-    code = "cb_obj.title = `${symbol} = ${values[cb_obj.value]}`"
-    slider.js_on_change("value", CustomJS(args=args, code=code))
-    return slider

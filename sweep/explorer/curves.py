@@ -11,11 +11,10 @@ from bokeh import models
 from bokeh.core.properties import value
 from bokeh.plotting import figure
 
-from sweep.explorer import axes
-from sweep.explorer.colours import CURVES
 from sweep.explorer.player import Player
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
+from sweep.explorer.style import CURVES, GRID, SOFT, style
 from sweep.grid import Array
 from sweep.plots import labels, theory
 
@@ -25,7 +24,7 @@ _STRETCHES = 3000
 _OVER_TIME = ("spin", "energy", "dissipated")
 
 _LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.0,
-           "label_text_color": axes.SOFT, "border_line_color": None}  # fmt: skip
+           "label_text_color": SOFT, "border_line_color": None}  # fmt: skip
 
 
 class Curves:
@@ -39,17 +38,17 @@ class Curves:
         self.spin.add_layout(models.Legend(items=items, location="top_right", name="curve legend", **_LEGEND))
         self.spin.y_range.renderers = [item.renderers[0] for item in items]  # critical spins may be far away
         for words, dash in (("energy above rest", "solid"), ("work against friction", "dashed")):
-            self.energy.line([np.nan], [np.nan], color=axes.SOFT, line_dash=dash, legend_label=words)
+            self.energy.line([np.nan], [np.nan], color=SOFT, line_dash=dash, legend_label=words)
         self.energy.legend.update(location="right", **_LEGEND)
         self._critical = models.ColumnDataSource({"spin": [], "time": [], "dash": [], "symbol": []})
-        self.spin.hspan("spin", source=self._critical, line_color=axes.SOFT, line_dash="dash", level="underlay")
+        self.spin.hspan("spin", source=self._critical, line_color=SOFT, line_dash="dash", level="underlay")
         self.spin.text("time", "spin", "symbol", source=self._critical, text_font_size="11px", text_align="right",
-                       text_color=axes.SOFT)  # fmt: skip
+                       text_color=SOFT)  # fmt: skip
         self._played: tuple[Curve | None, float] | None = None
         self.player = Player([self.spin, self.energy])
 
     def show(self, curves: Sequence[Curve | None], names: Sequence[str], active: int) -> None:
-        """Draw the curves, one a place, with what the legend says of them; the critical spins are those of `active`."""
+        """Draw the curves, one a place, with their names in the legend; the critical spins are those of `active`."""
         for k, slot in enumerate(self._slots):
             slot.show(curves[k] if k < len(curves) else None, names[k] if k < len(curves) else "")
         present = [curve.dataset for curve in curves if curve]
@@ -62,13 +61,13 @@ class Curves:
         if (chosen, end) != self._played:
             self._played = chosen, end
             self.player.show(chosen, CURVES[active], end)
-        spins = theory.levels(chosen.dataset) if chosen else []
-        self._critical.data = {
-            "spin": [at for _, _, at, _ in spins],
-            "time": [end * (0.93 if name == "n_c1" else 1.0) for name, *_ in spins],  # they often lie close together
-            "dash": [theory.OVER_TIME[name] for name, *_ in spins],
-            "symbol": [sign for _, sign, *_ in spins],
-        }
+            spins = theory.levels(chosen.dataset) if chosen else []
+            self._critical.data = {
+                "spin": [at for _, _, at, _ in spins],
+                "time": [end * (0.93 if name == "n_c1" else 1.0) for name, *_ in spins],  # they often lie close
+                "dash": [theory.OVER_TIME[name] for name, *_ in spins],
+                "symbol": [sign for _, sign, *_ in spins],
+            }
 
     def _label(self, one: xr.Dataset) -> None:
         """Label the axes, in the units of a trajectory."""
@@ -104,7 +103,7 @@ class _Slot:
         self.item.update(label=value(name), visible=curve is not None)
 
     def _put(self, curve: Curve | None) -> None:
-        """Send a curve to the browser; what it does not tell is NaN."""
+        """Send a curve to the browser; a series that it lacks is NaN."""
         one, reversals = (
             (curve.dataset, curve.reversals) if curve else (xr.Dataset({"time": ("time", [])}), np.zeros(0))
         )
@@ -112,12 +111,12 @@ class _Slot:
             name: (one[name].values if name in one else np.full(one.sizes["time"], np.nan)).astype("float32")
             for name in ("time", *_OVER_TIME)
         }
-        at = _told([columns[name] for name in _OVER_TIME])
+        at = _drawn_samples([columns[name] for name in _OVER_TIME])
         self.series.data = {name: column[at] for name, column in columns.items()}
         self.reversals.data = {"x": reversals, "y": np.zeros(len(reversals))}
 
 
-def _told(series: Sequence[Array]) -> Array:
+def _drawn_samples(series: Sequence[Array]) -> Array:
     """The samples to draw: of each stretch the lowest and the highest of each series, so that no peak is lost."""
     count = len(series[0])
     stretch = -(-count // _STRETCHES)
@@ -135,6 +134,6 @@ def _figure(height: int, name: str) -> Any:
         active_drag="box_zoom", toolbar_location="right", name=name, outline_line_color=None,
     )  # fmt: skip
     plot.toolbar.update(logo=None, autohide=True)
-    plot.grid.grid_line_color = axes.GRID
-    axes.style(plot)
+    plot.grid.grid_line_color = GRID
+    style(plot)
     return plot

@@ -1,14 +1,13 @@
-"""Makes files of what is seen, without Bokeh: slice and trajectories as netCDF, and the configuration of both."""
+"""Makes files of what is seen: the curves as a table, and the configuration of the slice and of its trajectories."""
 
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
-import pandas as pd
+import xarray as xr
 
 from sweep.config import Config, Values
 from sweep.explorer.runner import Curve
@@ -24,27 +23,19 @@ def stem(source: Source) -> str:
     return f"{words or 'sweep'}_explored"
 
 
-def netcdf(source: Source, address: str, state: State, curves: Sequence[Curve]) -> bytes:
-    """The slice with all its variables, and in the groups `trajectory_1`, … the trajectories, as a netCDF file."""
-    fixed = {d: state.at.get(d, 0) for d in source.dims if d not in (state.x, state.y)}
-    part = source.dataset.isel(fixed).load().assign_attrs(explored=address)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "slice.nc")
-        part.to_netcdf(path, engine="netcdf4")
-        for k, curve in enumerate(curves, 1):
-            curve.dataset.to_netcdf(path, engine="netcdf4", mode="a", group=f"trajectory_{k}")
-        return path.read_bytes()
-
-
-def csv(curves: Sequence[Curve]) -> str:
+def csv(curves: Sequence[Curve | None]) -> str:
     """The samples of all trajectories, one a line, below a line of names and units."""
-    tables = [pd.DataFrame(columns=["trajectory"])] if not curves else []
-    for k, curve in enumerate(curves, 1):
-        one = curve.dataset
-        names = ["time", *(str(name) for name, v in one.data_vars.items() if v.dims == ("time",))]
-        series = {labels.with_unit(name, labels.unit(one, name)): one[name].values for name in names}
-        tables.append(pd.DataFrame({"trajectory": k} | series))
-    return str(pd.concat(tables).to_csv(index=False, float_format="%.10g", na_rep="nan"))
+    tables = [_table(curve.dataset, k) for k, curve in enumerate(curves, 1) if curve]
+    return "".join(t.to_csv(index=False, header=t is tables[0], float_format="%.10g", na_rep="nan") for t in tables)
+
+
+def _table(one: xr.Dataset, k: int) -> Any:
+    """The samples of the k-th trajectory as a table of pandas."""
+    series = one[[name for name, v in one.data_vars.items() if v.dims == ("time",)]].reset_coords(drop=True)
+    heads = {name: labels.with_unit(str(name), labels.unit(one, str(name))) for name in series.variables}
+    table = series.to_dataframe().reset_index().rename(columns=heads)
+    table.insert(0, "trajectory", k)
+    return table
 
 
 def yaml(source: Source, setup: Setup, state: State) -> str:

@@ -7,7 +7,6 @@ There is no glyph per cell: an image and a table of bits are sent as binary arra
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,11 +14,10 @@ from bokeh import models
 from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure
 
-from sweep.explorer import axes
-from sweep.explorer.colours import is_logarithmic, mapping, scale_of
-from sweep.explorer.patterns import TILES
+from sweep.explorer import style
 from sweep.explorer.slices import PlacedAxis, Source, plain
-from sweep.explorer.state import COUNTS, State
+from sweep.explorer.state import State
+from sweep.explorer.style import SOFT, TILES
 from sweep.plots import labels, marks, places, theory
 from sweep.plots.description import Map
 from sweep.plots.scales import Scale
@@ -30,16 +28,13 @@ HEIGHT = 480
 _CUT_HEIGHT = 150
 """Of a cut, in pixels."""
 
-_SHORT = COUNTS | {"status": "end"}
-"""What these are called under the pointer, where the table must not hide the map."""
-
 LINES = {name: (dash, round(1.25 * width, 2)) for name, (dash, width) in theory.STYLES.items()}
 """How the lines over a map are dashed, and their widths in pixels."""
 
 _BAR = {
-    "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": axes.SOFT,
-    "bar_line_color": axes.SOFT, "major_label_text_font_size": "12px", "background_fill_color": None,
-    "title_text_font_style": "normal", "major_label_text_color": axes.SOFT, "title_text_color": axes.SOFT,
+    "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": SOFT,
+    "bar_line_color": SOFT, "major_label_text_font_size": "12px", "background_fill_color": None,
+    "title_text_font_style": "normal", "major_label_text_color": SOFT, "title_text_color": SOFT,
 }  # fmt: skip
 
 
@@ -47,21 +42,15 @@ class MapFigure:
     """The map over two axes, which shows one slice after another.
 
     The models stay the same from slice to slice: a browser does not forget models that are replaced.
-
-    Parameters
-    ----------
-    main : the map beside which this one stands, with the same cells
     """
 
-    def __init__(self, source: Source, x: str, y: str, main: MapFigure | None = None) -> None:
+    def __init__(self, source: Source, x: str, y: str) -> None:
         self._source, self.axes = source, (x, y)
         self._x, self._y = (source.axes.get(axis, PlacedAxis("", np.zeros(1))) for axis in (x, y))
         self.placed = self._x, self._y
         ex, ey = self._x.drawn_edges, self._y.drawn_edges
         place = {"x": ex[0], "y": ey[0], "dw": ex[-1] - ex[0], "dh": ey[-1] - ey[0]}
         self.figure = plot = _frame(source, self._x, self._y)
-        if main:
-            plot.x_range, plot.y_range = main.figure.x_range, main.figure.y_range
         self._cells = ColumnDataSource({"image": [np.zeros((1, 1), "uint8")], "kinds": [np.zeros((1, 1), "uint8")]})
         # Two images, because an image goes on with the mapper that it was made with.
         self._images = [
@@ -74,42 +63,33 @@ class MapFigure:
         self._lines = {name: _line(plot, *style) for name, style in LINES.items()}
         self._numbers = _counts(plot)
         self._uncertain = plot.scatter([], [], color="white", line_color="black", line_width=0.7)
-        # Here the browser writes which cell is under the pointer, which one is to be run, and what is enclosed.
+        # Here the browser writes which cell is under the pointer, and which one is to be run.
         self.probe = ColumnDataSource({"i": [-1], "j": [-1]}, name="probe")
         self.request = ColumnDataSource({"i": [-1], "j": [-1], "add": [False], "count": [0]}, name="request")
-        self.selected = ColumnDataSource({"xs": [], "ys": []}, name="selected")
-        for colour, dash in (("black", "solid"), ("white", "dashed")):
-            plot.patches("xs", "ys", source=self.selected, fill_color=None, line_color=colour, line_dash=dash)
-        self.cursor: ColumnDataSource = _cursor(plot, main and main.cursor)
-        self.pins: ColumnDataSource = _pins(plot, main and main.pins)
+        cursor, self.pins = _cursor(plot), _pins(plot)
         self._hover = models.HoverTool(renderers=self._images, point_policy="follow_mouse")
         plot.add_tools(self._hover)
         ranges = zip(self.placed, (plot.x_range, plot.y_range), strict=True)
         self._cuts = [_cut(source, axis, span) for axis, span in ranges if axis.name]
         self.cuts = models.Row(*(cut["plot"] for cut in self._cuts), name="cuts", sizing_mode="stretch_width",
-                               styles={"flex-basis": "100%", "flex-wrap": "wrap"})  # fmt: skip
+                               styles={"flex-wrap": "wrap"})  # fmt: skip
         _connect(plot, self._cells, {"figure": plot, "overlay": overlay,
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
-                 "ex": ex, "ey": ey, "cursor": self.cursor, "probe": self.probe, "request": self.request,
-                 "cells": self._cells, "selected": self.selected, "main": main is None, "cuts": self._cuts,
+                 "ex": ex, "ey": ey, "cursor": cursor, "probe": self.probe, "request": self.request,
+                 "cells": self._cells, "cuts": self._cuts,
                  "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
-    def show(self, state: State, names: Iterable[str]) -> tuple[Map, Scale]:
-        """Show the variable of a state, and let the pointer tell of `names` as well.
-
-        Returns the map, and how its values become colours.
-        """
-        self.part = part = self._source.map(state.show, *self.axes, state.at)
-        columns = {state.show: part.values, **self._source.tables(names, *self.axes, state.at)}
-        scale = scale_of(part, state)
-        logarithmic = is_logarithmic(scale)
+    def show(self, state: State) -> tuple[Map, Scale]:
+        """Show the variable of a state; returns its map, and how its values become colours."""
+        part = self._source.map(state.show, *self.axes, state.at)
+        scale = style.scale_of(part, state)
+        logarithmic = style.is_logarithmic(scale)
         for image in self._images:
             image.visible = (image is self._images[1]) == logarithmic
         mapper = self._images[logarithmic].glyph.color_mapper
-        mapper.update(**mapping(scale))
+        mapper.update(**style.mapping(scale))
         kinds = np.packbits(np.stack(list(part.marks.values()), axis=-1), axis=-1, bitorder="little")
-        tables = {name: [plain(table)] for name, table in columns.items()}
-        self._cells.data = {"image": [plain(part.values)], "kinds": [kinds[..., 0]], **tables}
+        self._cells.data = {"image": [plain(part.values)], "kinds": [kinds[..., 0]]}
         for name, source in self._lines.items():
             parts = [points for line in part.lines if line.name == name for points in line.parts]
             source.data = {"xs": [self._x.place(x) for x, _ in parts], "ys": [self._y.place(y) for _, y in parts]}
@@ -130,17 +110,19 @@ class MapFigure:
         self.figure.title.text = self._source.label(part.name)
         # A new bar, because an old one leaves out ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]
-        tip, formatters = _tip(self._source, part, list(columns))
-        self._hover.update(tooltips=tip, formatters=formatters)
+        flags = {str(k): words for k, words in part.flags.items()}
+        code = "return words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')"
+        self._hover.tooltips = [(self._source.words(part.name), "@image{custom}")]
+        self._hover.formatters = {"@image": models.CustomJSHover(args={"words": flags}, code=code)}
         return part, scale
 
     def _bar(self, part: Map, scale: Scale, mapper: Any) -> models.ColorBar:
-        chosen_by_bokeh: Any = "auto" if is_logarithmic(scale) else models.BasicTicker()
+        chosen_by_bokeh: Any = "auto" if style.is_logarithmic(scale) else models.BasicTicker()
         ticks = scale.ticks or {}
         return models.ColorBar(
             color_mapper=mapper,
             ticker=models.FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
-            title=labels.unit(self._source.cell, part.name) or None, formatter=axes.numbers(),
+            title=labels.unit(self._source.cell, part.name) or None, formatter=style.numbers(),
             major_label_overrides=ticks, **_BAR,
         )  # fmt: skip
 
@@ -161,17 +143,17 @@ def _counts(plot: Any) -> ColumnDataSource:
     return source
 
 
-def _cursor(plot: Any, known: ColumnDataSource | None) -> ColumnDataSource:
+def _cursor(plot: Any) -> ColumnDataSource:
     """The outline of the chosen cell."""
-    source = known or ColumnDataSource({key: [] for key in ("left", "right", "bottom", "top", "i", "j")}, name="cursor")
+    source = ColumnDataSource({key: [] for key in ("left", "right", "bottom", "top", "i", "j")}, name="cursor")
     for colour, width in (("black", 4), ("white", 2)):
         plot.quad(source=source, fill_color=None, line_color=colour, line_width=width)
     return source
 
 
-def _pins(plot: Any, known: ColumnDataSource | None) -> ColumnDataSource:
+def _pins(plot: Any) -> ColumnDataSource:
     """The cells whose trajectories are drawn, each with its number."""
-    source = known or ColumnDataSource({key: [] for key in ("x", "y", "colour", "number", "alpha")}, name="pins")
+    source = ColumnDataSource({key: [] for key in ("x", "y", "colour", "number", "alpha")}, name="pins")
     plot.scatter(
         "x", "y", source=source, size=17, fill_color="colour", line_color="white", line_width=1.5, alpha="alpha"
     )
@@ -188,16 +170,16 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
         sizing_mode="stretch_width", min_width=240,
         x_range=models.Range1d(x[0], x[-1], bounds=(x[0], x[-1])),
         y_range=models.Range1d(y[0], y[-1], bounds=(y[0], y[-1])),
-        x_axis_type=axes.kind(across),
-        y_axis_type=axes.kind(up),
+        x_axis_type=style.kind(across),
+        y_axis_type=style.kind(up),
         x_axis_label=source.label(across.name),
         y_axis_label=source.label(up.name) if up.name else None,
-        tools="pan,box_zoom,wheel_zoom,box_select,lasso_select,reset", active_drag="box_zoom", toolbar_location="above",
+        tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom", toolbar_location="above",
         background_fill_color="#e8ebee",
     )  # fmt: skip
     plot.toolbar.logo = None
     plot.grid.visible = False
-    axes.style(plot, across, up)
+    style.style(plot, across, up)
     plot.title.update(text_font_size="14px", text_font_style="bold")
     plot.yaxis.visible = bool(up.name)
     return plot
@@ -207,41 +189,16 @@ def _cut(source: Source, axis: PlacedAxis, span: Any) -> dict[str, Any]:
     """The figure of a cut along an axis, and what `cut` of page.js has to know to fill it."""
     plot = figure(
         height=_CUT_HEIGHT, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, x_range=span,
-        x_axis_type=axes.kind(axis), x_axis_label=source.label(axis.name), name=f"cut along {axis.name}", title=" ",
+        x_axis_type=style.kind(axis), x_axis_label=source.label(axis.name), name=f"cut along {axis.name}", title=" ",
         outline_line_color=None,
     )  # fmt: skip
     data = ColumnDataSource({"at": [], "value": [], "here": []}, syncable=False)
     plot.step("at", "value", source=data, mode="center", color="#0072b2", line_width=1.5)
     plot.scatter("at", "here", source=data, color="#d55e00", size=8)
-    axes.style(plot, axis)
+    style.style(plot, axis)
     plot.title.update(text_font_size="12px", text_font_style="normal")
-    plot.grid.grid_line_color = axes.GRID
+    plot.grid.grid_line_color = style.GRID
     return {"plot": plot, "at": axis.place(axis.values), "values": axis.values, "symbol": labels.symbol(axis.name)}
-
-
-def _tip(source: Source, part: Map, columns: list[str]) -> tuple[str, dict[str, models.CustomJSHover]]:
-    """A table of the cell under the pointer, and what looks its numbers up by the index of the cell."""
-    rows, formatters = [], dict[str, Any]()
-    for axis, variable, index in ((part.x, "$x", "i"), (part.y, "$y", "j")):
-        if axis.name:
-            rows.append((labels.symbol(axis.name), f"{variable}{{custom}}"))
-            code = f"return sweep.number(values[special_vars.image_index.{index}])"
-            formatters[variable] = models.CustomJSHover(args={"values": axis.values}, code=code)
-    for name in columns:
-        rows.append((_SHORT.get(name) or source.words(name), f"@{{{name}}}{{custom}}"))
-        flags = {str(k): words for k, words in labels.flag_words(source.cell, name).items()}
-        code = "return words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')"
-        formatters[f"@{{{name}}}"] = models.CustomJSHover(args={"words": flags}, code=code)
-    table = "".join(
-        f'<tr><td style="color:#5b6875;padding-right:10px">{_escaped(words)}</td><td><b>{value}</b></td></tr>'
-        for words, value in rows
-    )
-    return f'<table style="font-size:12px">{table}</table>', formatters
-
-
-def _escaped(text: str) -> str:
-    """Text for a tooltip: neither markup nor one of Bokeh's placeholders."""
-    return text.translate({ord(character): f"&#{ord(character)};" for character in "&<@${"})
 
 
 def _connect(plot: Any, cells: ColumnDataSource, parts: dict[str, Any]) -> None:
@@ -253,7 +210,6 @@ def _connect(plot: Any, cells: ColumnDataSource, parts: dict[str, Any]) -> None:
         span.js_on_change("end", repaint)
     for size in ("inner_width", "inner_height"):
         plot.js_on_change(size, repaint)
-    plot.js_on_event("selectiongeometry", models.CustomJS(code="sweep.select(cb_obj)"))
     plot.js_on_event("tap", models.CustomJS(code="sweep.tap(cb_obj)"))
     plot.js_on_event("mousemove", models.CustomJS(code="sweep.point(cb_obj)"))
     plot.js_on_event("mouseleave", models.CustomJS(code="sweep.point(null)"))

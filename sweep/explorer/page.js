@@ -90,7 +90,6 @@ const sweep = (() => {
   /** Take note of the map that is shown; called for every new figure. */
   function use(map) {
     repaint(map)
-    if (!map.main) return
     current = map
     cut(...map.cut ?? chosen(map.cursor))
   }
@@ -126,14 +125,6 @@ const sweep = (() => {
     if (i < 0 || j < 0) return
     choose(i, j)
     ask(current.request, i, j, Boolean(event.modifiers?.shift))
-  }
-
-  /** Take note of what a lasso or a box encloses. */
-  function select({geometry, final}) {
-    if (!final) return
-    const {type, x, y, x0, x1, y0, y1} = geometry
-    const [xs, ys] = type === "rect" ? [[x0, x1, x1, x0], [y0, y0, y1, y1]] : [Array.from(x), Array.from(y)]
-    current.selected.data = {xs: [xs], ys: [ys]}
   }
 
   let waiting = 0
@@ -276,9 +267,9 @@ const sweep = (() => {
     history.replaceState(null, "", `?${query}`)
   }
 
-  function save(bytes, name, type) {
+  function save(content, name) {
     const link = document.createElement("a")
-    link.href = URL.createObjectURL(new Blob([bytes], {type}))
+    link.href = URL.createObjectURL(new Blob([content]))
     link.download = name
     link.click()
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000)
@@ -325,7 +316,7 @@ const sweep = (() => {
       pen.drawImage(layer, 0, y)
       y += layer.height
     }
-    canvas.toBlob((blob) => save(blob, name, "image/png"))
+    canvas.toBlob((blob) => save(blob, name))
   }
 
   async function copy(button) {
@@ -337,6 +328,6 @@ const sweep = (() => {
 
   document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
 
-  const api = {address, called, copy, moment, number, picture, play, point, save, select, tap, turn, use}
+  const api = {address, called, copy, moment, number, picture, play, point, save, tap, turn, use}
   return api
 })()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -14,16 +13,12 @@ from bokeh.models import Column, Div
 from bokeh.resources import INLINE
 from jinja2 import Environment
 
-from sweep.explorer import figure, patterns, state
-from sweep.explorer.colours import beyond
+from sweep.explorer import figure, state, style
 from sweep.explorer.slices import Source
 from sweep.plots import labels
 from sweep.plots.description import Map
 from sweep.plots.scales import Scale
 from sweep.results.writing import replacing
-
-_MOST_VALUES = 8_000_000
-"""Numbers in a page that stands alone, at most: of larger maps it tells only what matters most."""
 
 
 def _text(name: str) -> str:
@@ -46,10 +41,10 @@ def dress(document: Document, source: Source, query: str | None = None) -> None:
 
 def legend(part: Map, scale: Scale) -> str:
     """The patterns and lines that occur in a map, and what lies beyond its scale, as HTML."""
-    items = [(patterns.swatch(kind), words) for kind, words in part.legend.items()]
+    items = [(style.swatch(kind), words) for kind, words in part.legend.items()]
     lines = {line.words: figure.LINES[line.name] for line in part.lines}
     items += [(f"border-top:{2 * width}px {dash} currentColor", words) for words, (dash, width) in lines.items()]
-    return str(PARTS.legend(items, beyond(part, scale)))
+    return str(PARTS.legend(items, style.beyond(part, scale)))
 
 
 def save_html(
@@ -77,7 +72,7 @@ def save_html(
     if faults:
         raise ValueError("; ".join(faults))
     drawn = figure.MapFigure(source, shown.x, shown.y)
-    part, scale = drawn.show(shown, _told(source, shown))
+    part, scale = drawn.show(shown)
     document = Document()
     document.add_root(Column(drawn.figure, drawn.cuts, sizing_mode="stretch_width", name="map"))
     document.add_root(Div(text=legend(part, scale), sizing_mode="stretch_width", name="legend"))
@@ -89,12 +84,3 @@ def save_html(
     html = file_html(document, INLINE, document.title, template=document.template, template_variables=variables)
     with replacing(path) as temporary:
         temporary.write_text(html, encoding="utf-8")
-
-
-def _told(source: Source, shown: state.State) -> list[str]:
-    """The variables that the pointer tells: all, or of a large map only the counts and how they came about."""
-    plain = [n for n in source.variables if source.dims_of(n) <= set(source.dims)]
-    cells = math.prod(len(axis.values) for name, axis in source.axes.items() if name in (shown.x, shown.y))
-    if cells * len(plain) > _MOST_VALUES:
-        return [n for n in plain if n in ("reversals", "reversals_predicted", "difference", "status")]
-    return plain

@@ -12,9 +12,9 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import proj3d
 
-from sweep.explorer import axes
 from sweep.explorer.controls import WIDGETS
 from sweep.explorer.runner import Curve
+from sweep.explorer.style import GRID, SOFT
 from sweep.plots import body, labels
 
 _MOMENTS = 20_000
@@ -35,7 +35,7 @@ class Player:
         self._motion, self._shape = models.ColumnDataSource(), models.ColumnDataSource()
         faces = models.ColumnDataSource({"xs": [], "ys": [], "colour": []}, syncable=False, name="faces")
         trace = models.ColumnDataSource({"x": [], "y": []}, syncable=False)
-        table = plot.multi_line("xs", "ys", source=self._table, color=axes.GRID)
+        table = plot.multi_line("xs", "ys", source=self._table, color=GRID)
         plot.patches("xs", "ys", source=faces, color="colour", line_width=0.5)
         for colour, width in (("white", 3.0), ("black", 1.2)):  # seen through the body, which covers most of it
             plot.line("x", "y", source=trace, color=colour, line_width=width)
@@ -43,7 +43,7 @@ class Player:
             span.update(renderers=[table], range_padding=0.05)
         clock = models.Label(x=6, y=6, x_units="screen", y_units="screen", text_font_size="12px", syncable=False)
         plot.add_layout(clock)
-        line = models.Span(location=0, dimension="height", line_color=axes.SOFT, line_width=1, syncable=False)
+        line = models.Span(location=0, dimension="height", line_color=SOFT, line_width=1, syncable=False)
         for other in over_time:
             other.add_layout(line)
         parts = {"motion": self._motion, "shape": self._shape, "faces": faces, "trace": trace, "line": line,
@@ -71,7 +71,7 @@ class Player:
         return models.Column(self._slider, row, sizing_mode="stretch_width", name="player", stylesheets=[WIDGETS])
 
     def show(self, curve: Curve | None, colour: str, end: float) -> None:
-        """Show the body of a curve, if it tells how that is turned; the slider goes to the time `end`."""
+        """Show the body of a curve, if it has the turns of the body; the slider goes to the time `end`."""
         self._slider.update(end=end, step=end / 2000)
         self.figure.visible = self.controls.visible = curve is not None and "heading" in curve.dataset
         if not curve or not self.figure.visible:

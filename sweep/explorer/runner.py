@@ -34,9 +34,6 @@ COMPILING = "compiling the simulation for this machine; later runs find it in th
 _STRETCHES = tuple(0.25**k for k in range(4, -1, -1))
 """A trajectory is run to these shares of its time in turn, so that the first of its curve is seen at once."""
 
-_KEPT = 64
-"""Trajectories that are remembered."""
-
 _TELL_EVERY = 0.1
 """Seconds between two reports of progress."""
 
@@ -70,30 +67,27 @@ class Job(Reporter):
     delay: str = ""
     """The reason if it does not get on."""
     curve: Curve | None = None
-    """As far as it has been run."""
+    """As far as it has been run; at first that of the job whose place this one takes."""
     fault: str = ""
     """The reason if there will be no curve."""
+    over: bool = False
+    """True if there is nothing more to come."""
     dropped: bool = False
-    """Set by whoever no longer waits: the run is not begun, or ends at its next chunk, and nothing more is told."""
+    """Set by whoever stops waiting: the run is not begun, or ends at its next chunk; `tell` is not called again."""
     t_end: float = 1.0
     """The time at which the run ends."""
     rest: Iterator[Curve] = field(default_factory=lambda: iter(()))
     """Runs it further."""
     _told: float = 0.0
 
-    @property
-    def over(self) -> bool:
-        """True if there is nothing more to come."""
-        return bool(self.fault or (self.curve and self.curve.whole))
-
     def news(self, delay: str = "") -> None:
-        """Tell that something has changed, unless nobody waits."""
+        """Report that something has changed, unless nobody waits."""
         self.delay, self._told = delay, time.perf_counter()
         if not self.dropped:
             self.tell(self)
 
     def chunk(self, progress: Progress) -> None:
-        """Tell how far the run is; ends it by `Dropped` if nobody waits."""
+        """Report how far the run is; end it by `Dropped` if nobody waits."""
         if self.dropped:
             raise Dropped
         self.share = max(self.share, progress.done / self.t_end)
@@ -134,7 +128,6 @@ class Runner:
         self._setup = setup
         self._jobs: PriorityQueue[tuple[float, int, Job]] = PriorityQueue()
         self._numbers = count()
-        self._known: dict[tuple[tuple[str, float], ...], Curve] = {}
         self._running: Job | None = None
         self._compiles = False
         # Not waited for at the end of the program: a chunk of a kernel cannot be interrupted.
@@ -157,21 +150,18 @@ class Runner:
                 self._go_on(self._running)
 
     def _go_on(self, job: Job) -> None:
-        key = tuple(sorted(job.cell.items()))
+        if job.dropped:
+            return
         try:
-            if job.dropped:
-                return
-            job.curve = self._known.get(key) or next(job.rest)
+            job.curve = next(job.rest)
+            job.over = job.curve.whole
         except Dropped:
             return
         except ConfigError as error:
             job.fault = error.faults[0].message if error.faults else str(error)
-        except Exception as error:  # told on the page: this thread has to go on
+        except Exception as error:  # shown on the page: this thread has to go on
             job.fault = printable(f"{type(error).__name__}: {error}")
-        if job.curve and job.curve.whole:
-            self._known[key] = job.curve
-            if len(self._known) > _KEPT:
-                del self._known[next(iter(self._known))]
+        job.over = job.over or bool(job.fault)
         if not job.over:
             self._jobs.put((job.share, next(self._numbers), job))
         job.news()

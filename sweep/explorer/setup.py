@@ -23,7 +23,7 @@ class Setup:
     Parameters
     ----------
     model : the file or entry point of the model, if a user brought it; its code runs
-    announce : told in words that it is about to run
+    announce : called with a line of words before it runs
 
     Raises
     ------
@@ -41,7 +41,7 @@ def why_still(source: Source) -> str:
     """Say why no trajectory is run of a file that is not `usable`."""
     if place := source.dataset.attrs.get("model_place"):
         return f"Its model is code of a user, {place}, and runs only if you name it: sweep explore FILE --model MODEL."
-    return "This file tells no configuration to run trajectories from."
+    return "This file has no configuration to run trajectories from."
 
 
 def usable(source: Source) -> Setup | None:
@@ -55,7 +55,7 @@ def usable(source: Source) -> Setup | None:
 def _named(source: Source, model: str) -> dict[str, str]:
     """The keys by which the configuration names the user's model, which runs only if its hash is the dataset's.
 
-    What the dataset says of its file does not matter: the dataset may come from anybody.
+    The file that the dataset names does not matter: the dataset may come from anybody.
     """
     wanted, words = source.dataset.attrs.get("model_sha256"), ""
     if wanted is None:

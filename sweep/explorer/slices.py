@@ -1,9 +1,9 @@
-"""A dataset as the explorer needs it: its axes, its variables, maps of them, and what there is to tell of a cell."""
+"""A dataset as the explorer needs it: its axes, its variables, maps of them, and the values of a cell in words."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -14,17 +14,14 @@ import xarray as xr
 
 from sweep.axis import Axis
 from sweep.grid import Array
-from sweep.plots import labels, marks, quantities, theory
-from sweep.plots.description import Map, along, describe, table
+from sweep.plots import labels, marks, quantities
+from sweep.plots.description import Map, along, describe
 from sweep.results.kind import BOUNDARIES, FIT, INDICES, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
 
 IN_MEMORY = 2_000_000
 """Cells up to which a dataset is read as a whole; of a larger one, each slice is read when it is shown."""
-
-_HOW = {"linear": "eigenvalues", "simulated": "simulation", "reason": "whether found"}
-"""How a critical spin was found, by what follows its name."""
 
 
 class PlacedAxis(Axis):
@@ -80,7 +77,7 @@ class Source:
 
     @cached_property
     def cell(self) -> xr.Dataset:
-        """One cell with all that is derived, which tells of the variables what no number does."""
+        """One cell with all that is derived, for the names, units and types of the variables."""
         return quantities.with_derived(self.dataset.isel({d: slice(1) for d in self.axes}).load())
 
     def dims_of(self, name: str) -> set[str]:
@@ -89,10 +86,6 @@ class Source:
 
     def words(self, name: str) -> str:
         """Say what a variable or an axis is."""
-        if name.startswith("n_c") and name.count("_") > 1:
-            _, _, _, *how = name.split("_")
-            words = ", ".join([_HOW.get(h, h) for h in how] or ["formula"])
-            return f"{theory.symbol(name)}, {words}"
         return labels.words(self.cell, name)
 
     def label(self, name: str) -> str:
@@ -101,25 +94,16 @@ class Source:
 
     def map(self, name: str, x: str, y: str, at: Mapping[str, int]) -> Map:
         """Read the map of a variable over `x` and `y`, at an index of each other axis; a row if `y` is empty."""
-        return describe(self._part(x, y, at), name, x, y)
-
-    def tables(self, names: Iterable[str], x: str, y: str, at: Mapping[str, int]) -> dict[str, Array]:
-        """The values of variables over the cells of such a map, each of shape (y, x)."""
-        part = self._part(x, y, at)
-        axes = [self.axes[d] if d else Axis("", np.zeros(1)) for d in (x, y)]
-        return {name: table(quantities.field(part, name), *axes) for name in names}
-
-    def _part(self, x: str, y: str, at: Mapping[str, int]) -> xr.Dataset:
-        """The slice over `x` and `y`; of a large file, each variable is read when it is asked for."""
-        return self.dataset.isel({d: at.get(d, 0) for d in self.axes if d not in (x, y)})
+        part = self.dataset.isel({d: at.get(d, 0) for d in self.axes if d not in (x, y)})
+        return describe(part, name, x, y)
 
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:
-        """The parameters `names` of the cell at `index`, as far as the dataset tells them."""
+        """The parameters `names` of the cell at `index`, as far as the dataset has them."""
         there = self.dataset.coords
         return {name: float(there[name].isel(index, missing_dims="ignore")) for name in names if name in there}
 
     def describe(self, index: Mapping[str, int]) -> dict[str, str]:
-        """All that the dataset tells of the cell at `index`: each variable in words, and its value with its unit."""
+        """All values of the cell at `index`: each variable in words, and its value with its unit."""
         cell = quantities.with_derived(self.dataset.isel({d: index.get(d, 0) for d in self.dims}).load())
         told = {self.words(n): self._value(cell, n) for n in self.variables}
         kinds = marks.marks(cell, self.variables[0])

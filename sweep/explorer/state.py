@@ -1,4 +1,4 @@
-"""The state of the page, the choices that change it, and the address that tells it.
+"""The state of the page, the choices that change it, and the address that holds it.
 
 Every value that comes from an address or from a browser is checked here.
 """
@@ -19,25 +19,19 @@ from sweep.plots import labels
 from sweep.plots.quantities import subject
 
 MAX_CELLS = 6
-"""Curves over each other; as many as there are colours that everybody can tell apart."""
-
-_BUTTONS = 6
-"""Values of an axis that have a button each; more share a slider."""
+"""Curves over each other; as many as there are colours that everybody can distinguish."""
 
 LIMITS = {"low": "from", "high": "to"}
 """The ends of the colour scale, and what the page calls them."""
 
-COUNTS = {"reversals": "simulated", "reversals_predicted": "predicted", "difference": "difference"}
-"""The variables that have a button each, and what it says."""
-
 Cell = Mapping[str, float]
 """The parameters of a trajectory."""
 
+_ENDED = ("beside", "spacing")
+"""Keys of links of older versions, which are left out."""
 
 PALETTES = ("", "viridis", "cividis", "inferno", "turbo", "gray", "PuOr_r", "coolwarm")
 """Names of matplotlib's that can be chosen; without one a variable has its own."""
-
-_SPACINGS = {"": "by the values", "linear": "linear", "log": "logarithmic"}
 
 
 @dataclass(frozen=True)
@@ -51,11 +45,8 @@ class State:
     """One of the source's variables."""
     at: Mapping[str, int] = field(default_factory=dict)
     """The index on each axis that is not drawn."""
-    beside: str = ""
-    """The variable of a second map, if there is one."""
     cells: tuple[Cell, ...] = ()
     palette: str = ""
-    spacing: str = ""
     low: float | None = None
     high: float | None = None
     """What the visitor has chosen of the colour scale; the rest is as in pictures."""
@@ -73,9 +64,7 @@ class Choice:
     title: str
     options: Sequence[str]
     words: Sequence[str]
-    """The options as the page says them."""
-    buttons: int = 0
-    """The number of options, from the first on, that have a button each; the others share a list or a slider."""
+    """The options in the words of the page."""
     axis: Axis | None = None
     """The axis of the dataset on which the options are places."""
 
@@ -108,21 +97,16 @@ class Choice:
 
 def choices(source: Source) -> dict[str, Choice]:
     """All that can be chosen of the map of a dataset, by name."""
-    counts = [n for n in COUNTS if n in source.variables]
-    others = [n for n in source.variables if n not in counts]
-    words = [*(COUNTS[n] for n in counts), *map(source.words, others)]
     axes = list(source.axes), [source.words(d) for d in source.axes]
-    found = [Choice("show", "variable", [*counts, *others], words, len(counts))]
-    found.append(Choice("beside", "beside it", ["", *counts, *others], ["nothing", *words]))
+    found = [Choice("show", "variable", source.variables, [*map(source.words, source.variables)])]
     found.append(Choice("x", "horizontal axis", *axes))
     if len(source.axes) > 1:
         found.append(Choice("y", "vertical axis", *axes))
     for name, axis in source.axes.items():
         unit = labels.si_unit(source.dataset, name)
         exact, short = [f"{v:.12g}" for v in axis.values], [f"{labels.number(v)}{unit}" for v in axis.values]
-        found.append(Choice(name, source.words(name), exact, short, len(exact) * (len(exact) <= _BUTTONS), axis))
+        found.append(Choice(name, source.words(name), exact, short, axis))
     found.append(Choice("palette", "palette", PALETTES, ["its own", *PALETTES[1:]]))
-    found.append(Choice("spacing", "colours", list(_SPACINGS), list(_SPACINGS.values())))
     return {choice.name: choice for choice in found}
 
 
@@ -173,15 +157,18 @@ def read(
             state = state.limited(key, limit)
         elif key in LIMITS:
             faults.append(f"{key}={brief(values[-1])} is no number")
-        elif key != "cell":
-            known_keys = ", ".join([*all_choices, *LIMITS])
-            faults.append(f"{brief(key)} is no part of an address; there are {known_keys} and cell")
-    asked = query.get("cell", ())
-    cells = [(text, _cell(text, base, known)) for text in asked[:MAX_CELLS]]
-    faults += [f"cell={brief(text)}: {cell}" for text, cell in cells if isinstance(cell, str)]
+        elif key not in ("cell", *_ENDED):
+            expected = ", ".join([*all_choices, *LIMITS, "cell"])
+            faults.append(f"unknown URL parameter '{brief(key)}'; expected one of {expected}")
+    asked, cells = query.get("cell", ()), list[Cell]()
+    for text in asked[:MAX_CELLS]:
+        try:
+            cells.append(_cell(text, base, known))
+        except ValueError as fault:
+            faults.append(f"cell={brief(text)}: {fault}")
     if len(asked) > MAX_CELLS:
         faults.append(f"{len(asked)} cells are too many; the first {MAX_CELLS} are drawn")
-    return replace(state, cells=tuple(cell for _, cell in cells if not isinstance(cell, str))), faults
+    return replace(state, cells=tuple(cells)), faults
 
 
 def wrong_value(parameter: Parameter, value: float) -> str:
@@ -191,18 +178,18 @@ def wrong_value(parameter: Parameter, value: float) -> str:
     return f"{parameter.name} has to be {parameter.allowed}"
 
 
-def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell | str:
-    """The cell that an address names, or what is wrong with it."""
+def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell:
+    """The cell that an address names; `ValueError` if there is none."""
     if not base:
-        return "this file has no configuration from which a trajectory could be run"
+        raise ValueError("this file has no configuration from which a trajectory could be run")
     cell = dict(base)
     for pair in text.split(",", len(base)):
         name, _, value = pair.partition(":")
         if name not in cell:
-            return f"{brief(name)} is no parameter; there are {', '.join(cell)}"
+            raise ValueError(f"{brief(name)} is no parameter; there are {', '.join(cell)}")
         cell[name] = number(value)
         if fault := wrong_value(known[name], cell[name]):
-            return fault
+            raise ValueError(fault)
     return cell
 
 

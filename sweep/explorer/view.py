@@ -7,14 +7,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
 from bokeh.document import Document
 from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Div, Row
 
-from sweep.explorer import controls, export, figure, page, selection
+from sweep.explorer import controls, export, figure, page
 from sweep.explorer import state as states
 from sweep.explorer.chosen import CellControls
-from sweep.explorer.colours import CURVES
 from sweep.explorer.curves import Curves
 from sweep.explorer.drawn import Drawn
 from sweep.explorer.page import PARTS
@@ -22,19 +20,16 @@ from sweep.explorer.runner import Curve, Job, Runner
 from sweep.explorer.setup import Setup, why_still
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State
+from sweep.explorer.style import CURVES
 from sweep.plots import labels
-
-_BESIDE = ("reversals", "reversals_predicted", "status")
-"""The pointer shows these of a cell at once; the server adds everything else."""
-
-_FILES = {"netCDF": ("nc", "application/x-netcdf"), "CSV": ("csv", "text/csv"), "YAML": ("yaml", "application/yaml")}
-"""What can be saved besides the picture: the endings and types of the files by what the buttons say."""
 
 _NOTICE = {"background": "#1b2733", "border-radius": "8px 8px 0 0", "color": "white", "padding": "6px 16px"}
 
 
 class View:
     """Everything on one page.  Each change goes through `_change`, which draws what differs and writes the address."""
+
+    _shown: figure.MapFigure
 
     def __init__(
         self, document: Document, source: Source, setup: Setup | None, runner: Runner | None,
@@ -44,7 +39,6 @@ class View:
         self._base: Cell = setup.base if setup else {}
         self._known = setup.config.table if setup else {}
         self.state, self._faults = states.read(query, source, self._base, self._known)
-        self._second: figure.MapFigure | None = None
         self._build()
         self._drawn = Drawn(self.state.cells, runner, self._tell)
         self._draw_map()
@@ -57,10 +51,8 @@ class View:
     def _build(self) -> None:
         self._calls = ColumnDataSource({"name": [], "given": []}, name="calls")
         self._calls.js_on_change("data", CustomJS(code="sweep.called(cb_obj.data)"))
-        self._shown = self._figure()
-        self._map = Row(sizing_mode="stretch_width", name="map", styles={"flex-wrap": "wrap"})
+        self._map = Column(sizing_mode="stretch_width", name="map")
         self._legend = Div(sizing_mode="stretch_width", name="legend")
-        self._selection = Div(sizing_mode="stretch_width", name="selection", visible=False)
         self._cell = Div(sizing_mode="stretch_width", name="cell")
         self._notice = Div(name="notice", styles=_NOTICE, sizing_mode="stretch_width", margin=0)
         self._figures = Curves()
@@ -71,8 +63,8 @@ class View:
         curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
         player = Column(shown.player.figure, shown.player.controls, sizing_mode="stretch_width", name="played")
         self._document.js_on_event("document_ready", shown.player.moment)
-        for root in (self._controls.root, self._notice, self._map, self._legend, self._selection, self._cell,
-                     curves, player, self._chosen.root, self._buttons()):  # fmt: skip
+        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, player,
+                     self._chosen.root, self._buttons()):  # fmt: skip
             self._document.add_root(root)
 
     def _call(self, name: str, *given: Any) -> None:
@@ -90,41 +82,17 @@ class View:
             self._draw_cells()
 
     def _draw_map(self) -> None:
-        state, beside = self.state, [n for n in _BESIDE if n in self._source.variables]
-        if self._shown.axes != (state.x, state.y):
-            self._shown, self._second = self._figure(), None
-        self._second = (self._second or self._figure(self._shown)) if state.beside else None
-        self._map.children = [shown.figure for shown in (self._shown, self._second) if shown] + [self._shown.cuts]
-        if self._second:
-            self._second.show(replace(state, show=state.beside, spacing="", low=None, high=None), beside)
-        self._legend.text = page.legend(*self._shown.show(state, beside))
-        self._controls.show(state)
-        self._draw_selection()
-
-    def _figure(self, main: figure.MapFigure | None = None) -> figure.MapFigure:
-        """A map over the chosen axes, or a second one beside `main`."""
-        made = figure.MapFigure(self._source, self.state.x, self.state.y, main)
-        controls.on(made.probe, "data", lambda _: self._point())
-        controls.on(made.request, "data", lambda _: self._requested())
-        controls.on(made.selected, "data", lambda _: self._draw_selection())
-        return made
-
-    def _draw_selection(self) -> None:
-        """Tell about the cells that are chosen."""
-        around = self._shown.selected.data
-        self._selection.visible = len(around["xs"]) > 0
-        if self._selection.visible:
-            corners = np.array([around["xs"][0], around["ys"][0]], float)
-            chosen = selection.enclosed(corners, *self._shown.placed)
-            told = selection.statistics(self._shown.part, chosen)
-            self._selection.text = str(PARTS.selection(int(chosen.sum()), *told))
+        if not self._map.children or self._shown.axes != (self.state.x, self.state.y):
+            self._shown = figure.MapFigure(self._source, self.state.x, self.state.y)
+            self._map.children = [self._shown.figure, self._shown.cuts]
+            controls.on(self._shown.probe, "data", lambda _: self._point())
+            controls.on(self._shown.request, "data", lambda _: self._requested())
+        self._legend.text = page.legend(*self._shown.show(self.state))
+        self._controls.show(self.state)
 
     def _place(self, source: ColumnDataSource) -> dict[str, int] | None:
-        """The index on every axis of the cell that the browser wrote into `source`, which may be anything."""
-        data = [source.data.get(key) for key in ("i", "j")]
-        if not all(isinstance(d, list | np.ndarray) and len(d) and isinstance(d[0], int | np.integer) for d in data):
-            return None
-        i, j = (int(d[0]) for d in data)
+        """The index on every axis of the cell that the browser wrote into `source`; None if it wrote no cell."""
+        i, j = (int(source.data[key][0]) for key in ("i", "j"))
         across, up = self._shown.placed
         if not (0 <= i < len(across.values) and 0 <= j < len(up.values)):
             return None
@@ -132,7 +100,7 @@ class View:
         return {**index, self.state.y: j} if self.state.y else index
 
     def _point(self) -> None:
-        """Tell about the cell under the pointer, or else about the chosen one."""
+        """Show the values of the cell under the pointer, or else of the chosen one."""
         index = self._place(self._shown.probe)
         if index is None:
             self._cell.text = str(PARTS.hint("" if self._setup else why_still(self._source)))
@@ -154,7 +122,7 @@ class View:
             self._activate(self._drawn.cells.index(cell))
             return
         self._faults = []
-        self._drawn.add(cell, beside=bool(self._shown.request.data["add"][0]) or bool(self._chosen.keep.active))
+        self._drawn.add(cell, keep=bool(self._shown.request.data["add"][0]))
         self._draw_cells()
 
     def _edit(self, name: str, value: float) -> None:
@@ -163,11 +131,9 @@ class View:
             return
         fault = states.wrong_value(self._known[name], value)
         self._faults = [fault] if fault else []
-        if fault:
-            self._draw_progress()
-        else:
+        if not fault:
             self._drawn.change({**self._drawn.cells[self._drawn.active], name: value})
-            self._draw_cells()
+        self._draw_cells()
 
     def _activate(self, k: int) -> None:
         self._drawn.active = k
@@ -182,10 +148,9 @@ class View:
         self._document.add_next_tick_callback(partial(self._hear, job))
 
     def _hear(self, job: Job) -> None:
-        if self._drawn.hear(job):
-            self._draw_curves()
         if not job.dropped:
             self._faults = [job.fault] if job.fault else self._faults
+            self._draw_curves()
             self._draw_progress()
 
     def _draw_cells(self) -> None:
@@ -219,7 +184,7 @@ class View:
         self._chosen.tell(curves)
 
     def _names(self) -> list[str]:
-        """Name each cell by what tells it from the others."""
+        """Name each cell by what distinguishes it from the others."""
         cells, base = self._drawn.cells, self._base
         varied = [n for n in base if n not in self._source.dims and any(cell[n] != base[n] for cell in cells)]
         varied = [*(n for n in self._source.dims if n in base), *varied]
@@ -242,9 +207,9 @@ class View:
         link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
         png = Button(label="PNG", name="png", width=64)
         figures = [self._figures.spin, self._figures.energy, self._figures.player.figure]
-        args = {"plots": self._map, "figures": figures, "name": f"{export.stem(self._source)}.png"}
-        png.js_on_click(CustomJS(args=args, code="sweep.picture([...plots.children, ...figures], name)"))
-        files = [Button(label=label, name=label, width=76) for label in (_FILES if self._setup else ["netCDF"])]
+        args = {"map": self._map, "figures": figures, "name": f"{export.stem(self._source)}.png"}
+        png.js_on_click(CustomJS(args=args, code="sweep.picture([...map.children, ...figures], name)"))
+        files = [Button(label=label, name=label, width=76) for label in ("CSV", "YAML") if self._setup]
         for button in files:
             button.on_click(partial(self._save, button.label))
         # The calls travel with a root: what a callback of the document alone refers to is not kept up to date.
@@ -252,17 +217,11 @@ class View:
                    styles={"flex-wrap": "wrap"})  # fmt: skip
 
     def _save(self, label: str) -> None:
-        """Let the browser save one of the `_FILES`."""
-        curves = list(filter(None, self._drawn.curves))
-        if label == "netCDF":
-            content = export.netcdf(self._source, self._query(), self.state, curves)
-        elif label == "CSV":
-            content = export.csv(curves).encode()
-        else:
-            assert self._setup
-            content = export.yaml(self._source, self._setup, self.state).encode()
-        ending, mime = _FILES[label]
-        self._call("save", np.frombuffer(content, "uint8"), f"{export.stem(self._source)}.{ending}", mime)
+        """Let the browser save the curves as CSV, or the configuration as YAML."""
+        assert self._setup
+        curves = label == "CSV"
+        content = export.csv(self._drawn.curves) if curves else export.yaml(self._source, self._setup, self.state)
+        self._call("save", content, f"{export.stem(self._source)}.{label.lower()}")
 
 
 def _counted(curve: Curve | None) -> str:

@@ -159,14 +159,6 @@ def test_compiling_is_announced_to_all_who_wait(setup: Setup, monkeypatch: pytes
 def test_the_files_make_what_is_seen(source: Source, setup: Setup, opened: xr.Dataset, tmp_path: Path) -> None:
     cell = cell_at(source, setup, mu=3, b=2, n0=1)
     state = State("mu", "b", "reversals", {"n0": 1}, cells=(cell,))
-    saved = tmp_path / "saved.nc"
-    saved.write_bytes(export.netcdf(source, "x=mu", state, [whole(setup, cell)]))
-    with xr.open_dataset(saved, decode_times=False) as part:
-        xr.testing.assert_equal(part.load(), opened.isel(n0=1))
-        assert part.attrs["explored"] == "x=mu"
-    with xr.open_dataset(saved, group="trajectory_1", decode_times=False) as dense:
-        assert float(dense["spin_final"]) == opened["spin_final"].isel(mu=3, b=2, n0=1)
-
     config = tmp_path / "saved.yaml"
     config.write_text(export.yaml(source, setup, state), encoding="utf-8")
     again = sweep.run(config)

@@ -13,7 +13,7 @@ HOSTILE = {
     "show=../../etc/passwd": "show=../../etc/passwd is not there; choose reversals, ",
     "show=<script>alert(1)</script>": "show=<script>alert(1)</script> is not there; choose ",
     "x=delta": "x=delta is not there; choose mu, b, n0",
-    "file=/etc/passwd": "file is no part of an address; there are show, beside, x, y, mu, b, n0, palette, spacing,",
+    "file=/etc/passwd": "unknown URL parameter 'file'; expected one of show, x, y, mu, b, n0, palette, low,",
     "n0=nan": "n0=nan is not there; choose from 0.02 to 0.05",
     "n0=1e999": "n0=1e999 is not there",
     "n0=7": "n0=7 is not there",
@@ -45,14 +45,14 @@ def test_the_longest_axes_are_shown_first(source: Source) -> None:
 
 def test_what_is_written_is_read_again(source: Source, base: state.Cell) -> None:
     cells = ({**base, "mu": 47.123456789, "b": 3.0}, {**base, "delta": -0.25})
-    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, "status", cells, "gray", "log", high=4.5)
+    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, cells, "gray", high=4.5)
     again, faults = read(state.write(shown, source, base), source, base)
     assert not faults
     assert again == shown
 
 
 def test_a_cell_in_the_address_names_no_more_than_it_has_to(source: Source, base: state.Cell) -> None:
-    shown = State("mu", "b", "reversals", {"n0": 1}, "", ({**base, "mu": 47.0},))
+    shown = State("mu", "b", "reversals", {"n0": 1}, ({**base, "mu": 47.0},))
     assert state.write(shown, source, base).endswith("cell=b:2,mu:47,n0:0.02")
 
 
@@ -62,6 +62,10 @@ def test_nothing_else_gets_through(query: str, said: str, source: Source, base: 
     assert shown == state.first(source)
     assert fault.startswith(said)
     assert len(fault) < 600
+
+
+def test_a_link_with_a_choice_that_has_ended_opens(source: Source, base: state.Cell) -> None:
+    assert read("beside=status&spacing=log&x=mu", source, base) == read("x=mu", source, base)
 
 
 def test_no_more_cells_than_colours(source: Source, base: state.Cell) -> None:

@@ -1,0 +1,150 @@
+"""How figures of the explorer look: their axes, the colours of maps and curves, and patterns over cells.
+
+Patterns are tiles of pixels, which the browser lays over the cells that are no plain results.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from bokeh.models import CustomJSTickFormatter, FixedTicker
+from matplotlib.colors import BoundaryNorm, LogNorm, to_hex
+from matplotlib.image import imsave
+
+from sweep.explorer.slices import PlacedAxis
+from sweep.explorer.state import State
+from sweep.grid import Array
+from sweep.plots import marks, scales
+from sweep.plots.description import Map, common_scale
+from sweep.plots.scales import Scale
+
+SOFT = "#77828d"
+"""A grey that can be read on a light page and on a dark one."""
+
+GRID = f"{SOFT}40"
+"""The colour of lines across a figure."""
+
+CURVES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00")
+"""Of Okabe and Ito: safe for the colour-blind."""
+
+_TICKS = 12
+"""On an axis whose values are listed one by one, at most."""
+
+_AXES = {
+    "axis_line_color": SOFT, "major_tick_line_color": SOFT, "minor_tick_line_color": None,
+    "axis_label_text_font_style": "normal", "axis_label_text_font_size": "12px", "major_label_text_font_size": "12px",
+}  # fmt: skip
+
+_MOST = 4096
+"""Colours of a palette."""
+
+_WHITE, _BLACK, _DARK, _LIGHT = 0xC8FFFFFF, 0x90000000, 0xFF474340, 0xFFA8A39E  # ABGR; 0 is transparent
+
+_EXAMPLE = "#21918c"
+"""A colour of a map under a pattern that lets it be seen."""
+
+
+# ---- axes
+
+
+def style(plot: Any, *shown: PlacedAxis) -> None:
+    """Give the axes of a figure their style; of those that are `shown`, uneven values are listed one by one."""
+    for drawn in plot.axis:
+        drawn.update(formatter=numbers(), **_AXES)
+    for axis, drawn in zip(shown, (plot.xaxis[0], plot.yaxis[0]), strict=False):
+        if axis.spacing == "uneven":
+            ticks = [float(t) for t in range(0, len(axis.values), -(-len(axis.values) // _TICKS))]
+            drawn.ticker = FixedTicker(ticks=ticks, minor_ticks=[])
+            code = "return sweep.number(values[tick])"
+            drawn.formatter = CustomJSTickFormatter(args={"values": axis.values}, code=code)
+
+
+def numbers() -> CustomJSTickFormatter:
+    """Write the numbers on an axis as pictures do."""
+    return CustomJSTickFormatter(code="return sweep.number(tick)")
+
+
+def kind(axis: PlacedAxis) -> Any:
+    """What Bokeh calls an axis of such values."""
+    return "log" if axis.spacing == "log" else "linear"
+
+
+# ---- colours
+
+
+def mapping(scale: Scale) -> dict[str, Any]:
+    """The settings of Bokeh's colour mapper for a scale: a colour for each integer of a scale of steps."""
+    low, high = float(scale.norm.vmin or 0), float(scale.norm.vmax or 0)
+    if isinstance(scale.norm, BoundaryNorm):
+        first, last = math.ceil(low), math.floor(high)
+        at = np.linspace(first, last, min(last - first + 1, _MOST)).round()
+    else:
+        at = np.asarray(scale.norm.inverse(np.linspace(0, 1, 256)))
+    return {"palette": [to_hex(colour) for colour in scale.rgba(at)], "low": low, "high": high}
+
+
+def scale_of(part: Map, state: State) -> Scale:
+    """The scale of a map, with whatever of it the visitor has chosen; all values of flags have their colours."""
+    palette = state.palette or None
+    if part.flags:
+        return scales.flags(part.flags, palette)
+    shown = part.shown[np.isfinite(part.shown)].astype(float)
+    if (state.low, state.high) == (None, None) or not shown.size:
+        return common_scale([part], cmap=palette)
+    low = shown.min() if state.low is None else state.low
+    high = shown.max() if state.high is None else state.high
+    possible = low < high and (low > 0 or part.name != "ratio")
+    return common_scale([part], (low, high) if possible else None, palette)
+
+
+def is_logarithmic(scale: Scale) -> bool:
+    return isinstance(scale.norm, LogNorm)
+
+
+def beyond(part: Map, scale: Scale) -> str:
+    """Say in words what lies beyond the scale; empty if nothing does."""
+    ends = {"min": ("down to", np.min), "max": ("up to", np.max)}
+    there = (said for end, said in ends.items() if scale.arrows in (end, "both"))
+    words = " and ".join(f"{said} {extreme(part.shown):.2g}" for said, extreme in there)
+    return f"the last colours also stand for values {words}" if words else ""
+
+
+# ---- patterns
+
+
+def _tile(side: int, colour: Callable[[Array, Array], Array]) -> Array:
+    """The colours of a tile by x and y; its first row is the lowest, as in the browser."""
+    y, x = np.indices((side, side))
+    return np.ascontiguousarray(np.broadcast_to(colour(x, y), (side, side)).astype("uint32"))
+
+
+def _lines(across: Array) -> Array:
+    """White lines, with black beside them, where a distance from the lines is 0 and 1."""
+    return np.select([across == 0, across == 1], [_WHITE, _BLACK], 0)
+
+
+TILES = {
+    "not_run": _tile(1, lambda x, _: 0 * x + _LIGHT),
+    "failed": _tile(10, lambda x, y: np.where(((x + y) % 10 == 0) | (x == y), _LIGHT, _DARK)),
+    "impossible": _tile(6, lambda _, y: np.where(y == 0, _DARK, _LIGHT)),
+    "no_value": _tile(1, lambda x, _: 0 * x + _LIGHT),
+    "time_limit": _tile(10, lambda x, y: _lines((x + y) % 10)),
+    "inferred": _tile(6, lambda x, y: np.where(x < 2, _lines(y), 0)),
+    "noise_limited": _tile(8, lambda _, y: _lines(y)),
+}
+assert [*TILES, "uncertain"] == list(marks.WORDS)  # which has a dot
+
+
+def swatch(kind: str) -> str:
+    """The CSS of a kind in a legend."""
+    if kind == "uncertain":
+        return "background:#fff;border:1px solid #000;border-radius:50%;height:5px;margin:0 9px;width:5px"
+    file = io.BytesIO()
+    imsave(file, TILES[kind][::-1].view("uint8").reshape(*TILES[kind].shape, 4), format="png")
+    picture = f"url(data:image/png;base64,{base64.b64encode(file.getvalue()).decode()})"
+    return f"height:14px;border:1px solid #8a949e;border-radius:2px;background:{picture} {_EXAMPLE}"
