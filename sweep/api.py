@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from typing import Any
 
     import xarray as xr
+    from distributed import Client
 
     from sweep.config import Config, ConfigError, ConfigLike, load_config
-    from sweep.engine.cluster import Cluster
     from sweep.engine.reporter import Reporter
     from sweep.explorer.server import Beside
     from sweep.kernels.measures.misfit import Film
@@ -65,7 +65,7 @@ def run(
     rerun: str | None = None,
     progress: bool | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Run a sweep.
@@ -83,7 +83,8 @@ def run(
         reached the time limit, with the settings of the integrator as they are now; the others stay as they are
     progress : whether to show a bar; by default in notebooks alone
     reporter : receives progress and messages in place of a bar
-    cluster : processes to run the cells in; by default the threads of this one
+    client : connected to a dask cluster whose workers run the cells, or the address of its scheduler; by default the
+        threads of this process run them
     overrides : values that replace those of `config`, such as ``mu=60``, ``t_end=1000`` or ``n0=np.linspace(0, 1, 9)``
 
     Returns
@@ -105,7 +106,7 @@ def run(
     from sweep.engine.run import run
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, cluster=cluster)
+        return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, client=client)
 
 
 def boundaries(
@@ -119,7 +120,7 @@ def boundaries(
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """The curves over two axes on which the number of reversals changes, for each value of the other axes.
@@ -130,7 +131,7 @@ def boundaries(
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, cluster, overrides : as for `run`
+    config, output, fresh, progress, reporter, client, overrides : as for `run`
     x, y : axes over which the curves are drawn; by default the second and the first of more than one value
     width : of the brackets, relative to the value of the parameter along which each lies
     deviation : how far halfway between two points the boundary may be from the smooth curve through them, relative to
@@ -158,7 +159,7 @@ def boundaries(
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
         task = boundaries(checked, x, y, width, deviation)
-        return kept(task, output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(task, output, fresh=fresh, reporter=told, client=client)
 
 
 def critical(
@@ -169,7 +170,7 @@ def critical(
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Critical spins over all axes of `config` except n0: by formulas, and n_c1 by eigenvalues, n_c2 by simulation.
@@ -180,7 +181,7 @@ def critical(
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, cluster, overrides : as for `run`
+    config, output, fresh, progress, reporter, client, overrides : as for `run`
     width : of the brackets of n_c2, relative to the spin
 
     Returns
@@ -204,7 +205,7 @@ def critical(
     from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(critical(checked, width), output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(critical(checked, width), output, fresh=fresh, reporter=told, client=client)
 
 
 def trajectory(
@@ -347,14 +348,14 @@ def indices(
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Tell on which of the uncertain parameters the results of a scene depend, by Sobol indices.
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, cluster, overrides : as for `run`.  Some parameters are distributions,
+    config, output, fresh, progress, reporter, client, overrides : as for `run`.  Some parameters are distributions,
         and none is an axis.  n (uncertain parameters + 2) trajectories are run, n being the samples rounded up to a
         power of two
 
@@ -373,7 +374,7 @@ def indices(
     from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(indices(checked), output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(indices(checked), output, fresh=fresh, reporter=told, client=client)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:

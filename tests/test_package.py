@@ -88,7 +88,6 @@ def test_wheel_holds_every_file_of_the_package_and_the_configurations(wheel: Pat
 VERBS = {
     "run small.yaml --output again": ["again/small.nc", "again/small.png"],
     "run small.yaml --dry-run": [],
-    "run small.yaml --workers 2 --output workers": ["workers/small.nc", "workers/small.png"],
     "trajectory small.yaml --at mu=60 --at b=3": [
         "runs/small/small_trajectory.nc", "runs/small/small_trajectory.png",
     ],
