@@ -24,6 +24,7 @@ else:
             return version("rattleback-sweep")
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        import_module("sweep.accessor")  # registers `dataset.sweep`
         return getattr(import_module(HOMES.get(name, "sweep.api")), name)
 
 

@@ -54,7 +54,25 @@ def _prepared(
     from sweep.progress import shown
 
     with shown(progress, reporter) as told:
-        yield load_config(config, overrides, announce=told.note), told
+        checked = load_config(config, overrides, announce=told.note)
+        _refuse_arguments(checked)
+        yield checked, told
+
+
+def _refuse_arguments(config: Config) -> None:
+    """Refuse a user's parameter that no keyword could give, because an argument here has its name."""
+    from inspect import signature
+
+    from sweep.faults import fault_of
+    from sweep.parameters import sections
+
+    if not config.origin:
+        return
+    verbs = run, boundaries, critical, trajectory, fit, indices
+    arguments = {name for verb in verbs for name in signature(verb).parameters}
+    if wrong := sorted(arguments & {*config.table, *sections(config.table)}):
+        words = f"parameter {wrong[0]!r} has the name of an argument of sweep.run, or of another verb; rename it"
+        raise fault_of(words, file=config.origin.place)
 
 
 def run(
