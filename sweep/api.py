@@ -6,6 +6,7 @@ What a function needs is imported when it is called: an import of all would take
 from __future__ import annotations
 
 from contextlib import contextmanager
+from functools import cache
 
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
@@ -53,6 +54,7 @@ def _prepared(
     from sweep.config import load_config
     from sweep.progress import shown
 
+    register()
     with shown(progress, reporter) as told:
         checked = load_config(config, overrides, announce=told.note)
         _refuse_arguments(checked)
@@ -420,8 +422,51 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
     from sweep.results.netcdf import open_dataset
     from sweep.results.store import StoreError
 
+    register()
     dataset = open_dataset(Path(path), load=load)
     if "sweep_version" not in dataset.attrs:
         dataset.close()
         raise StoreError(f"{path}: not a dataset of sweep: no attribute sweep_version")
     return dataset
+
+
+class Accessor:
+    """What is ours of a dataset of xarray: `dataset.sweep.plot()`, `dataset.sweep.trajectory(mu=60)`."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def plot(self, variable: str | None = None, **options: Any) -> Any:
+        """Draw the dataset; arguments, figure and errors as of `sweep.plot`."""
+        from sweep.plots.picture import plot  # which loads matplotlib
+
+        return plot(self._dataset, variable, **options)
+
+    def trajectory(self, **values: Any) -> Any:
+        """Follow single cells densely in time, with the configuration of the dataset.
+
+        Parameters
+        ----------
+        values : the cells, such as ``mu=60``, and the other arguments of `sweep.trajectory`
+
+        Raises
+        ------
+        ValueError
+            if the dataset tells no configuration.
+        ConfigError
+            as `sweep.trajectory`; also if its model is code of a user, which runs only if `sweep.trajectory` is given
+            the configuration.
+        """
+        if "config" not in self._dataset.attrs:
+            raise ValueError("the dataset tells no configuration; call sweep.trajectory with one")
+        from sweep.results.configuration import configuration
+
+        return trajectory(configuration(self._dataset), **values)
+
+
+@cache
+def register() -> None:
+    """Make `Accessor` the attribute `sweep` of every dataset."""
+    import xarray as xr
+
+    xr.register_dataset_accessor("sweep")(Accessor)  # type: ignore[no-untyped-call]

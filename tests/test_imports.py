@@ -29,7 +29,7 @@ FOREIGN = {
     "scipy": {"config", "engine", "plots", "reproduce", "results", "studies"},
     "tornado": {"explorer"},
     "xarray": {
-        "accessor", "api", "bench", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies",
+        "api", "bench", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies",
     },
 }  # fmt: skip
 """The rooms that import each package; NumPy is for all."""
