@@ -5,9 +5,10 @@ They are imported when they are first used: an import of all would take a second
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 
-from sweep.api import HOMES
+from sweep.api import HOMES, register
 from sweep.api import __all__ as __all__
 
 TYPE_CHECKING = False  # True for type checkers; `typing` is not imported before Ctrl-C is taken care of
@@ -24,7 +25,10 @@ else:
             return version("rattleback-sweep")
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(HOMES.get(name, "sweep.api")), name)
+        found = getattr(import_module(HOMES.get(name, "sweep.api")), name)
+        if "xarray" in sys.modules:
+            register()
+        return found
 
 
 def __dir__() -> list[str]:

@@ -6,6 +6,7 @@ What a function needs is imported when it is called: an import of all would take
 from __future__ import annotations
 
 from contextlib import contextmanager
+from functools import cache
 
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
@@ -17,10 +18,10 @@ if TYPE_CHECKING:
     from typing import Any
 
     import xarray as xr
+    from distributed import Client
 
     from sweep.config import Config, ConfigError, ConfigLike, load_config
     from sweep.config.film import Film
-    from sweep.engine.cluster import Cluster
     from sweep.engine.reporter import Reporter
     from sweep.explorer.server import Beside
     from sweep.plots.animation import animate
@@ -53,8 +54,27 @@ def _prepared(
     from sweep.config import load_config
     from sweep.progress import shown
 
+    register()
     with shown(progress, reporter) as told:
-        yield load_config(config, overrides, announce=told.note), told
+        checked = load_config(config, overrides, announce=told.note)
+        _refuse_arguments(checked)
+        yield checked, told
+
+
+def _refuse_arguments(config: Config) -> None:
+    """Refuse a user's parameter that no keyword could give, because an argument here has its name."""
+    from inspect import signature
+
+    from sweep.faults import fault_of
+    from sweep.parameters import sections
+
+    if not config.origin:
+        return
+    verbs = run, boundaries, critical, trajectory, fit, indices
+    arguments = {name for verb in verbs for name in signature(verb).parameters}
+    if wrong := sorted(arguments & {*config.table, *sections(config.table)}):
+        words = f"parameter {wrong[0]!r} has the name of an argument of sweep.run, or of another verb; rename it"
+        raise fault_of(words, file=config.origin.place)
 
 
 def run(
@@ -65,7 +85,7 @@ def run(
     rerun: str | None = None,
     progress: bool | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Run a sweep.
@@ -83,7 +103,8 @@ def run(
         reached the time limit, with the settings of the integrator as they are now; the others stay as they are
     progress : whether to show a bar; by default in notebooks alone
     reporter : receives progress and messages in place of a bar
-    cluster : processes to run the cells in; by default the threads of this one
+    client : connected to a dask cluster whose workers run the cells, or the address of its scheduler; by default the
+        threads of this process run them
     overrides : values that replace those of `config`, such as ``mu=60``, ``t_end=1000`` or ``n0=np.linspace(0, 1, 9)``
 
     Returns
@@ -105,7 +126,7 @@ def run(
     from sweep.engine.run import run
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, cluster=cluster)
+        return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, client=client)
 
 
 def boundaries(
@@ -119,7 +140,7 @@ def boundaries(
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """The curves over two axes on which the number of reversals changes, for each value of the other axes.
@@ -130,7 +151,7 @@ def boundaries(
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, cluster, overrides : as for `run`
+    config, output, fresh, progress, reporter, client, overrides : as for `run`
     x, y : axes over which the curves are drawn; by default the second and the first of more than one value
     width : of the brackets, relative to the value of the parameter along which each lies
     deviation : how far halfway between two points the boundary may be from the smooth curve through them, relative to
@@ -158,7 +179,7 @@ def boundaries(
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
         task = boundaries(checked, x, y, width, deviation)
-        return kept(task, output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(task, output, fresh=fresh, reporter=told, client=client)
 
 
 def critical(
@@ -169,7 +190,7 @@ def critical(
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Critical spins over all axes of `config` except n0: by formulas, and n_c1 by eigenvalues, n_c2 by simulation.
@@ -180,7 +201,7 @@ def critical(
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, cluster, overrides : as for `run`
+    config, output, fresh, progress, reporter, client, overrides : as for `run`
     width : of the brackets of n_c2, relative to the spin
 
     Returns
@@ -204,7 +225,7 @@ def critical(
     from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(critical(checked, width), output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(critical(checked, width), output, fresh=fresh, reporter=told, client=client)
 
 
 def trajectory(
@@ -347,14 +368,14 @@ def indices(
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Tell on which of the uncertain parameters the results of a scene depend, by Sobol indices.
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, cluster, overrides : as for `run`.  Some parameters are distributions,
+    config, output, fresh, progress, reporter, client, overrides : as for `run`.  Some parameters are distributions,
         and none is an axis.  n (uncertain parameters + 2) trajectories are run, n being the samples rounded up to a
         power of two
 
@@ -373,7 +394,7 @@ def indices(
     from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(indices(checked), output, fresh=fresh, reporter=told, cluster=cluster)
+        return kept(indices(checked), output, fresh=fresh, reporter=told, client=client)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
@@ -401,8 +422,51 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
     from sweep.results.netcdf import open_dataset
     from sweep.results.store import StoreError
 
+    register()
     dataset = open_dataset(Path(path), load=load)
     if "sweep_version" not in dataset.attrs:
         dataset.close()
         raise StoreError(f"{path}: not a dataset of sweep: no attribute sweep_version")
     return dataset
+
+
+class Accessor:
+    """What is ours of a dataset of xarray: `dataset.sweep.plot()`, `dataset.sweep.trajectory(mu=60)`."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def plot(self, variable: str | None = None, **options: Any) -> Any:
+        """Draw the dataset; arguments, figure and errors as of `sweep.plot`."""
+        from sweep.plots.picture import plot  # which loads matplotlib
+
+        return plot(self._dataset, variable, **options)
+
+    def trajectory(self, **values: Any) -> Any:
+        """Follow single cells densely in time, with the configuration of the dataset.
+
+        Parameters
+        ----------
+        values : the cells, such as ``mu=60``, and the other arguments of `sweep.trajectory`
+
+        Raises
+        ------
+        ValueError
+            if the dataset tells no configuration.
+        ConfigError
+            as `sweep.trajectory`; also if its model is code of a user, which runs only if `sweep.trajectory` is given
+            the configuration.
+        """
+        if "config" not in self._dataset.attrs:
+            raise ValueError("the dataset tells no configuration; call sweep.trajectory with one")
+        from sweep.results.configuration import configuration
+
+        return trajectory(configuration(self._dataset), **values)
+
+
+@cache
+def register() -> None:
+    """Make `Accessor` the attribute `sweep` of every dataset."""
+    import xarray as xr
+
+    xr.register_dataset_accessor("sweep")(Accessor)  # type: ignore[no-untyped-call]

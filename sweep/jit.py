@@ -9,17 +9,20 @@ from __future__ import annotations
 import hashlib
 import itertools
 import os
-import platform
+import re
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from threading import RLock
 from typing import Any
 
 import numpy as np
+
+from sweep.sources import hashed, versions
 
 # contract: fuse a*b + c into one FMA.  nsz, arcp: harmless on the values met here.
 # Not nnan or ninf: these let the compiler assume that no NaN or infinity occurs, so tests such as `x > 0`
@@ -191,16 +194,28 @@ os.register_at_fork(after_in_child=_pool.cache_clear)
 
 def fingerprint() -> str:
     """Hash of all sources from which a kernel can be built, and of the versions of what compiles them."""
-    from importlib import metadata  # which takes as long to import as all else here
+    files = [path for pattern in _NUMERIC_SOURCES for path in Path(__file__).parent.glob(pattern)]
+    decisive = f"{hashed(files)} {versions()} {INTERPRETED}"
+    return hashlib.sha256(decisive.encode()).hexdigest()[:16]
 
-    root = Path(__file__).parent
-    files = [path for pattern in _NUMERIC_SOURCES for path in sorted(root.glob(pattern))]
-    digest = hashlib.sha256(b"interpreted" if INTERPRETED else b"")
-    for path in files:
-        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
-    for version in (platform.python_version(), *map(metadata.version, ("numba", "llvmlite", "numpy"))):
-        digest.update(version.encode())
-    return digest.hexdigest()[:16]
+
+_FILE = re.compile(r'File "(.+?)", line (\d+)')
+
+
+def compiler_said(error: Exception) -> tuple[list[tuple[str, int]], str]:
+    """Return the places, as file and line, that an error of Numba's compiler names, and why it failed.
+
+    An error of anything else has no places and no reason.
+    """
+    if not type(error).__module__.startswith("numba"):
+        return [], ""
+    where = getattr(error, "loc", None)
+    places = [(where.filename, where.line)] if where else []
+    places += [(file, int(line)) for file, line in _FILE.findall(str(error))]
+    # Numba says, from the outermost function inwards: that it failed, and why.
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    why = [after for before, after in pairwise(lines) if "Failed in" in before]
+    return places, (why or lines)[-1]
 
 
 _LOADING = RLock()

@@ -26,13 +26,19 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 """Without what could lead to this checkout or to its compiled kernels."""
 
 
+def checkout(folder: Path) -> Path:
+    """A copy of what the package is made of, in a folder that is named as the package is."""
+    copy = folder / "sweep"
+    shutil.copytree(ROOT / "sweep", copy / "sweep", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md"):
+        shutil.copy(ROOT / name, copy)
+    return copy
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Built from a copy: setuptools leaves a `build` folder, whose old files would get into the next wheel."""
-    source, target = (tmp_path_factory.mktemp(name) for name in ("source", "wheel"))
-    for name in ("pyproject.toml", "README.md"):
-        shutil.copy(ROOT / name, source)
-    shutil.copytree(ROOT / "sweep", source / "sweep", ignore=shutil.ignore_patterns("__pycache__"))
+    source, target = checkout(tmp_path_factory.mktemp("source")), tmp_path_factory.mktemp("wheel")
     command = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", target, source]
     subprocess.run(command, check=True, env=ENVIRONMENT)
     (path,) = target.glob("*.whl")
@@ -88,7 +94,6 @@ def test_wheel_holds_every_file_of_the_package_and_the_configurations(wheel: Pat
 VERBS = {
     "run small.yaml --output again": ["again/small.nc", "again/small.png"],
     "run small.yaml --dry-run": [],
-    "run small.yaml --workers 2 --output workers": ["workers/small.nc", "workers/small.png"],
     "trajectory small.yaml --at mu=60 --at b=3": [
         "runs/small/small_trajectory.nc", "runs/small/small_trajectory.png",
     ],
@@ -125,6 +130,14 @@ def test_data_of_the_reports_is_found(python: Path, folder: Path) -> None:
 
 def test_console_script(python: Path, folder: Path) -> None:
     assert call(folder, python.parent / "sweep", "--version").startswith("sweep, version ")
+
+
+def test_the_folder_above_an_editable_install_hides_nothing(tmp_path: Path) -> None:
+    """Python finds the checkout there as a namespace without any name, unless a path leads to the package first."""
+    python = tmp_path / "environment" / "bin" / "python"
+    call(tmp_path, sys.executable, "-m", "venv", "environment")
+    call(tmp_path, python, "-m", "pip", "install", "-q", "--no-deps", "-e", checkout(tmp_path))
+    assert call(tmp_path, python, "-c", "import sweep; print(sweep.__all__)")
 
 
 USER = """\

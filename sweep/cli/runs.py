@@ -24,19 +24,7 @@ if TYPE_CHECKING:
     from sweep.studies.kept import Task
 
 
-def _either(context: click.Context, parameter: click.Parameter, value: Any) -> Any:  # noqa: ARG001
-    """Refuse workers of two kinds, before code of a user runs."""
-    if value and any(context.params.get(name) for name in ("workers", "scheduler")):
-        refuse("--workers", "cannot be combined with --scheduler; leave out one of the two")
-    return value
-
-
-WORKERS = click.option(
-    "--workers", type=click.IntRange(1, 4096), callback=_either, help="Run in this many processes of one thread each."
-)
-SCHEDULER = click.option(
-    "--scheduler", metavar="ADDRESS", callback=_either, help="Run on the workers of this dask scheduler."
-)
+SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 
 
 def _parameter_help() -> str:
@@ -60,7 +48,7 @@ FRESH = click.option("--fresh", is_flag=True, help="Discard what an earlier run 
 
 def _resumed(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of a command whose simulations are kept, resumed, and spread over processes."""
-    for option in (QUIET, SCHEDULER, WORKERS, FRESH, DRY_RUN, OUTPUT):
+    for option in (QUIET, SCHEDULER, FRESH, DRY_RUN, OUTPUT):
         command = option(command)
     return command
 
@@ -272,13 +260,12 @@ def _studied(task: Task, **how: Any) -> None:
 
 def _written(
     config: Config, verb: str, work: Callable[..., xr.Dataset], estimate: Callable[[], str], *,
-    fresh: bool, dry_run: bool, output: Path | None, workers: int | None, scheduler: str | None, quiet: bool,
+    fresh: bool, dry_run: bool, output: Path | None, scheduler: str | None, quiet: bool,
 ) -> xr.Dataset | None:  # fmt: skip
     """Carry out `work`, show its progress, and say what it found and wrote; of a dry run, only the estimate."""
     if dry_run:
         click.echo(estimate())
         return None
-    from sweep.engine.cluster import connected
     from sweep.progress import Terminal
     from sweep.results.summary import describe
 
@@ -286,8 +273,7 @@ def _written(
     before = _stamps(folder, name)
     with Terminal(quiet) as terminal:
         try:
-            with connected(workers, scheduler) as cluster:
-                result = work(output=folder, fresh=fresh, reporter=terminal, cluster=cluster)
+            result = work(output=folder, fresh=fresh, reporter=terminal, client=scheduler)
         except KeyboardInterrupt:
             done = f"{terminal.last.done:.0f} of {terminal.last.cells} cells" if terminal.last else "no cells"
             command = "the same command without --fresh" if fresh else "the same command"

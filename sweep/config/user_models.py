@@ -22,11 +22,8 @@ SUFFIX = ".py"
 
 TAKEN = frozenset({path.rpartition(".")[2] for path in SETTINGS}) | {
     "integrator", CASE, SAMPLE, "trajectory", "time",
-    *("config", "output", "fresh", "rerun", "progress", "reporter", "cluster", "every", "film", "free", "laws"),
-    *("x", "y", "width", "deviation", "show", "palette", "low", "high", "cell"),
 }  # fmt: skip
-"""Names that mean something else: in a configuration, as a dimension, as an argument, or in an address of the explorer.
-A user's parameter cannot have them."""
+"""Names that mean something else in a configuration, or as a dimension.  A user's parameter cannot have them."""
 
 
 def named(source: Document, announce: Callable[[str], None] | None) -> Origin | None:

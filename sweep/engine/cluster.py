@@ -1,4 +1,4 @@
-"""Runs tiles in other processes, of this machine or of a cluster, with dask.distributed.
+"""Runs tiles on the workers of a dask scheduler, with dask.distributed.
 
 Workers compute and send arrays back; only the process that started the run writes files.  If a
 worker dies, another one computes the tile it was working on.
@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import logging
 import math
-import signal
 import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numba
 
@@ -27,6 +26,9 @@ from sweep.kernels.build import APPROACH, build
 from sweep.results.identity import Identity
 from sweep.results.provenance import identify, sources
 from sweep.results.store import StoreError
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 AHEAD = 3
 """Tiles per worker that are sent out before the first comes back."""
@@ -44,66 +46,59 @@ _POLL = 0.01
 _LOST = "the dask scheduler is gone; finished tiles are kept, and the same command without --fresh resumes the run"
 
 
-class Cluster:
-    """A dask scheduler and its workers.
+def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Done]:
+    """Run the tiles `todo` on the workers of `client`, and yield them as they come back.
 
-    Parameters
-    ----------
-    client : connected to the scheduler
-    local : whether the workers find what this process compiles: then it compiles for all of them
+    Raises
+    ------
+    StoreError
+        if a worker runs other source code, a tile kills several workers, or the scheduler disappears.
     """
+    from distributed import CancelledError, KilledWorker, as_completed
 
-    def __init__(self, client: Any, local: bool = False) -> None:
-        self.client, self.local = client, local
+    if config.simulated and _on_this_machine(client):
+        build(kernels(config), APPROACH)  # once, into the cache that those workers read
+    # A task's result rather than scattered data, which would be lost along with the workers that hold it.
+    shared = client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
+    waiting, numbers = iter(todo), dict[Any, int]()
+    running = as_completed(loop=client.loop)
+    workers, counted = 0, -math.inf
 
-    def run(self, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Done]:
-        """Run the tiles `todo`, and yield them as they come back.
+    def send_ahead() -> None:
+        nonlocal workers, counted
+        if time.monotonic() > counted + _RECOUNT:
+            workers, counted = len(client.nthreads()), time.monotonic()
+        while len(numbers) < AHEAD * max(1, workers):
+            if (i := next(waiting, None)) is None:
+                return
+            future = client.submit(_work, shared, i, pure=False)
+            numbers[future] = i
+            running.add(future)
 
-        Raises
-        ------
-        StoreError
-            if a worker runs other source code, a tile kills several workers, or the scheduler disappears.
-        """
-        from distributed import CancelledError, KilledWorker, as_completed
-        from distributed.comm import CommClosedError
+    send_ahead()
+    for future in _arriving(running):
+        try:
+            done: Done = future.result()
+        except KilledWorker as error:
+            deaths = error.allowed_failures + 1
+            raise StoreError(f"tile {numbers[future]}: {deaths} workers died computing it; out of memory?") from None
+        except CancelledError:
+            raise StoreError(_LOST) from None
+        del numbers[future]
+        future.release()
+        try:
+            send_ahead()
+        except OSError:
+            raise StoreError(_LOST) from None
+        yield done
 
-        if self.local and config.simulated:
-            build(kernels(config), APPROACH)
-        # A task's result rather than scattered data, which would be lost along with the workers that hold it.
-        shared = self.client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
-        waiting, numbers = iter(todo), dict[Any, int]()
-        running = as_completed(loop=self.client.loop)
-        workers, counted = 0, -math.inf
 
-        def send_ahead() -> None:
-            nonlocal workers, counted
-            if time.monotonic() > counted + _RECOUNT:
-                workers, counted = len(self.client.scheduler_info(n_workers=-1)["workers"]), time.monotonic()
-            while len(numbers) < AHEAD * max(1, workers):
-                if (i := next(waiting, None)) is None:
-                    return
-                future = self.client.submit(_work, shared, i, pure=False)
-                numbers[future] = i
-                running.add(future)
+def _on_this_machine(client: Client) -> bool:
+    """Tell whether any worker runs on the machine of this process."""
+    from distributed.comm import get_address_host
+    from distributed.utils import get_ip
 
-        send_ahead()
-        for future in _arriving(running):
-            try:
-                done: Done = future.result()
-            except KilledWorker as error:
-                deaths = error.allowed_failures + 1
-                raise StoreError(
-                    f"tile {numbers[future]}: {deaths} workers died computing it; out of memory?"
-                ) from None
-            except CancelledError:
-                raise StoreError(_LOST) from None
-            del numbers[future]
-            future.release()
-            try:
-                send_ahead()
-            except CommClosedError:
-                raise StoreError(_LOST) from None
-            yield done
+    return not {"127.0.0.1", get_ip()}.isdisjoint(map(get_address_host, client.nthreads()))
 
 
 def _arriving(running: Any) -> Iterator[Any]:
@@ -138,54 +133,28 @@ def _work(shared: Shared, tile: int) -> Done:
 
 
 @contextmanager
-def connected(workers: int | None, scheduler: str | None) -> Iterator[Cluster | None]:
-    """A local cluster of `workers` processes, or the cluster at the address `scheduler`; None if neither is given.
+def connected(client: Client | str | None) -> Iterator[Client | None]:
+    """Connect to the scheduler at an address; a client, or None, is handed on as it is.
 
     Raises
     ------
     StoreError
         if dask.distributed is not installed, or no scheduler answers.
     """
-    if workers is None and scheduler is None:
-        yield None
-        return
-    import dask
-    import distributed
-
-    for logger in ("distributed", "distributed.client"):  # what a user has to know is raised as an error
-        logging.getLogger(logger).setLevel("CRITICAL")
-    quiet = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "CRITICAL"}
-    if scheduler is None:
-        with (
-            dask.config.set(quiet),
-            distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                dashboard_address=":0",  # any free port: the usual one may be taken
-                scheduler_kwargs={"dashboard": False},
-                silence_logs="CRITICAL",
-                # Whoever reaches a scheduler runs code as the one who started it, so it asks for a certificate.
-                security=distributed.Security.temporary(),
-                protocol="tls://",
-                preload=__name__,
-            ) as cluster,
-            distributed.Client(cluster, set_as_default=False) as client,
-        ):
-            yield Cluster(client, local=True)
+    if not isinstance(client, str):
+        yield client
         return
     try:
+        import distributed
+    except ModuleNotFoundError:
+        raise StoreError("a cluster needs dask.distributed: pip install 'rattleback-sweep[cluster]'") from None
+    for logger in ("distributed", "distributed.client"):  # what a user has to know is raised as an error
+        logging.getLogger(logger).setLevel("CRITICAL")
+    try:
         # A client that is given a wrong address waits 20 s for itself when it is collected, and prints a traceback.
-        distributed.comm.resolve_address(scheduler)
-        client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        distributed.comm.resolve_address(client)
+        there = distributed.Client(client, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
-        raise StoreError(f"{scheduler}: no dask scheduler answers ({error})") from None
-    with client:
-        yield Cluster(client)
-
-
-def dask_setup(worker: Any) -> None:  # noqa: ARG001
-    """Make a worker ignore Ctrl-C, which a terminal sends to all processes: it is for the one that started the run.
-
-    Dask calls this in each worker, by the name of this module given as `preload`.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        raise StoreError(f"{client}: no dask scheduler answers ({error})") from None
+    with there:
+        yield there

@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigLike, load_config
 from sweep.engine import local
-from sweep.engine.cluster import Cluster
+from sweep.engine.cluster import connected, run_tiles
 from sweep.engine.enlarged import RERUN, Earlier, Enlarged, is_whole, reason_against, taken_over
 from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
@@ -38,6 +38,9 @@ from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import identify
 from sweep.results.store import Running, Store, StoreError
 
+if TYPE_CHECKING:
+    from distributed import Client
+
 LARGE = 2_000_000
 """Cells of the largest dataset that is loaded into memory unasked."""
 
@@ -55,7 +58,7 @@ def run(
     fresh: bool = False,
     rerun: str | None = None,
     reporter: Reporter | None = None,
-    cluster: Cluster | None = None,
+    client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """As `sweep.api.run`; what there is to tell goes to `reporter` alone."""
@@ -68,9 +71,10 @@ def run(
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)
     if output is None:
-        return _compute(config, Store(), reporter, cluster).dataset()
+        with connected(client) as there:
+            return _compute(config, Store(), reporter, there).dataset()
     files = RunFiles(Path(output), config.name, config.picture)
-    with files.locked():
+    with files.locked(), connected(client) as there:
         if fresh:
             _forget_pictures(config, files)
             files.discard()
@@ -84,7 +88,7 @@ def run(
             else:
                 _forget_pictures(config, files)
                 store = Checkpoint(files.checkpoint, identity, reporter.note)
-                _compute(config, store, reporter, cluster, earlier).save(files.dataset)
+                _compute(config, store, reporter, there, earlier).save(files.dataset)
         files.discard_checkpoint()
         point()
         result = open_dataset(files.dataset, load=config.grid.size <= LARGE)
@@ -128,7 +132,7 @@ def _earlier(
 
 
 def _compute(
-    config: Config, store: Store, reporter: Reporter, cluster: Cluster | None, earlier: Earlier | None = None
+    config: Config, store: Store, reporter: Reporter, client: Client | None, earlier: Earlier | None = None
 ) -> Whole:
     if earlier:
         reporter.note(earlier.words)
@@ -139,18 +143,18 @@ def _compute(
     else:
         # A single cell has no neighbours from which it could be inferred.
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
-    carry_out(result, store, reporter, cluster)
+    carry_out(result, store, reporter, client)
     return result
 
 
-def carry_out(result: Whole, store: Store, reporter: Reporter, cluster: Cluster | None) -> None:
+def carry_out(result: Whole, store: Store, reporter: Reporter, client: Client | None) -> None:
     """Run the tiles of `result` that `store` does not have, until it asks for no more."""
     count, running = Count(reporter), store.load_running()
     with blamed(result.config.origin):
         while result.grow(tile_size):
             if not count.cells and (store.done or running):
                 reporter.note(_kept(result, store, running))
-            _run_tiles(result.simulated(), result.tiles, store, count, cluster)
+            _run_tiles(result.simulated(), result.tiles, store, count, client)
 
 
 def _kept(result: Whole, store: Store, running: Running | None) -> str:
@@ -162,7 +166,7 @@ def _kept(result: Whole, store: Store, running: Running | None) -> str:
     return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 
 
-def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count, cluster: Cluster | None) -> None:
+def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count, client: Client | None) -> None:
     """Run the tiles that `store` does not have yet."""
     grid = config.grid
     todo = [i for i in range(len(tiles)) if i not in store.done]
@@ -172,7 +176,7 @@ def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count
         for batch, left in local.batches(grid, tiles, todo, store)
         for done in local.run_batch(config, tiles, batch, store=store, left=left, after_chunk=count.chunk)
     )
-    for tile, arrays in cluster.run(config, tiles, todo) if cluster else here:
+    for tile, arrays in run_tiles(client, config, tiles, todo) if client else here:
         store.save(tile, arrays)
         count.tile(arrays["status"])
 

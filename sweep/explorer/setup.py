@@ -12,7 +12,7 @@ from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell
 from sweep.faults import brief
 from sweep.models.user.loading import entry_point
-from sweep.results.accessor import configuration
+from sweep.results.configuration import configuration
 
 Announce = Callable[[str], None]
 

@@ -41,6 +41,10 @@ class PlacedAxis(Axis):
         return np.interp(values, [low, *self.values, high], places, left=np.nan, right=np.nan)
 
 
+ADDRESS = frozenset({"x", "y", "show", "beside", "palette", "spacing", "low", "high", "cell"})
+"""The keys of an address that are no axes (`sweep.explorer.state`)."""
+
+
 class Source:
     """The dataset of a sweep, as the explorer needs it.
 
@@ -56,6 +60,8 @@ class Source:
         what = "no axis" if not dims else TRAJECTORY if "trajectory" in dims else kind(dataset)
         if what in ("no axis", TRAJECTORY, BOUNDARIES, FIT, INDICES):
             raise StoreError(f"{name} has {what}; open a dataset of run or critical that has an axis or more")
+        if taken := ADDRESS.intersection(dims):
+            raise StoreError(f"{name}: the axis {min(taken)} has the name of a key of the explorer's address")
         self.name = name
         self.dims = dims
         ascending = {d: np.argsort(dataset[d].values, kind="stable") for d in dims if d in dataset.coords}

@@ -10,6 +10,8 @@ import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 
+from sweep.sources import hashed
+
 
 @dataclass(frozen=True)
 class Origin:
@@ -31,10 +33,7 @@ class Origin:
     @classmethod
     def of_package(cls, name: str, place: str) -> Origin:
         """The origin of an entry point; nothing is imported."""
-        digest = hashlib.sha256()
-        for path in map(Path, _sources(place)):
-            digest.update(path.name.encode() + b"\0" + path.read_bytes())
-        return cls(name, place, "", digest.hexdigest())
+        return cls(name, place, "", hashed(map(Path, _sources(place))))
 
     @property
     def is_file(self) -> bool:

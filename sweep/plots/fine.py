@@ -16,7 +16,7 @@ from sweep.config import Config, ConfigError
 from sweep.grid import Grid
 from sweep.parameters import START
 from sweep.prediction import predict
-from sweep.results.accessor import configuration
+from sweep.results.configuration import configuration
 
 _POINTS = {1: 401, 2: 41}
 """Values along one axis, and along each of two; the eigenvalues of a body take 0.1 ms."""

@@ -19,7 +19,6 @@ from sweep.kernels.methods import METHODS
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.parameters import PAPER_UNITS, SI
-from sweep.results import accessor as accessor
 from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.variables import Variable, in_si, with_unit, without_unit
 

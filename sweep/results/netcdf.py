@@ -18,7 +18,6 @@ import xarray as xr
 
 from sweep.grid import Array
 from sweep.interrupt import deferred
-from sweep.results import accessor as accessor
 from sweep.results.store import StoreError
 from sweep.results.writing import probe, replacing
 

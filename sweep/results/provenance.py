@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
 import platform
 import re
 import subprocess
@@ -21,6 +20,7 @@ from sweep.jit import vector_bits
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.results.identity import Identity
 from sweep.results.kind import OWN_BODY
+from sweep.sources import hashed, versions
 
 _PACKAGE = Path(__file__).parent.parent
 
@@ -60,12 +60,7 @@ def identify(config: Config, maker: str = RUN) -> Identity:
 @cache
 def sources(maker: str = RUN) -> tuple[str, str]:
     """Hash of the decisive source files, and the versions of what compiles and runs them."""
-    digest = hashlib.sha256()
-    for path in decisive_sources(maker):
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
-    found = [f"{name} {_version(name)}" for name in ("numba", "llvmlite", "numpy")]
-    versions = [f"sweep {_version('rattleback-sweep')}", f"Python {platform.python_version()}", *found]
-    return digest.hexdigest()[:16], ", ".join(versions)
+    return hashed(decisive_sources(maker))[:16], f"sweep {_version('rattleback-sweep')}, {versions()}"
 
 
 @cache

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import xarray as xr
 
 from sweep.config import Config
-from sweep.engine.cluster import Cluster
+from sweep.engine.cluster import connected
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import carry_out
 from sweep.interrupt import deferred
@@ -22,6 +22,9 @@ from sweep.results.identity import require_same
 from sweep.results.provenance import identify
 from sweep.results.store import Store
 from sweep.studies.search import Study
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 
 class Task(NamedTuple):
@@ -37,23 +40,24 @@ class Task(NamedTuple):
 
 @deferred()
 def kept(
-    task: Task, output: str | Path | None, *, fresh: bool, reporter: Reporter, cluster: Cluster | None
+    task: Task, output: str | Path | None, *, fresh: bool, reporter: Reporter, client: Client | str | None
 ) -> xr.Dataset:
     """The dataset that a study finds, or what an earlier one of the same identity has left in the folder `output`."""
     config, verb, settings, make = task
     run = identify(config, f"sweep.studies.{verb}")
     identity = replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
 
-    def search(store: Store) -> xr.Dataset:
+    def search(store: Store, there: Client | None) -> xr.Dataset:
         with blamed(config.origin):
             found = make(config, store)
-        carry_out(found, store, reporter, cluster)
+        carry_out(found, store, reporter, there)
         return found.labelled().assign_attrs(vars(identity))
 
     if output is None:
-        return search(Store())
+        with connected(client) as there:
+            return search(Store(), there)
     files = RunFiles(Path(output), f"{config.name}_{verb}")
-    with files.locked():
+    with files.locked(), connected(client) as there:
         if fresh:
             files.discard()
         if found := files.identity():
@@ -61,7 +65,8 @@ def kept(
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
             files.picture.unlink(missing_ok=True)  # of a dataset that is gone
-            netcdf.write(files.dataset, search(Checkpoint(files.checkpoint, identity, reporter.note)))
+            store = Checkpoint(files.checkpoint, identity, reporter.note)
+            netcdf.write(files.dataset, search(store, there))
         files.discard_checkpoint()
         result = netcdf.open_dataset(files.dataset)
         if not files.picture.exists():

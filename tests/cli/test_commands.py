@@ -94,7 +94,7 @@ def test_the_command_that_resumes_is_told(
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sweep.engine.cluster.connected", interrupt)
+    monkeypatch.setattr("sweep.results.folder.RunFiles.locked", interrupt)
     result = invoke(command, write(), "--output", tmp_path, *options)
     assert result.exit_code == 130
     assert result.stderr == f"interrupted: no cells finished and kept; the same command{again} resumes the {what}\n"

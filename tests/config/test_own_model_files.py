@@ -1,8 +1,6 @@
 """A user's model in a configuration: where it is found, when its code runs, and what is said of a broken one."""
 
-import dataclasses
 import hashlib
-import inspect
 import re
 import sys
 from collections.abc import Iterator
@@ -18,8 +16,6 @@ from support.own import FADING, PENDULUM
 
 import sweep
 from sweep.config import ConfigError, load_config
-from sweep.config.user_models import TAKEN
-from sweep.explorer.state import State
 from sweep.models.model import ENERGY, LINEAR
 from sweep.models.theory.stability import stable_ranges
 from sweep.models.user import loading
@@ -315,22 +311,18 @@ def test_a_package_offers_models_by_entry_points(package: Path) -> None:
     assert load_config({"model": "swing", "drive": {"torque": 0.3}}).fingerprint() != first.fingerprint()
 
 
-@pytest.mark.parametrize("name", ["seed", "x"])
-def test_no_parameter_takes_the_name_of_a_setting_or_of_a_choice(folder: Path, name: str) -> None:
+@pytest.mark.parametrize("name", ["seed", "samples"])
+def test_no_parameter_takes_the_name_of_a_setting(folder: Path, name: str) -> None:
     (folder / "pendulum.py").write_text(PENDULUM.replace('"torque"', f'"{name}"'), encoding="utf-8")
     with pytest.raises(ConfigError, match=rf"pendulum.py: parameter drive.{name}: '{name}' means something else"):
         load_config({"model": str(folder / "pendulum.py")})
 
 
-def test_all_names_of_arguments_and_of_choices_are_taken() -> None:
-    """What takes overrides takes its own arguments beside them; the addresses of the explorer name both."""
-    verbs = [each for name in sweep.__all__ if inspect.isfunction(each := getattr(sweep, name))]
-    with_more = [
-        s for s in map(inspect.signature, verbs) if any(p.kind == p.VAR_KEYWORD for p in s.parameters.values())
-    ]
-    arguments = {name for s in with_more for name, p in s.parameters.items() if p.kind != p.VAR_KEYWORD}
-    fields = {field.name for field in dataclasses.fields(State)} - {"cells", "at"}
-    assert arguments | fields | {"cell"} <= TAKEN
+def test_no_parameter_takes_the_name_of_an_argument(folder: Path) -> None:
+    """It could not be given by keyword."""
+    (folder / "pendulum.py").write_text(PENDULUM.replace('"torque"', '"width"'), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"pendulum.py: parameter 'width' has the name of an argument"):
+        sweep.run({"model": str(folder / "pendulum.py")}, drive={"width": 0.3})
 
 
 @pytest.mark.parametrize("name", ["t_stop", "verified_spin_final", "reversal_times", "contact_x"])

@@ -14,7 +14,6 @@ from unittest import mock
 
 import dask
 import distributed
-import psutil
 import pytest
 import xarray as xr
 from support import ROOT, Write
@@ -25,7 +24,7 @@ from support.runs import Heard, Stop, same_numbers
 from support.same import contents
 
 import sweep
-from sweep.engine.cluster import AHEAD, Cluster, connected
+from sweep.engine.cluster import AHEAD
 from sweep.results.provenance import sources
 from sweep.results.store import StoreError
 
@@ -35,7 +34,6 @@ body: {b: {start: 2, stop: 6, num: 40}}
 friction: {mu: {start: 40, stop: 60, num: 40}}
 start: {n0: [0.02, 0.05, 0.07]}
 integrator: {t_end: 100}
-verify: 0.01
 """
 TILES, SMALL_TILES = 5, 20
 
@@ -135,7 +133,7 @@ def test_workers_that_come_go_hang_and_lag_cost_only_their_tiles(
                 fault(client, local)
 
         heard = Heard(when_the_first_is_back)
-        found = sweep.run(config, tmp_path, reporter=heard, cluster=Cluster(client))
+        found = sweep.run(config, tmp_path, reporter=heard, client=client)
         assert heard.seen
         assert SMALL_TILES <= completed(local) <= SMALL_TILES + lost
     same_numbers(found, expected)
@@ -160,12 +158,12 @@ def test_a_run_resumed_on_a_cluster_computes_what_is_missing(
     by_threads: dict[str, bytes],
 ) -> None:
     with pytest.raises(KeyboardInterrupt):
-        sweep.run(config, tmp_path, reporter=Stop(1), cluster=Cluster(client))
+        sweep.run(config, tmp_path, reporter=Stop(1), client=client)
     there = len(list(tmp_path.glob("tiles.checkpoint/0*.npz")))
     while any(client.processing().values()):
         time.sleep(0.05)
     local.scheduler.transition_log.clear()
-    sweep.run(config, tmp_path, cluster=Cluster(client))
+    sweep.run(config, tmp_path, client=client)
     assert completed(local) == TILES - there < TILES
     assert contents(tmp_path) == by_threads
 
@@ -175,7 +173,7 @@ def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> No
     # One worker may take all tiles, so each says both.
     types = iter(["one", "another"] * TILES)
     with patched(client, "sweep.engine.local.this_cpu", lambda: next(types)):
-        dataset = sweep.run(config, cluster=Cluster(client), t_end=20)
+        dataset = sweep.run(config, client=client, t_end=20)
     assert dataset.attrs["cpu"] == "another, one"
 
 
@@ -192,7 +190,7 @@ def test_another_program_in_a_worker_is_refused(
         patched(client, "sweep.engine.cluster.sources", lambda: tuple(own)),
         pytest.raises(StoreError, match=f"tcp://.*: the worker has {said}"),
     ):
-        sweep.run(config, cluster=Cluster(client))
+        sweep.run(config, client=client)
 
 
 def test_a_tile_that_kills_its_workers_is_reported(
@@ -201,54 +199,8 @@ def test_a_tile_that_kills_its_workers_is_reported(
     monkeypatch.setattr(local.scheduler, "allowed_failures", 0)
     with patched(client, "sweep.engine.cluster.run_batch", lambda *_: os._exit(1)):
         with pytest.raises(StoreError, match="workers died computing it"):
-            sweep.run(config, cluster=Cluster(client))
+            sweep.run(config, client=client)
         client.wait_for_workers(2)
-
-
-def command(config: Path, out: Path) -> list[str]:
-    return ["-m", "sweep", "run", str(config), "--output", str(out), "--workers", "2"]
-
-
-def test_only_the_run_itself_reaches_its_local_scheduler() -> None:
-    with connected(1, None) as cluster:
-        assert cluster
-        address = cluster.client.scheduler.address
-        assert cluster.client.submit(sum, [1, 2]).result(timeout=30) == 3
-        for other in (address, address.replace("tls", "tcp")):
-            with pytest.raises((OSError, TypeError)):
-                distributed.Client(other, timeout="2s", set_as_default=False)
-
-
-@pytest.mark.campaign
-def test_local_processes_give_the_same_files(config: Path, tmp_path: Path, by_threads: dict[str, bytes]) -> None:
-    done = python(*command(config, tmp_path), "--quiet")
-    assert (done.stdout, done.stderr) == ("", "")
-    assert contents(tmp_path) == by_threads
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "terminal"])
-def test_ctrl_c_ends_all_processes(
-    config: Path, tmp_path: Path, by_threads: dict[str, bytes], send: Callable[[int, int], None]
-) -> None:
-    with subprocess.Popen(
-        [sys.executable, *command(config, tmp_path), "--set", "t_end=5000"],
-        cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    ) as process:  # fmt: skip
-        while not list(tmp_path.glob("tiles.checkpoint/identity.json")):
-            assert process.poll() is None
-            time.sleep(0.05)
-        time.sleep(1)
-        others = psutil.Process(process.pid).children(recursive=True)
-        assert len(others) > 1
-        send(process.pid, signal.SIGINT)
-        _, said = process.communicate(timeout=60)
-        assert process.returncode == 130
-    assert "the same command resumes the run" in said
-    assert "Traceback" not in said
-    assert not psutil.wait_procs(others, timeout=60)[1]
-    sweep.run(config, tmp_path, fresh=True)
-    assert contents(tmp_path) == by_threads
 
 
 UNANSWERED = """\
@@ -314,6 +266,6 @@ def test_a_lost_scheduler_leaves_finished_tiles(config: Path, tmp_path: Path, by
 
 
 def test_formulas_run_on_a_cluster(config: Path, client: distributed.Client) -> None:
-    asked = {"model": "analytic", "verify": 0}
-    here, there = sweep.run(config, **asked), sweep.run(config, cluster=Cluster(client), **asked)
+    asked = {"model": "analytic"}
+    here, there = sweep.run(config, **asked), sweep.run(config, client=client, **asked)
     xr.testing.assert_identical(here.drop_attrs(deep=False), there.drop_attrs(deep=False))

@@ -15,7 +15,6 @@ from support.runs import Heard, same_numbers, settled
 
 import sweep
 from sweep.config import ConfigError, load_config
-from sweep.engine.cluster import Cluster
 from sweep.engine.plan import kernels
 from sweep.kernels import build as builder
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -134,7 +133,7 @@ def test_workers_need_no_file(few: xr.Dataset, folder: Path, client: distributed
     """They get its text with the configuration."""
     config = load_config(folder / "pendulum.yaml", FEW)
     (folder / "pendulum.py").unlink()
-    same_numbers(sweep.run(config, cluster=Cluster(client)), few)
+    same_numbers(sweep.run(config, client=client), few)
 
 
 LATE = 'if columns["torque"].max() > 1.1 and len(columns["torque"]) > 2:\n        raise ValueError("too much")\n    '
@@ -152,9 +151,9 @@ It fails late at high spins: one text for two tests, for each text takes a kerne
 
 def test_an_error_in_a_worker_names_its_line(folder: Path, client: distributed.Client) -> None:
     (folder / "pendulum.py").write_text(ROLLING, encoding="utf-8")
-    for cluster in (None, Cluster(client)):
+    for where in (None, client):
         with pytest.raises(ConfigError, match=r"pendulum.py:\d+: ValueError: too much") as error:
-            sweep.run(folder / "pendulum.yaml", cluster=cluster, **FEW)
+            sweep.run(folder / "pendulum.yaml", client=where, **FEW)
         assert 'raise ValueError("too much")' in ROLLING.splitlines()[error.value.faults[0].line - 1]
 
 

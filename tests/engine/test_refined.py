@@ -17,7 +17,6 @@ from support.runs import in_sittings, same_numbers
 
 import sweep
 from sweep.engine import local, refinement
-from sweep.engine.cluster import Cluster
 from sweep.engine.local import Done
 from sweep.engine.refinement import UNKNOWN, Outcomes, search
 from sweep.kernels.status import SETTLED
@@ -315,4 +314,4 @@ def test_command_tells_the_share(file: Path, refined: xr.Dataset, tmp_path: Path
 
 
 def test_in_other_processes(file: Path, refined: xr.Dataset, client: distributed.Client) -> None:
-    same_numbers(sweep.run(file, cluster=Cluster(client)), refined)
+    same_numbers(sweep.run(file, client=client), refined)

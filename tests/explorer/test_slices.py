@@ -1,5 +1,6 @@
 """Slices of a dataset: the same numbers as xarray's own selection, whatever the axes, and what is told of a cell."""
 
+from dataclasses import fields
 from itertools import permutations
 from pathlib import Path
 
@@ -96,3 +97,9 @@ def test_what_has_no_map_is_refused(dims: tuple[str, ...]) -> None:
     dataset = xr.Dataset({"status": (dims, np.zeros([2] * len(dims), "int8"))})
     with pytest.raises(StoreError, match="open a dataset of run"):
         Source(dataset, "x.nc")
+
+
+def test_no_axis_has_the_name_of_a_key_of_the_address(opened: xr.Dataset) -> None:
+    assert {field.name for field in fields(state.State)} - {"cells", "at"} < slices.ADDRESS
+    with pytest.raises(StoreError, match="the axis show has the name"):
+        Source(opened.rename(mu="show"))

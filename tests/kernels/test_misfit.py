@@ -13,7 +13,6 @@ from support.runs import in_sittings, same_numbers
 
 import sweep
 from sweep.config import ConfigError
-from sweep.engine.cluster import Cluster
 from sweep.explorer.setup import usable
 from sweep.explorer.slices import Source
 from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
@@ -87,7 +86,7 @@ def test_numbers_do_not_depend_on_threads_workers_or_interruptions(
     again, interruptions, _ = in_sittings(1, config, tmp_path / "out")
     assert interruptions
     same_numbers(again, alone)
-    same_numbers(sweep.run(config, cluster=Cluster(client)), alone)
+    same_numbers(sweep.run(config, client=client), alone)
 
 
 def test_another_film_is_another_run(write: Write, config: Path, tmp_path: Path) -> None:

@@ -269,9 +269,6 @@ def test_what_cannot_be_searched_is_refused(write: Write) -> None:
     one = write("friction: {mu: [60, 70]}\n", "one.yaml")
     refused(invoke("boundaries", one), "boundaries need two axes")
     refused(invoke("boundaries", one, "--x", "c"), "x: c is no axis of more than one value", "mu")
-    two = write("friction: {mu: [60, 70]}\nbody: {b: [2, 3]}\n", "two.yaml")
-    both = invoke("boundaries", two, "--workers", "2", "--scheduler", "tcp://x")
-    refused(both, "cannot be combined with --scheduler")
 
 
 def traced(edge: Callable[[Array], Array], points: int, deviation: float) -> tuple[Curve, int]:

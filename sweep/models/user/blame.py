@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import pairwise
 from os.path import abspath
 
 from sweep.faults import ConfigError, fault_of
+from sweep.jit import compiler_said
 from sweep.models.origin import Origin
 
 
@@ -32,25 +31,18 @@ def _place(error: Exception, origin: Origin) -> tuple[str, int | None]:
     known = {abspath(file): file for file in origin.files}
     chain = filter(None, (error, error.__cause__))
     lines = [(f.f_code.co_filename, n) for each in chain for f, n in traceback.walk_tb(each.__traceback__)]
-    if where := getattr(error, "loc", None):
-        lines.append((where.filename, where.line))
-    lines += [(file, int(line)) for file, line in _FILE.findall(str(error))]
+    lines += compiler_said(error)[0]
     found = [(known[abspath(file)], n) for file, n in lines if abspath(file) in known]
     return found[-1] if found else ("", None)
-
-
-_FILE = re.compile(r'File "(.+?)", line (\d+)')
 
 
 def _words(error: Exception) -> str:
     arithmetic = (
         "inline functions are plain arithmetic and NumPy's functions of numbers, such as np.sqrt and np.minimum"
     )
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    if type(error).__module__.startswith("numba"):
-        # Numba tells, from the outermost function inwards: that it failed, and why.
-        why = [after for before, after in pairwise(lines) if "Failed in" in before]
-        return f"does not compile: {(why or lines)[-1]}; {arithmetic}, and call only others marked sweep.jit.inline"
+    if reason := compiler_said(error)[1]:
+        return f"does not compile: {reason}; {arithmetic}, and call only others marked sweep.jit.inline"
     if "truth value of an array" in str(error):
         return f"a branch on arrays; {arithmetic}"
-    return f"{type(error).__name__}: {lines[0] if lines else ''}"
+    first, *_ = str(error).strip().splitlines() or [""]
+    return f"{type(error).__name__}: {first.strip()}"

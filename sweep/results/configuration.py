@@ -1,0 +1,41 @@
+"""The configuration that a dataset tells, as what runs it again needs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import xarray as xr
+
+from sweep.config import Config, load_config
+from sweep.config.document import parse_value
+from sweep.faults import fault_of
+from sweep.grid import CASE
+from sweep.kernels.measures.misfit import Misfit
+
+
+def configuration(
+    dataset: xr.Dataset, model: Mapping[str, str] | None = None, announce: Callable[[str], None] | None = None
+) -> Config:
+    """The configuration that a dataset tells, without a film; a table of cases gives way to the first of them.
+
+    Parameters
+    ----------
+    model : the keys by which the user names their model, if it is to run
+    announce : told in words that code of a user is about to run; None if such a model is to be refused
+
+    Raises
+    ------
+    ConfigError
+        if it cannot be run.
+    """
+    values = parse_value(str(dataset.attrs.get("config", "")), "config")
+    if not isinstance(values, dict):
+        raise fault_of("a configuration is a mapping of keys to values", "config")
+    values.pop("cases", None)
+    if isinstance(measure := values.get("measure"), list):
+        values["measure"] = [each for each in measure if not (isinstance(each, dict) and Misfit.name in each)]
+    first = {str(name): float(c[0]) for name, c in dataset.coords.items() if c.dims == (CASE,) and name != CASE}
+    named = dict(model or {})
+    return load_config(
+        values, first | named, argument=lambda key: "--model" if key in named else key, announce=announce
+    )
