@@ -14,7 +14,7 @@ import xarray as xr
 
 from sweep.axis import Axis
 from sweep.grid import Array
-from sweep.plots import labels, marks, quantities, theory
+from sweep.plots import labels, marks, quantities
 from sweep.plots.description import Map, along, describe, table
 from sweep.results.kind import BOUNDARIES, FIT, INDICES, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
@@ -22,9 +22,6 @@ from sweep.results.store import StoreError
 
 IN_MEMORY = 2_000_000
 """Cells up to which a dataset is read as a whole; of a larger one, each slice is read when it is shown."""
-
-_HOW = {"linear": "eigenvalues", "simulated": "simulation", "reason": "whether found"}
-"""How a critical spin was found, by what follows its name."""
 
 
 class PlacedAxis(Axis):
@@ -89,10 +86,6 @@ class Source:
 
     def words(self, name: str) -> str:
         """Say what a variable or an axis is."""
-        if name.startswith("n_c") and name.count("_") > 1:
-            _, _, _, *how = name.split("_")
-            words = ", ".join([_HOW.get(h, h) for h in how] or ["formula"])
-            return f"{theory.symbol(name)}, {words}"
         return labels.words(self.cell, name)
 
     def label(self, name: str) -> str:

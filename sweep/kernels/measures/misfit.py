@@ -22,6 +22,7 @@ from sweep.kernels.layout import BLOCK, LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.status import RUNNING
 from sweep.models.model import SPIN, Array, Columns, Model
+from sweep.units import NUMBER
 
 POINTS = 8
 """Of a polynomial, half of them on either side of the instant but near the ends of a trajectory."""
@@ -83,7 +84,12 @@ class Misfit(Measurement):
     asks = SPIN
     every_step = True
     quantities = ("film_end", "noted_spin", "compared", "next_instant", "misfit", *_SPINS)
-    variables = {"misfit": measured("float64", "sum of squares of (spin - film) / error over the instants of the film")}
+    variables = {
+        "misfit": measured(
+            "float64", NUMBER, "misfit of the film",
+            "Sum of squares of (spin - film) / error over the instants of the film.",
+        )
+    }  # fmt: skip
     film: Film | None = None
     """None where the kernel is only compiled."""
 
