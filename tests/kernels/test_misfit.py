@@ -59,7 +59,7 @@ def test_it_is_that_of_the_trajectories(config: Path) -> None:
     seen = sweep.trajectory(config, every=0.5, mu=[40, 60, 80], n0=[0.03, 0.05])
     np.testing.assert_allclose(found.misfit.values.ravel(), misfit(seen.spin.values, seen.time.values), rtol=1e-10)
     assert found.misfit.dims == found.reversals.dims
-    assert found.misfit.attrs["long_name"].startswith("sum of squares of (spin - film) / error")
+    assert found.misfit.attrs["description"].startswith("Sum of squares of (spin - film) / error")
     np.testing.assert_array_equal(seen.misfit, found.misfit.values.ravel())
 
 
