@@ -117,7 +117,7 @@ _SECTIONS: dict[str, tuple[_Row, ...]] = {
         ("radius_contact", u.LENGTH, "radius of the contact", None, _SIZE),
         ("mu_viscous", u.SLOWNESS, "viscous part of the friction coefficient", 0.0, _VISCOUS),
         ("sigma", u.DRAG, "rotational drag coefficient σ", 0.0, _VISCOUS,
-         "Torque per angular velocity that opposes it."),
+         "Torque per angular velocity, opposed to the rotation."),
         ("mu_rolling", u.NUMBER, "coefficient of rolling friction", None, _COEFFICIENT),
         ("radius", u.LENGTH, "contact radius of rolling friction", None, _SIZE),
         ("speed_rolling", u.SPIN, "angular velocity of rolling friction", None, _SIZE,

@@ -30,7 +30,7 @@ def _parameters() -> tuple[Row, list[Row]]:
     rows = [
         (
             f"`{p.path}`",
-            _meaning(p),
+            p.description or p.long_name,
             f"{pretty(named(p.units, SI))}, with `units: SI` alone" if p.name in SI_ALONE else _unit(p),
             "required" if p.default is None else f"{p.default:g}",
             p.allowed,
@@ -38,10 +38,6 @@ def _parameters() -> tuple[Row, list[Row]]:
         for p in PARAMETERS.values()
     ]
     return ("name", "meaning", "unit", "default", "allowed"), rows
-
-
-def _meaning(of: Parameter | Variable) -> str:
-    return ". ".join(filter(None, [of.long_name, of.description]))
 
 
 def _unit(of: Parameter | Variable) -> str:
@@ -76,8 +72,8 @@ def _variables() -> tuple[Row, list[Row]]:
     rows = []
     for over, table in tables.items():
         for name, spec in table.items():
-            flags = "; ".join(f"{code} {flag}" for code, flag in (spec.flags or {}).items())
-            rows.append((f"`{name}`", spec.dtype, over, _unit(spec), _meaning(spec) + (f" ({flags})" if flags else "")))
+            flags = f" ({', '.join(f'{code} {flag}' for code, flag in spec.flags.items())})" if spec.flags else ""
+            rows.append((f"`{name}`", spec.dtype, over, _unit(spec), (spec.description or spec.long_name) + flags))
     return ("variable", "type", "axes", "unit", "meaning"), rows
 
 

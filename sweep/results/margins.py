@@ -30,7 +30,8 @@ _PLACE = "Place along the bracket's axis of the simulated cell that reverses"
 
 POINTS = {
     "level": Variable("int16", NUMBER, "spin reversals that begin at the point"),
-    "curve": Variable("int32", NUMBER, "number of the curve", "Points of a curve are in order along it."),
+    "curve": Variable("int32", NUMBER, "number of the curve",
+                      "Number of the curve to which the point belongs; its points are in order along it."),
     "closed": Variable("int8", NUMBER, "is the curve closed?", "", {0: "ends_at_an_edge", 1: "closed"}),
     "end_fewer": Variable("float64", NUMBER, "end of the bracket, fewer reversals", f"{_PLACE} less."),
     "end_more": Variable("float64", NUMBER, "end of the bracket, more reversals", f"{_PLACE} more."),
