@@ -30,18 +30,18 @@ motion = NOSLIP.rhs
 
 PARAMETERS = (
     *(
-        Parameter(f"I{i}", "body", "1", f"principal moment of inertia {i}, in m h^2", value, above=0, below=1e6)
+        Parameter(f"I{i}", "body", "m h2", f"principal moment of inertia {i}", value, above=0, below=1e6)
         for i, value in ((1, 5.0), (2, 6.0), (3, 7.0))
     ),
     *(
-        Parameter(f"a{i}", "body", "1", f"radius of curvature {i} at the lowest point, in h", value, above=1, below=1e6)
+        Parameter(f"a{i}", "body", "h", f"radius of curvature {i} at the lowest point", value, above=1, below=1e6)
         for i, value in ((1, 9.0), (2, 4.0))
     ),
     *(
-        Parameter(f"omega{i}", "start", "1", f"direction of the start angular velocity, along {axis}", value)
+        Parameter(f"omega{i}", "start", "1", f"direction of the angular velocity along {axis}", value)
         for i, axis, value in ((1, "x", 0.0), (2, "y", 0.0), (3, "z", -1.0))
     ),
-    Parameter("E", "start", "1", "total energy, in m g h/100", 752.0, above=100, below=1e6),
+    Parameter("E", "start", "m g h/100", "total energy", 752.0, above=100, below=1e6),
 )
 
 

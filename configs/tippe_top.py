@@ -35,13 +35,13 @@ from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, Model
 from sweep.parameters import Parameter
 
 PARAMETERS = (
-    Parameter("eccentricity", "body", "1", "distance α of the centre of mass from the centre, in R", 0.3,
-              above=0, below=1),
-    Parameter("ratio", "body", "1", "ratio A/C of the moments of inertia, across and along the axis", 0.936,
-              at_least=0.5, below=10),
-    Parameter("C", "body", "1", "moment of inertia about the axis, in m R^2", 0.4, above=0, below=1),
-    Parameter("mu", "friction", "1", "coefficient of viscous friction μ, in 1/sqrt(g R)", 0.15, at_least=0, below=100),
-    Parameter("n0", "start", "1", "start spin about the axis, in sqrt(g/R)", 7.0, above=0, below=1000),
+    Parameter("eccentricity", "body", "R", "distance α of the centre of mass", 0.3,
+              above=0, below=1, description="Distance of the centre of mass from the centre of the sphere."),
+    Parameter("ratio", "body", "1", "ratio A/C of the moments of inertia", 0.936,
+              at_least=0.5, below=10, description="Moment of inertia across the axis, divided by that along it."),
+    Parameter("C", "body", "m R2", "moment of inertia about the axis", 0.4, above=0, below=1),
+    Parameter("mu", "friction", "1/sqrt(g R)", "coefficient of viscous friction μ", 0.15, at_least=0, below=100),
+    Parameter("n0", "start", "sqrt(g/R)", "start spin about the axis", 7.0, above=0, below=1000),
     Parameter("tilt", "start", "radian", "start angle of the axis with the vertical", 0.1, at_least=0, below=3.1),
 )  # fmt: skip
 
@@ -173,7 +173,7 @@ MODEL = Model(
     observe=observe,
     series=(
         ("inclination", "radian", "angle of the axis with the vertical"),
-        ("jellett", "1", "Jellett's integral, in m R sqrt(g R)"),
+        ("jellett", "m R sqrt(g R)", "Jellett's integral"),
     ),
     slower_period=nutation,
     fastest_motion=fastest,

@@ -11,8 +11,8 @@ from math import inf, pi
 from sys import float_info
 from typing import Any
 
-PAPER_UNITS, SI = "paper", "SI"
-"""Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
+from sweep import units as u
+from sweep.units import PAPER_UNITS, SI, Unit, named
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,10 @@ class Parameter:
     name: str
     section: str
     """Section of the configuration in which it stands; "" for the top."""
-    units: str
-    """CF unit in the paper's units."""
+    units: Unit | str
+    """Powers of length, time and mass; or the unit as text, of a user's model."""
     long_name: str
-    """Meaning, with the paper's unit as its last words where the number is no pure one (`sweep.variables.in_si`)."""
+    """What figures call it, without the unit; with its symbol."""
     default: float | None
     """Value of the paper's standard case; None if the configuration has to give one."""
     above: float = -inf
@@ -34,13 +34,13 @@ class Parameter:
     """Exclusive upper bound."""
     at_least: float = -inf
     """Inclusive lower bound."""
-    words: str = ""
-    """What figures call it, with its symbol; by default its `long_name`."""
+    description: str = ""
+    """What it is, in a sentence, where the `long_name` does not say it."""
 
     @property
     def symbol(self) -> str:
-        """What figures write for it: the Greek or indexed letter in its words, or else its name."""
-        return next((word for word in self.words.split() if not word.isascii()), self.name)
+        """What figures write for it: the Greek or indexed letter in its `long_name`, or else its name."""
+        return next((word for word in self.long_name.split() if not word.isascii()), self.name)
 
     @property
     def place(self) -> tuple[str, ...]:
@@ -50,6 +50,13 @@ class Parameter:
     @property
     def path(self) -> str:
         return ".".join(self.place)
+
+    @property
+    def meaning(self) -> str:
+        """What it is, with its unit, for messages and tables."""
+        alone = self.name in SI_ALONE
+        unit = named(self.units, SI if alone else PAPER_UNITS)
+        return self.long_name + (f", in {unit}" if unit else "") + (" (units: SI only)" if alone else "")
 
     def allows(self, value: float) -> bool:
         within = self.above < value < self.below and value >= self.at_least
@@ -63,77 +70,87 @@ class Parameter:
         return f"a finite number {bounds}".rstrip()
 
 
-_SIZE = {"above": 0, "below": 1e6}
-_MASS: dict[str, Any] = {"above": 0, "below": 1e12}
-_MOMENT = {"above": 0, "below": 1e24}
-_PRODUCT = {"above": -1e24, "below": 1e24}
-_COEFFICIENT = {"at_least": 0, "below": 1e6}
-_VISCOUS = {"at_least": 0, "below": 1e12}
-_SPIN = {"above": -1e3, "below": 1e3}
-_SLIP = {"above": -1e6, "below": 1e6}
-_ANGLE = {"units": "radian", "above": -pi / 2, "below": pi / 2}
-_POINT: dict[str, Any] = {}
+SI_ALONE = ("mass", "gravity")
+"""Parameters that are one in the paper's units."""
 
-_Row = tuple[str, str, float | None, dict[str, Any], *tuple[str, ...]]
-"""Name, meaning, default, and the bounds of a parameter, and what figures call it."""
+_Bounds = dict[str, Any]
+_SIZE: _Bounds = {"above": 0, "below": 1e6}
+_MASS: _Bounds = {"above": 0, "below": 1e12}
+_MOMENT: _Bounds = {"above": 0, "below": 1e24}
+_PRODUCT: _Bounds = {"above": -1e24, "below": 1e24}
+_COEFFICIENT: _Bounds = {"at_least": 0, "below": 1e6}
+_VISCOUS: _Bounds = {"at_least": 0, "below": 1e12}
+_SPIN: _Bounds = {"above": -1e3, "below": 1e3}
+_SLIP: _Bounds = {"above": -1e6, "below": 1e6}
+_ANGLE: _Bounds = {"above": -pi / 2, "below": pi / 2}
+_POINT: _Bounds = {}
+
+_Row = tuple[str, Unit, str, float | None, _Bounds, *tuple[str, ...]]
+"""Name, unit, `long_name`, default, bounds and perhaps the `description` of a parameter."""
 
 _SECTIONS: dict[str, tuple[_Row, ...]] = {
     "body": (
-        ("a", "semi-axis of the ellipsoid at delta from x (long axis), in c", 10.0, _SIZE, "long semi-axis a"),
-        ("b", "semi-axis of the ellipsoid at delta from y (short axis), in c", 3.0, _SIZE, "short semi-axis b"),
-        ("c", "semi-axis of the ellipsoid along z, the unit of length", 1.0, _SIZE,
-         "height c of the center over the table"),
-        ("delta", "angle from the ellipsoid's axes to the axes of inertia", 0.03, _ANGLE,
-         "angle δ of the axes of inertia"),
-        ("offset", "depth of the centre of mass below the ellipsoid's centre, in c", 0.0, _POINT),
-        ("mass", "mass, in m", None, _MASS),
-        ("Ixx", "central moment of inertia about x, in m c^2", None, _MOMENT),
-        ("Iyy", "central moment of inertia about y, in m c^2", None, _MOMENT),
-        ("Izz", "central moment of inertia about z, in m c^2", None, _MOMENT),
-        ("Ixy", "element xy of the central matrix of inertia, in m c^2", 0.0, _PRODUCT),
-        ("Ixz", "element xz of the central matrix of inertia, in m c^2", 0.0, _PRODUCT),
-        ("Iyz", "element yz of the central matrix of inertia, in m c^2", 0.0, _PRODUCT),
+        ("a", u.LENGTH, "long semi-axis a", 10.0, _SIZE, "Semi-axis of the ellipsoid at delta from x."),
+        ("b", u.LENGTH, "short semi-axis b", 3.0, _SIZE, "Semi-axis of the ellipsoid at delta from y."),
+        ("c", u.LENGTH, "height c of the centre over the table", 1.0, _SIZE,
+         "Semi-axis of the ellipsoid along z, the unit of length in the paper's units."),
+        ("delta", u.ANGLE, "angle δ of the axes of inertia", 0.03, _ANGLE,
+         "Angle from the ellipsoid's axes to the axes of inertia."),
+        ("offset", u.LENGTH, "depth of the centre of mass", 0.0, _POINT,
+         "Depth of the centre of mass below the ellipsoid's centre."),
+        ("mass", u.MASS, "mass", None, _MASS),
+        ("Ixx", u.INERTIA, "central moment of inertia about x", None, _MOMENT),
+        ("Iyy", u.INERTIA, "central moment of inertia about y", None, _MOMENT),
+        ("Izz", u.INERTIA, "central moment of inertia about z", None, _MOMENT),
+        ("Ixy", u.INERTIA, "element xy of the central inertia matrix", 0.0, _PRODUCT),
+        ("Ixz", u.INERTIA, "element xz of the central inertia matrix", 0.0, _PRODUCT),
+        ("Iyz", u.INERTIA, "element yz of the central inertia matrix", 0.0, _PRODUCT),
     ),
-    "": (("gravity", "acceleration of free fall, in g", 9.80665, _SIZE),),
+    "": (("gravity", u.ACCELERATION, "acceleration of free fall", 9.80665, _SIZE),),
     "friction": (
-        ("mu", "viscous friction coefficient, in 1/sqrt(g c)", None, _VISCOUS, "friction μ"),
-        ("speed", "slip velocity from which on friction is that of slipping, in sqrt(g c)", None, _SIZE),
-        ("mu_static", "coefficient of friction at no slip", None, _COEFFICIENT),
-        ("speed_stick", "slip velocity over which static friction sets in, in sqrt(g c)", None, _SIZE),
-        ("radius_contact", "radius of the contact, in c", None, _SIZE),
-        ("mu_viscous", "viscous part of the coefficient of friction, in 1/sqrt(g c)", 0.0, _VISCOUS),
-        ("sigma", "couple per angular velocity that opposes it, in m c sqrt(g c)", 0.0, _VISCOUS,
-         "couple σ per angular velocity"),
-        ("mu_rolling", "coefficient of rolling friction", None, _COEFFICIENT),
-        ("radius", "contact radius of rolling friction, in c", None, _SIZE),
-        ("speed_rolling", "angular velocity below which rolling friction fades, in sqrt(g/c)", None, _SIZE),
-        ("mu_spinning", "coefficient of spinning friction", None, _COEFFICIENT),
-        ("radius_spinning", "contact radius of spinning friction, in c", None, _SIZE),
-        ("speed_spinning", "spin below which spinning friction fades, in sqrt(g/c)", None, _SIZE),
+        ("mu", u.SLOWNESS, "friction μ", None, _VISCOUS, "Viscous friction coefficient."),
+        ("speed", u.SPEED, "slip speed of full friction", None, _SIZE,
+         "Slip speed above which Coulomb friction is fully developed."),
+        ("mu_static", u.NUMBER, "coefficient of static friction", None, _COEFFICIENT),
+        ("speed_stick", u.SPEED, "slip speed of static friction", None, _SIZE,
+         "Slip speed over which static friction sets in."),
+        ("radius_contact", u.LENGTH, "radius of the contact", None, _SIZE),
+        ("mu_viscous", u.SLOWNESS, "viscous part of the friction coefficient", 0.0, _VISCOUS),
+        ("sigma", u.DRAG, "rotational drag coefficient σ", 0.0, _VISCOUS,
+         "Torque per angular velocity, opposed to the rotation."),
+        ("mu_rolling", u.NUMBER, "coefficient of rolling friction", None, _COEFFICIENT),
+        ("radius", u.LENGTH, "contact radius of rolling friction", None, _SIZE),
+        ("speed_rolling", u.SPIN, "angular velocity of rolling friction", None, _SIZE,
+         "Angular velocity below which rolling friction fades."),
+        ("mu_spinning", u.NUMBER, "coefficient of spinning friction", None, _COEFFICIENT),
+        ("radius_spinning", u.LENGTH, "contact radius of spinning friction", None, _SIZE),
+        ("speed_spinning", u.SPIN, "spin of spinning friction", None, _SIZE,
+         "Spin below which spinning friction fades."),
     ),
     "start": (
-        ("n0", "start spin about the upward normal, in sqrt(g/c)", 0.05, _SPIN, "start spin n₀"),
-        ("x0", "start contact point along x, in c", 0.01, _POINT, "start contact point x₀"),
-        ("y0", "start contact point along y, in c", 0.01, _POINT, "start contact point y₀"),
-        ("roll", "start angle about the axis of a", 0.0, _ANGLE),
-        ("pitch", "start angle about the axis of b, after roll", 0.0, _ANGLE),
-        ("omega1", "start angular velocity about the axis of a, in sqrt(g/c)", 0.0, _SPIN,
-         "start angular velocity ω₁ about the axis of a"),
-        ("omega2", "start angular velocity about the axis of b, in sqrt(g/c)", 0.0, _SPIN,
-         "start angular velocity ω₂ about the axis of b"),
-        ("omega3", "start angular velocity about z, in sqrt(g/c)", 0.0, _SPIN, "start angular velocity ω₃ about z"),
-        ("slip1", "start slip along the ground, at heading zero along x, in sqrt(g c)", 0.0, _SLIP),
-        ("slip2", "start slip along the ground, at heading zero along y, in sqrt(g c)", 0.0, _SLIP),
+        ("n0", u.SPIN, "start spin n₀", 0.05, _SPIN, "Spin about the upward normal at the start."),
+        ("x0", u.LENGTH, "start contact point x₀", 0.01, _POINT, "Contact point along x at the start."),
+        ("y0", u.LENGTH, "start contact point y₀", 0.01, _POINT, "Contact point along y at the start."),
+        ("roll", u.ANGLE, "start angle about the axis of a", 0.0, _ANGLE),
+        ("pitch", u.ANGLE, "start angle about the axis of b", 0.0, _ANGLE,
+         "Angle at the start about the axis of b, after roll."),
+        ("omega1", u.SPIN, "start angular velocity ω₁", 0.0, _SPIN, "Angular velocity about the axis of a."),
+        ("omega2", u.SPIN, "start angular velocity ω₂", 0.0, _SPIN, "Angular velocity about the axis of b."),
+        ("omega3", u.SPIN, "start angular velocity ω₃", 0.0, _SPIN, "Angular velocity about z."),
+        ("slip1", u.SPEED, "start slip velocity along x", 0.0, _SLIP,
+         "Slip velocity along the ground at the start, at heading zero along x."),
+        ("slip2", u.SPEED, "start slip velocity along y", 0.0, _SLIP,
+         "Slip velocity along the ground at the start, at heading zero along y."),
     ),
 }  # fmt: skip
 
 PARAMETERS: dict[str, Parameter] = {
-    name: Parameter(name, section, long_name=meaning, default=default, words="".join(words), **{"units": "1", **bounds})
+    name: Parameter(name, section, units, long_name, default, description="".join(description), **bounds)
     for section, rows in _SECTIONS.items()
-    for name, meaning, default, bounds, *words in rows
+    for name, units, long_name, default, bounds, *description in rows
 }
 
-DENSITY = Parameter("density", "", "kg/m^3", "density of a body of one material", None, **_MASS)
+DENSITY = Parameter("density", "", u.MASS_DENSITY, "density of a body of one material", None, **_MASS)
 """No key of a configuration: it is measured instead of the mass."""
 
 PAPER_PARAMETERS: dict[str, Parameter] = {

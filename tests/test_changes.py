@@ -30,11 +30,12 @@ TWIN = '''"""The time of the first reversal by another name."""
 
 from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.measures.measurement import measured
+from sweep.units import TIME
 
 
 class Twin(FirstReversal):
     name = "twin"
-    variables = {"t_twin": measured("float64", "time of the first reversal once more, in sqrt(c/g)")}
+    variables = {"t_twin": measured("float64", TIME, "time of the first reversal once more")}
 
     def read(self, table, times):
         return {"t_twin": table["first_reversal"]}
@@ -145,14 +146,14 @@ assert found["reversals"].item() > 5
             "sweep/parameters.py": [
                 (
                     '        ("mu_static",',
-                    '        ("fading", "slip velocity of half the force", None, _SIZE),\n        ("mu_static",',
+                    '        ("fading", u.SPEED, "slip of half the force", None, _SIZE),\n        ("mu_static",',
                 )
             ],
         },
         f"""
 found = sweep.run({BODY!r}, **{{"friction.law": "square"}}, speed=0.05, fading=0.2)
 assert found["energy_error"].item() < 1e-6
-assert found["fading"].attrs["long_name"].startswith("slip velocity of half")
+assert found["fading"].attrs["long_name"].startswith("slip of half")
 """,
     ),
     "a surface of bodies": Change(

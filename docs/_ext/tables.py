@@ -17,9 +17,11 @@ from sweep.kernels import measures, methods
 from sweep.kernels.status import FAILURES
 from sweep.models import MODELS, TIERS
 from sweep.models.model import Model
-from sweep.parameters import PARAMETERS
+from sweep.parameters import PARAMETERS, SI_ALONE, Parameter
 from sweep.results import dataset
 from sweep.results.probabilities import PROBABILITIES
+from sweep.units import PAPER_UNITS, SI, named, pretty
+from sweep.variables import Variable
 
 Row = tuple[str, ...]
 
@@ -28,14 +30,19 @@ def _parameters() -> tuple[Row, list[Row]]:
     rows = [
         (
             f"`{p.path}`",
-            p.long_name,
-            "rad" if p.units == "radian" else p.units,
+            p.description or p.long_name,
+            f"{pretty(named(p.units, SI))}, with `units: SI` alone" if p.name in SI_ALONE else _unit(p),
             "required" if p.default is None else f"{p.default:g}",
             p.allowed,
         )
         for p in PARAMETERS.values()
     ]
     return ("name", "meaning", "unit", "default", "allowed"), rows
+
+
+def _unit(of: Parameter | Variable) -> str:
+    """The paper's unit and that of SI, if they differ."""
+    return " or ".join(dict.fromkeys(pretty(named(of.units, system)) for system in (PAPER_UNITS, SI)))
 
 
 def _settings() -> tuple[Row, list[Row]]:
@@ -56,18 +63,18 @@ def _default(field: Any) -> str:
 
 
 def _variables() -> tuple[Row, list[Row]]:
+    tables = {
+        "all": {name: spec for name, spec in dataset.VARIABLES.items() if not spec.per_body},
+        "all but the start's": {name: spec for name, spec in dataset.VARIABLES.items() if spec.per_body},
+        "all but `sample`, and `count`": PROBABILITIES,
+        "`verified`": dataset.VERIFIED,
+    }
     rows = []
-    for name, spec in dataset.VARIABLES.items():
-        words = spec.long_name
-        if spec.flags:
-            words += ": " + ", ".join(f"{code} {flag}" for code, flag in spec.flags.items())
-        over = "all but the start's" if spec.per_body else "all"
-        rows.append((f"`{name}`", spec.dtype, over, words))
-    for name, spec in PROBABILITIES.items():
-        rows.append((f"`{name}`", spec.dtype, "all but `sample`, and `count`", spec.long_name))
-    for name, spec in dataset.VERIFIED.items():
-        rows.append((f"`{name}`", spec.dtype, "`verified`", spec.long_name))
-    return ("variable", "type", "axes", "meaning"), rows
+    for over, table in tables.items():
+        for name, spec in table.items():
+            flags = f" ({', '.join(f'{code} {flag}' for code, flag in spec.flags.items())})" if spec.flags else ""
+            rows.append((f"`{name}`", spec.dtype, over, _unit(spec), (spec.description or spec.long_name) + flags))
+    return ("variable", "type", "axes", "unit", "meaning"), rows
 
 
 _STATUS_MEANINGS = {

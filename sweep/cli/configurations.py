@@ -45,7 +45,7 @@ def _measured(command: Callable[..., None]) -> Callable[..., None]:
 def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
     """Print a configuration of a rattleback that was measured.
 
-    It is a homogeneous solid, by default the lower half of an ellipsoid.  Lengths may have any unit.
+    It is a homogeneous solid, by default the lower half of an ellipsoid.  Lengths may be in m, cm, mm, in or ft.
     Give the mass, and for each direction a size, a radius of curvature or a semi-axis; where there
     are two, the size is that of the solid, the other that of the surface.  With --stl, give only the
     mass or the density.

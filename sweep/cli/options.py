@@ -24,7 +24,7 @@ def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> li
     """The keys of a configuration, or with `--at` the parameters, that go on from what was typed."""
     from sweep.config.schema import PATHS
 
-    known = PATHS if parameter.name == "settings" else {p.name: p.long_name for p in PARAMETERS.values()}
+    known = PATHS if parameter.name == "settings" else {p.name: p.meaning for p in PARAMETERS.values()}
     return [CompletionItem(f"{key}=", help=words) for key, words in known.items() if key.startswith(typed)]
 
 

@@ -32,7 +32,7 @@ def _parameter_help() -> str:
     lines = ["\b", "Parameters (a number, a list, or {start, stop, num, spacing: linear|log}):"]
     for p in PARAMETERS.values():
         default = "no default" if p.default is None else f"default {p.default:g}"
-        lines.append(f"  {p.path:24} {p.long_name}; {default}; {p.allowed}")
+        lines.append(f"  {p.path:24} {p.meaning}; {default}; {p.allowed}")
     return "\n".join(lines)
 
 

@@ -32,7 +32,8 @@ from sweep.models.general.variants import PAPER_LAW, Physics
 from sweep.models.model import MODES, Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
-from sweep.parameters import PARAMETERS, SI, Parameter, sections
+from sweep.parameters import PARAMETERS, Parameter, sections
+from sweep.units import SI
 
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 

@@ -28,8 +28,9 @@ from sweep.models.general.variants import BASES, PAPER_LAW, Physics
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
-from sweep.parameters import PAPER_UNITS, SI, Parameter, sections
-from sweep.variables import in_si, with_unit
+from sweep.parameters import Parameter, sections
+from sweep.units import NUMBER, PAPER_UNITS
+from sweep.variables import attributes
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
@@ -173,11 +174,9 @@ class Config:
         parameter = self.table[name]
         known = {"distribution": found.words} if (found := self.distributions.get(name)) else {}
         if name in (self.own_law or laws.LAWS[self.law]).pure:
-            return {"long_name": "coefficient of friction", **known}
-        units, long_name = parameter.units, SURFACES[self.surface].meanings.get(name, parameter.long_name)
-        if self.units == SI:
-            units, long_name = in_si(units, long_name)
-        return {**with_unit(long_name, units), **known}
+            parameter = replace(parameter, units=NUMBER, description="Coefficient of friction.")
+        parameter = replace(parameter, **SURFACES[self.surface].meanings.get(name, {}))
+        return {**attributes(parameter, self.units), **known}
 
     def document(self) -> dict[str, Any]:
         """The whole configuration, defaults included, as plain data."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,23 +14,20 @@ import numpy as np
 from sweep.faults import ConfigError, Fault, brief, either
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
+from sweep.units import ANGLE, SPIN, TIME, Unit, factor, known
 
 MOST_ROWS = 20_000
 """Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
 
-_SPINS = {"rad/s": 1.0, "1/s": 1.0, "": 1.0, "deg/s": np.pi / 180, "°/s": np.pi / 180, "rpm": np.pi / 30}
-_ANGLES = {"rad": 1.0, "": 1.0, "deg": np.pi / 180, "°": np.pi / 180}
-_TIMES = {"s": 1.0, "": 1.0, "ms": 1e-3, "min": 60.0}
-
 _NO_TABLE = "no table; the first line must name all columns, with semicolons between them if numbers have commas"
 
 # What trackers and phones (phyphox) call their columns, without the unit in parentheses.
-_NAMES: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
-    "time": (_TIMES, ("time", "t")),
-    "spin": (_SPINS, ("spin", "n", "angular velocity")),
-    "gyroscope": (_SPINS, ("gyroscope z", "gyro z", "omega z", "wz")),
-    "heading": (_ANGLES, ("heading", "angle", "theta")),
-    "error": ({}, ("error", "sigma", "uncertainty")),  # in a unit of what is seen
+_NAMES: dict[str, tuple[str, ...]] = {
+    "time": ("time", "t"),
+    "spin": ("spin", "n", "angular velocity"),
+    "gyroscope": ("gyroscope z", "gyro z", "omega z", "wz"),
+    "heading": ("heading", "angle", "theta"),
+    "error": ("error", "sigma", "uncertainty"),
 }
 
 
@@ -82,16 +78,17 @@ def read(path: str | Path) -> Film:
         names = either(f"'{name}'" for name in ("spin (rad/s)", "gyroscope z (rad/s)", "heading (deg)"))
         raise _fault(path, 1, f"needs a column 'time (s)' and one {names}; it has {brief(', '.join(header))}")
 
-    def column(name: str, units: Mapping[str, float]) -> Array:
-        place, unit = found[name]
-        if unit not in units:
-            known = either(sorted(filter(None, units)))
-            raise _fault(path, 1, f"{name} is in '{brief(unit, 20)}'; its unit must be {known}")
-        return np.asarray(rows[:, place] * units[unit])
+    def column(name: str, unit: Unit) -> Array:
+        """The column in SI; without a unit it is in SI already, and an error in the unit of what is seen."""
+        place, written = found[name]
+        written = written or (found[what][1] if name == "error" else "")
+        if (scale := factor(written, unit) if written else 1.0) is None:
+            raise _fault(path, 1, f"{name} is in '{brief(written, 20)}'; its unit must be {either(known(unit))}")
+        return np.asarray(rows[:, place] * scale)
 
-    units = _NAMES[what][0]
-    time, value = column("time", _TIMES), column(what, units)
-    error = column("error", units | {"": units[found[what][1]]}) if "error" in found else None
+    unit = ANGLE if what == "heading" else SPIN
+    time, value = column("time", TIME), column(what, unit)
+    error = column("error", unit) if "error" in found else None
     whole = np.isfinite(time) & np.isfinite(value)
     back = np.flatnonzero(np.diff(time[whole]) < 0)
     if len(back):
@@ -135,7 +132,7 @@ def _columns(header: list[str]) -> dict[str, tuple[int, str]]:
     for place, written in enumerate(header):
         name, _, unit = (part.strip() for part in re.sub(r"[)\]]\s*$", "", written).replace("[", "(").partition("("))
         plain = re.sub(r"[_\s]+", " ", name).lower()
-        for what, (_, names) in _NAMES.items():
+        for what, names in _NAMES.items():
             if plain in names:
                 found.setdefault(what, (place, unit))
     return found

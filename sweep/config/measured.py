@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import pint
-
 from sweep.faults import either, fault_of, printable, refusal
 from sweep.models.general import meshes, solids
-from sweep.parameters import DENSITY, PARAMETERS, SI, Parameter
-from sweep.variables import in_si
-
-_NUMBER = r"[-+]?(?:\.\d+|\d+(?:\.\d*)?)(?:[eE][-+]?\d+)?"
-_UNIT = r"°|[^\W\d_]+(?:/[^\W\d_]+\^?3?)?"
-_QUANTITY = re.compile(rf"(?P<value>{_NUMBER}) *(?:(?:±|\+/?-) *(?P<error>{_NUMBER}))? *(?P<unit>{_UNIT})")
-_EXAMPLES = {"m": "12.0+-0.1cm", "kg": "30.0+-0.1g", "radian": "2.0+-0.5deg", DENSITY.units: "1.24+-0.02g/cm3"}
-_UNITS: pint.UnitRegistry[float] = pint.UnitRegistry()
+from sweep.parameters import PARAMETERS, Parameter
+from sweep.units import SI, Unit, known, named, quantity
 
 _MILLIMETRE = 1e-3
 _MASS = ("mass", "density")
@@ -75,18 +66,14 @@ def measured(name: str, text: str, parameter: Parameter) -> Measured:
     ConfigError
         if `text` is something else.
     """
-    option = _option(name)
-    unit, found = _unit(parameter), _QUANTITY.fullmatch(text.strip())
-    try:
-        spelled = re.sub(r"\^?3$", "**3", found["unit"]) if found else ""  # as Pint wants cm3
-        factor = float(_UNITS.Quantity(1.0, spelled).to(unit).magnitude)
-    except pint.PintError:
-        found = None
-    if not found:
-        raise fault_of(refusal(text, f"a number with its unit, such as {_EXAMPLES[unit]}"), file=option)
-    value, error = (float(found[part] or 0) * factor for part in ("value", "error"))
+    option, unit = _option(name), parameter.units
+    assert isinstance(unit, Unit)
+    if not (found := quantity(text, unit)):
+        wanted = f"a number with its unit ({either(known(unit))}), such as 12.0+-0.1{known(unit)[1]}"
+        raise fault_of(refusal(text, wanted), file=option)
+    value, error = found
     if not (parameter.allows(value) and 0 <= error < float("inf")):
-        raise fault_of(refusal(text, f"{parameter.allowed}, in {unit}, with an error >= 0"), file=option)
+        raise fault_of(refusal(text, f"{parameter.allowed}, in {unit.si}, with an error >= 0"), file=option)
     return Measured(value, error, f"{option} {text.strip()}")
 
 
@@ -133,8 +120,9 @@ def _body(formula: Callable[[solids.Numbers], solids.Numbers], given: Given) -> 
     values, errors = ({name: getattr(each, part) for name, each in given.items()} for part in ("value", "error"))
     found, spread = formula(values), solids.propagated(formula, values, errors)
     _check_stands(found)
+    units = {name: named(PARAMETERS[name].units, SI) for name in found}
     entries = (
-        f"  {name}: {value + 0.0:.6g}  #{f' ± {spread[name]:.2g}' if spread[name] else ''} {_unit(PARAMETERS[name])}"
+        f"  {name}: {value + 0.0:.6g}  #{f' ± {spread[name]:.2g}' if spread[name] else ''} {units[name]}"
         for name, value in found.items()
     )
     return _BODY.format(units=SI, entries="\n".join(entries), x0=found["a"] / 50, y0=found["b"] / 50)
@@ -142,10 +130,6 @@ def _body(formula: Callable[[solids.Numbers], solids.Numbers], given: Given) -> 
 
 def _said(given: Given) -> str:
     return ", ".join(each.said for each in given.values())
-
-
-def _unit(parameter: Parameter) -> str:
-    return in_si(parameter.units, parameter.long_name)[0]
 
 
 def _option(name: str) -> str:

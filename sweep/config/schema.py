@@ -23,7 +23,8 @@ from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.general.variants import PAPER_LAW
 from sweep.models.origin import Origin
 from sweep.models.user import loading
-from sweep.parameters import PAPER_UNITS, PARAMETERS, SI, Parameter, sections
+from sweep.parameters import PARAMETERS, Parameter, sections
+from sweep.units import PAPER_UNITS, SI
 
 
 def _measures(raw: Any) -> Any:
@@ -253,6 +254,6 @@ for _name, _words in _WORDS.items():
 SETTINGS |= {f"integrator.{name}": field for name, field in Integrator.model_fields.items()}
 """All values of a configuration but the physical parameters, by path; the `description` of each says what it means."""
 
-PATHS: dict[str, str] = {p.path: p.long_name for p in PARAMETERS.values()}
+PATHS: dict[str, str] = {p.path: p.meaning for p in PARAMETERS.values()}
 PATHS |= {path: str(field.description) for path, field in SETTINGS.items()}
 """The path of every value of a configuration, and what it means."""

@@ -15,6 +15,7 @@ from sweep.config.document import is_number, number, plain_data
 from sweep.config.messages import describe, wrong
 from sweep.faults import fault_of, refusal
 from sweep.parameters import Parameter
+from sweep.units import SI, named
 
 _MORE = ", a list of such, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}"
 
@@ -83,7 +84,7 @@ class Values:
 
 def parse_values(parameter: Parameter, raw: Any) -> Values:
     """The value of a parameter from what a configuration says; `wrong` tells what is wrong with it."""
-    if parameter.units == "radian":
+    if named(parameter.units, SI) == "radian":
         raw = _in_radians(raw)
     if isinstance(raw, dict):
         return _parse_distribution(parameter, raw) if raw.keys() & FAMILIES.keys() else _parse_range(parameter, raw)

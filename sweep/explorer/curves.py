@@ -74,7 +74,7 @@ class Curves:
         lowest, highest = (self.energy, self.spin) if "energy" in one else (self.spin, self.energy)
         lowest.xaxis.axis_label, highest.xaxis.axis_label = labels.label(one, "time"), None
         for axis, name, words in (
-            (self.spin.yaxis, "spin", ""), (self.energy.yaxis, "energy", "energy"),
+            (self.spin.yaxis, "spin", ""), (self.energy.yaxis, "energy", "energy per mass"),
         ):  # fmt: skip
             if name in one:
                 axis.axis_label = labels.with_unit(words or labels.words(one, name), labels.unit(one, name))

@@ -7,28 +7,13 @@ from collections.abc import Mapping
 
 import xarray as xr
 
-from sweep.models.general.surfaces import SURFACES
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.results.dataset import STATUS_WORDS, VARIABLES
 from sweep.results.kind import is_of_own_body, parameters
-from sweep.results.probabilities import PROBABILITIES
+from sweep.units import SUPERSCRIPT, is_of_paper, pretty
 from sweep.variables import Variable
 
-_RECORDS: Mapping[str, Parameter | Variable] = {**PARAMETERS, **VARIABLES, **PROBABILITIES}
-
-_WORDS = {
-    **{name: record.words for name, record in _RECORDS.items()},
-    **{index: index for index in ("case", "sample", "trajectory")},
-    "count": "spin reversals, at least",
-    "spin": "spin n",
-    "time": "time t",
-}
-"""What figures call a parameter or a variable."""
-
-# The scale of a dimensionless quantity at the end of its `long_name`, made of g, c and m: ", in 1/sqrt(g c)".
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-_SCALE = re.compile(r", in ((?:1/)?(?:sqrt\([gc/ ]+\)|[gcm](?: [gcm])*))(?=;|$)")
+_RECORDS: Mapping[str, Parameter | Variable] = {**PARAMETERS, **VARIABLES}
 
 
 def symbol(name: str) -> str:
@@ -37,27 +22,20 @@ def symbol(name: str) -> str:
 
 
 def unit(dataset: xr.Dataset, name: str) -> str:
-    """The unit of a variable or coordinate as figures print it, such as √(g/c) or m²/s; empty for a plain number.
-
-    A dimensionless quantity tells its scale at the end of its `long_name`: "…, in sqrt(g/c)".
-    """
+    """The unit of a variable or coordinate as figures print it, such as √(g/c) or m²/s; empty for a plain number."""
     units = str(dataset[name].attrs.get("units", "1"))
-    if units != "1":
-        return _fraction(units)
-    scale = _SCALE.search(_long_name(dataset, name))
-    return scale[1].replace("sqrt", "√") if scale else ""
+    return "" if units == "1" else pretty(units)
 
 
 def words(dataset: xr.Dataset, name: str) -> str:
     """Say what a variable or coordinate is, without its unit."""
-    of_surface = SURFACES[surface].labels if (surface := dataset.attrs.get("surface")) in SURFACES else {}
-    known = "" if is_of_own_body(dataset) and name in PARAMETERS else _WORDS.get(name)
-    return of_surface.get(name) or known or _SCALE.sub("", _long_name(dataset, name)) or name.replace("_", " ")
+    told = dataset[name].attrs.get("long_name") if name in dataset.variables else None
+    return str(told or short(name))
 
 
 def short(name: str) -> str:
-    """A variable of a run in a few words."""
-    return _WORDS.get(name) or name.replace("_", " ")
+    """The same of a variable of a run, or of one whose attributes are lost."""
+    return _RECORDS[name].long_name if name in _RECORDS else name.replace("_", " ")
 
 
 def label(dataset: xr.Dataset, name: str) -> str:
@@ -101,7 +79,7 @@ def number(at: float) -> str:
     digits = digits.replace("-", "−")
     if not power:
         return digits
-    ten = f"10{str(int(power)).translate(_SUPERSCRIPT)}"
+    ten = f"10{str(int(power)).translate(SUPERSCRIPT)}"
     return f"{digits.removesuffix('1')}{ten}" if digits in ("1", "−1") else f"{digits}×{ten}"
 
 
@@ -124,8 +102,8 @@ def measured(dataset: xr.Dataset, name: str, at: float) -> str:
 
 def si_unit(dataset: xr.Dataset, name: str) -> str:
     """The unit after a number, with the space before it; empty in the paper's units, and for a plain number."""
-    known = name in dataset.variables and dataset[name].attrs.get("units", "1") != "1"
-    return f" {unit(dataset, name)}" if known else ""
+    found = unit(dataset, name) if name in dataset.variables else ""
+    return f" {found}" if found and not is_of_paper(found) else ""
 
 
 def constants(dataset: xr.Dataset) -> str:
@@ -147,19 +125,3 @@ def in_maths(words: str) -> str:
     """Words in which n_c1 and n_c1⁺ are set as symbols."""
     signs = {"": "", "⁺": "^+", "⁻": "^-"}
     return re.sub(r"n_(c\d)([⁺⁻]?)", lambda found: rf"n$_{{\mathrm{{{found[1]}}}}}{signs[found[2]]}$", words)
-
-
-def _fraction(units: str) -> str:
-    """A CF unit such as "kg m2 s-1" as a fraction: kg m²/s."""
-    parts = [re.fullmatch(r"([A-Za-z]+)(-?)(\d*)", part) for part in units.replace("radian", "rad").split()]
-    if not all(parts):
-        return units
-    over, under = ([f"{p[1]}{p[3].translate(_SUPERSCRIPT)}" for p in parts if p and p[2] == sign] for sign in ("", "-"))
-    under = [part.removesuffix("¹") for part in under]
-    below = f"({' '.join(under)})" if len(under) > 1 else "".join(under)
-    return f"{' '.join(over) or 1}/{below}" if below else " ".join(over)
-
-
-def _long_name(dataset: xr.Dataset, name: str) -> str:
-    usual = _RECORDS[name].long_name if name in _RECORDS else ""
-    return str(dataset[name].attrs.get("long_name", usual))

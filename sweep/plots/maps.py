@@ -169,7 +169,7 @@ def _title(panels: Panels, name: str, panel: Panel, *, small: bool) -> str:
     """Name what a map shows; a small one beside others leaves the values of its panel to the first of them."""
     words, compared = labels.words(panels.dataset, name), name in panels.compared
     if panels.compared:  # what they have in common stands at the bar
-        words = words.rpartition(", ")[2] if compared else words.partition(", ")[2] or "simulated"
+        words = words.rpartition(", ")[2] if compared else labels.short(name).partition(", ")[2] or "simulated"
         words = (name if compared else words.partition(" (")[0]) if small else words
     elif panel and not labels.flag_words(panels.dataset, name):
         words = ""  # it stands at the bar

@@ -35,14 +35,12 @@ from sweep.results.dataset import VARIABLES
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
+from sweep.units import LENGTH, quantity
 
 _NO_DATE: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
-_LENGTH = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-z]+)")
-"""A number and its unit."""
-
-_NARROWEST, _WIDEST = 50.0, 1000.0
-"""Millimetres of a figure across."""
+_NARROWEST, _WIDEST = 0.05, 1.0
+"""Metres of a figure across."""
 
 _OWN: dict[str | None, Callable[[xr.Dataset], Picture]] = {
     TRAJECTORY: trajectories.draw, CRITICAL: critical.draw, BOUNDARIES: boundaries.draw, FIT: fit.draw,
@@ -210,17 +208,11 @@ def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None, *, histo
 
 def inches(width: str) -> float:
     """A length such as "85mm" in inches; `ValueError` if it is none, or none for a figure."""
-    import pint  # which takes as long to import as matplotlib
-
-    found = _LENGTH.fullmatch(width.strip())
-    try:
-        length = pint.Quantity(float(found[1]), found[2]).m_as("mm") if found else 0.0
-    except pint.PintError:
-        length = 0.0
-    if not _NARROWEST <= length <= _WIDEST:
-        span = f"between {_NARROWEST:g} and {_WIDEST:g} mm"
+    length, error = quantity(width, LENGTH) or (0.0, 0.0)
+    if error or not _NARROWEST <= length <= _WIDEST:
+        span = f"between {_NARROWEST * 1e3:g} and {_WIDEST * 1e3:g} mm"
         raise ValueError(f"width: {width}; give a length {span} with its unit, such as 85mm, 8.5cm or 3.3in")
-    return float(length / 25.4)
+    return length / 0.0254
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -30,8 +30,8 @@ _PANELS: tuple[tuple[str, dict[str, str]], ...] = (
     ("amplitude B of the second mode", {"amplitude_2": "B"}),
     ("acceleration along x", {"v0_rate_1": "dv₀/dt, v₀ = x$_p$ × ω", "slip_rate_1": "dv$_p$/dt, of the slip"}),
     ("acceleration along y", {"v0_rate_2": "dv₀/dt, v₀ = x$_p$ × ω", "slip_rate_2": "dv$_p$/dt, of the slip"}),
-    ("normal force R", {"normal_force": "R"}),
-    ("energy", {"energy": "above rest", "dissipated": "work against friction"}),
+    ("normal force R per mass", {"normal_force": "R"}),
+    ("energy per mass", {"energy": "above rest", "dissipated": "work against friction"}),
 )
 
 _MOST_ENTRIES = 12
@@ -91,8 +91,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     below = [figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first) for k in range(len(panels))]
     for axes, (title, names) in zip(below, panels, strict=True):
         _series(axes, dataset, names)
-        per_mass = " per unit mass" if "per unit mass" in dataset[next(iter(names))].attrs.get("long_name", "") else ""
-        axes.set_title(f"{title}{per_mass}", loc="left", pad=16 if columns == 1 < len(names) else None)
+        axes.set_title(title, loc="left", pad=16 if columns == 1 < len(names) else None)
     for axes in below[:-columns]:
         axes.tick_params(labelbottom=False)
     for axes in (below or [first])[-columns:]:

@@ -18,9 +18,9 @@ from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
-from sweep.parameters import PAPER_UNITS, SI
 from sweep.results.probabilities import PROBABILITIES, probabilities
-from sweep.variables import Variable, in_si, with_unit, without_unit
+from sweep.units import NUMBER, PAPER_UNITS, SPIN, TIME
+from sweep.variables import Variable, attributes
 
 _STATUSES = {
     0: ("not_run", "not run"),
@@ -53,86 +53,91 @@ class Reason(IntEnum):
 REASONS = {int(reason): reason.name.lower() for reason in Reason}
 """The flags of the variables that tell a `Reason`."""
 
-ROWS = {CASE: "row of the table of cases", SAMPLE: "number of the sample"}
+ROWS = {CASE: "Row of the table of cases.", SAMPLE: "Number of the sample."}
 """What the index along the rows of a table says."""
 
 
-def _number(long_name: str, **how: Any) -> Variable:
-    return Variable("float64", "1", long_name, **how)
+def _flag(long_name: str, meanings: Mapping[int, str], description: str = "", **how: Any) -> Variable:
+    return Variable("int8", NUMBER, long_name, description, meanings, **how)
 
 
-def _flag(long_name: str, meanings: Mapping[int, str], **how: Any) -> Variable:
-    return Variable("int8", "1", long_name, meanings, **how)
+def _critical(name: str, side: str, source: str, by: str) -> Variable:
+    where = "Positive spin above" if side == "plus" else "Negative spin below"
+    event = "a tiny rattle grows" if name == "n_c1" else "the spin reverses"
+    symbol = f"{name}{'⁺' if side == 'plus' else '⁻'}"
+    return Variable("float64", SPIN, f"{symbol}, {source}", f"{where} which {event}, by {by}.", per_body=True)
 
 
-def _critical(sign: str, event: str, source: str) -> Variable:
-    where = "positive spin above" if sign == "+" else "negative spin below"
-    return _number(f"{where} which {event}, by {source}, in sqrt(g/c)", per_body=True)
-
-
-_FORMULA, _EIGENVALUES = "the formula of Takano (2011)", "the eigenvalues of the model"
-_SIDES = {"plus": "+", "minus": "-"}
+_SIDES = ("plus", "minus")
 
 VARIABLES: dict[str, Variable] = {
     **{name: spec for kind in measures.MEASURES.values() for name, spec in kind.variables.items()},
-    "status": _flag("how the simulation of the trajectory ended", STATUSES, words="how the trajectory ended"),
-    "inferred": _flag("how reversals and status were found", {0: "simulated", 1: "inferred"},
-                      words="how the count was found"),
-    "spin_final": _number("spin at t_stop, in sqrt(g/c)", of_sound_runs=True, words="final spin n"),
-    "spin_error": _number("estimated error of the spin at t_stop, in sqrt(g/c)", of_sound_runs=True,
-                          words="estimated error of the final spin"),
+    "status": _flag("how the trajectory ended", STATUSES),
+    "inferred": _flag("how the count was found", {0: "simulated", 1: "inferred"},
+                      "How reversals and status were found."),
+    "spin_final": Variable("float64", SPIN, "final spin n", "Spin at t_stop.", of_sound_runs=True),
+    "spin_error": Variable("float64", SPIN, "estimated error of the final spin", of_sound_runs=True),
     "sensitive": _flag(
-        "whether other steps, or starts 1e-10 apart, give another number of reversals", {0: "firm", 1: "sensitive"},
-        of_sound_runs=True, words="does the count depend on steps or the start's 10th digit?",
+        "is the count sensitive?", {0: "firm", 1: "sensitive"},
+        "Whether other steps, or starts 1e-10 apart, give another number of reversals.", of_sound_runs=True,
     ),
     "decided": _flag(
-        "whether the number of reversals is final, and its margins are larger than ten times their errors",
-        {0: "open", 1: "decided"}, of_sound_runs=True, words="is the count certain?",
+        "is the count certain?", {0: "open", 1: "decided"},
+        "Whether the number of reversals is final, with margins larger than ten times their errors.",
+        of_sound_runs=True,
     ),
-    "t_stop": _number("time at which the simulation ended, in sqrt(c/g)", words="time of the end"),
-    "method": _flag("integration method of the trajectory", {each.code: name for name, each in METHODS.items()}),
-    "step": _number("integration step, in sqrt(c/g)"),
+    "t_stop": Variable("float64", TIME, "time of the end", "Time at which the simulation ended."),
+    "method": _flag("integration method", {each.code: name for name, each in METHODS.items()}),
+    "step": Variable("float64", TIME, "integration step"),
     "step_rule": _flag("what set the integration step", STEP_RULES),
-    "reversals_predicted": Variable("int16", "1", "spin reversals predicted by Takano (2011), cases (I) and (II)",
-                                    words="spin reversals, predicted (Takano 2011)"),
-    "t_first_reversal_predicted": _number(
-        "time of the first spin reversal predicted by Garcia and Hubbard (1988), in sqrt(c/g)",
-        words="time of the first reversal, predicted (Garcia and Hubbard 1988)",
+    "reversals_predicted": Variable("int16", NUMBER, "spin reversals, predicted (Takano 2011)",
+                                    "Spin reversals predicted by Takano (2011), cases (I) and (II)."),
+    "t_first_reversal_predicted": Variable(
+        "float64", TIME, "first reversal, predicted (Garcia–Hubbard)",
+        "Time of the first spin reversal predicted by Garcia and Hubbard (1988).",
     ),
     "reversal_time_reason": _flag(
-        "whether there is a predicted time of the first reversal, and why not", reversal_time.REASONS,
-        words="is the first reversal predicted?",
+        "is the first reversal predicted?", reversal_time.REASONS,
+        "Whether there is a predicted time of the first reversal, and why not.",
     ),
-    **{f"n_c1_{side}": _critical(sign, "a tiny rattle grows", _FORMULA) for side, sign in _SIDES.items()},
-    **{f"n_c2_{side}": _critical(sign, "the spin reverses", _FORMULA) for side, sign in _SIDES.items()},
-    **{f"n_c1_{side}_linear": _critical(sign, "a tiny rattle grows", _EIGENVALUES) for side, sign in _SIDES.items()},
-    "form_factor": _number("form factor L(f) of Takano (2011)", per_body=True, words="form factor L(f)"),
     **{
-        f"n_c2_{side}_simulated{suffix}": _critical(sign, "the spin reverses", f"simulation: {words}")
-        for side, sign in _SIDES.items()
-        for suffix, words in (("", "middle of the bracket"), ("_inner", "end nearer zero"), ("_outer", "far end"))
-    },
-    **{
-        f"n_{n}_{side}_reason": _flag(f"whether {source} find n_{n}_{side}, and why not", REASONS, per_body=True)
-        for n, source in (("c1", "eigenvalues"), ("c2", "simulations"))
+        f"{name}_{side}{suffix}": _critical(name, side, source, by)
+        for name, suffix, source, by in (
+            ("n_c1", "", "formula", "the formula of Takano (2011)"),
+            ("n_c2", "", "formula", "the formula of Takano (2011)"),
+            ("n_c1", "_linear", "eigenvalues", "the eigenvalues of the model"),
+            ("n_c2", "_simulated", "simulation", "simulation: the middle of the bracket"),
+            ("n_c2", "_simulated_inner", "simulation, inner", "simulation: the end of the bracket nearer zero"),
+            ("n_c2", "_simulated_outer", "simulation, outer", "simulation: the far end of the bracket"),
+        )
         for side in _SIDES
     },
-    "critical_reason": _flag("first of the four reasons that is not exists", REASONS, per_body=True),
+    "form_factor": Variable("float64", NUMBER, "form factor L(f)", "Form factor L(f) of Takano (2011).", per_body=True),
+    **{
+        f"{name}_{side}_reason": _flag(
+            f"{name}{'⁺' if side == 'plus' else '⁻'}, whether found", REASONS,
+            f"Whether {source} give {name}_{side}, and why not.", per_body=True,
+        )
+        for name, source in (("n_c1", "eigenvalues"), ("n_c2", "simulations"))
+        for side in _SIDES
+    },
+    "critical_reason": _flag("why a critical spin is missing", REASONS,
+                             "First of the four reasons that is not exists.", per_body=True),
 }  # fmt: skip
 
 
 def _again(name: str) -> Variable:
-    return replace(VARIABLES[name], long_name=f"{VARIABLES[name].long_name}; second run, with finer steps")
+    return replace(VARIABLES[name], long_name=f"{VARIABLES[name].long_name}; second run", description="")
 
 
 VERIFIED: dict[str, Variable] = {
-    "verified_cell": Variable("int64", "1", "cell run again: its index in the C order of the axes"),
+    "verified_cell": Variable("int64", NUMBER, "cell run again", "Index of the cell in the C order of the axes."),
     **{
         f"verified_{name}": _again(name)
         for name in ("reversals", "t_last_reversal", "spin_final", "status", "energy_error", "step")
     },
-    "verified_spin_difference": _number("difference in spin between the two runs at t_stop, in sqrt(g/c)"),
-    "verified_count_changed": _flag("whether the two runs count other reversals", {0: "no", 1: "yes"}),
+    "verified_spin_difference": Variable("float64", SPIN, "difference in spin between the two runs"),
+    "verified_count_changed": _flag("do the two runs count other reversals?", {0: "no", 1: "yes"}),
 }
 """The variables over the cells that were run again."""
 
@@ -169,7 +174,7 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
         coordinates[name] = xr.Variable((grid.row,), column, config.described(name))
     if grid.table:
         index = np.arange(grid.shape[-1], dtype="int64")
-        coordinates[grid.row] = xr.Variable((grid.row,), index, {"long_name": ROWS[grid.row]})
+        coordinates[grid.row] = xr.Variable((grid.row,), index, {"long_name": grid.row, "description": ROWS[grid.row]})
     for name, value in grid.constants.items():
         coordinates[name] = xr.Variable((), value, config.described(name))
     of = " of a rattleback" if config.of_rattlebacks else ""
@@ -184,7 +189,7 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
     axes = [str(dim) for dim in dataset["status"].dims if dim != SAMPLE]
     found = probabilities(dataset)
     counts = np.arange(1, found["probability"].shape[-1] + 1)
-    coordinate = xr.Variable(("count",), counts, {"long_name": "number of reversals or more"})
+    coordinate = xr.Variable(("count",), counts, {"long_name": "spin reversals, at least"})
     return dataset.assign_coords(count=coordinate).assign(
         variables(PROBABILITIES, (*axes, "count"), found, config.units)
     )
@@ -252,10 +257,7 @@ def variables(
 
 def described(spec: Variable, system: str = PAPER_UNITS) -> dict[str, Any]:
     """The CF attributes of a variable in a system of units."""
-    units, long_name = spec.units, spec.long_name
-    if system != PAPER_UNITS:
-        units, long_name = in_si(units, long_name) if system == SI else (units, without_unit(long_name))
-    words: dict[str, Any] = with_unit(long_name, units)
+    words: dict[str, Any] = {**attributes(spec, system)}
     if spec.flags:
         words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
         words["flag_meanings"] = " ".join(spec.flags.values())

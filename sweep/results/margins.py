@@ -12,6 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED, TIME_LIMIT
+from sweep.units import NUMBER
 from sweep.variables import Variable
 
 FOUND, OPEN, UNCERTAIN = range(3)
@@ -25,17 +26,21 @@ _NO_DIP = 0.98
 # Points of a curve that are nearer to each other than this, in lengths of the axes, are one.
 _SAME = 1e-9
 
+_PLACE = "Place along the bracket's axis of the simulated cell that reverses"
+
 POINTS = {
-    "level": Variable("int16", "1", "number of spin reversals that begins at the point"),
-    "curve": Variable("int32", "1", "number of the curve to which the point belongs; points are in order along it"),
-    "closed": Variable("int8", "1", "whether the curve is closed", {0: "ends_at_an_edge", 1: "closed"}),
-    "end_fewer": Variable("float64", "1", "place along the bracket's axis of its simulated cell that reverses less"),
-    "end_more": Variable("float64", "1", "place along the bracket's axis of its simulated cell that reverses more"),
-    "reversals_fewer": Variable("int16", "1", "spin reversals of the cell at end_fewer"),
-    "reversals_more": Variable("int16", "1", "spin reversals of the cell at end_more"),
+    "level": Variable("int16", NUMBER, "spin reversals that begin at the point"),
+    "curve": Variable("int32", NUMBER, "number of the curve",
+                      "Number of the curve to which the point belongs; its points are in order along it."),
+    "closed": Variable("int8", NUMBER, "is the curve closed?", "", {0: "ends_at_an_edge", 1: "closed"}),
+    "end_fewer": Variable("float64", NUMBER, "end of the bracket, fewer reversals", f"{_PLACE} less."),
+    "end_more": Variable("float64", NUMBER, "end of the bracket, more reversals", f"{_PLACE} more."),
+    "reversals_fewer": Variable("int16", NUMBER, "spin reversals at end_fewer"),
+    "reversals_more": Variable("int16", NUMBER, "spin reversals at end_more"),
     "outcome": Variable(
-        "int8", "1", "whether the bracket is as narrow as asked; if not, a cell in it failed or met the time limit; "
-        "uncertain if the count of one of its ends is not decided",
+        "int8", NUMBER, "outcome of the search",
+        "Found if the bracket is as narrow as asked; open if a cell in it failed or met the time limit; uncertain if "
+        "the count of one of its ends is not decided.",
         {FOUND: "found", OPEN: "open", UNCERTAIN: "uncertain"},
     ),
 }  # fmt: skip

@@ -7,18 +7,17 @@ import xarray as xr
 
 from sweep.grid import SAMPLE, Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
+from sweep.units import NUMBER
 from sweep.variables import Variable
 
-_END = "end of its interval of 95 %, by Wilson's formula; of samples at Sobol points it is wide enough"
+_END = "end of the 95 % interval of the probability, by Wilson's formula; it is wide enough for Sobol points."
 
 PROBABILITIES = {
-    f"probability{end}": Variable(
-        "float64", "1", f"probability of so many reversals or more{more}", along="count", words=f"probability{words}"
-    )
-    for end, more, words in (
-        ("", "", " of so many spin reversals or more"),
-        ("_low", f": lower {_END}", ", lower end of its 95 % interval"),
-        ("_high", f": upper {_END}", ", upper end of its 95 % interval"),
+    name: Variable("float64", NUMBER, long_name, description, along="count")
+    for name, long_name, description in (
+        ("probability", "probability of so many spin reversals or more", ""),
+        ("probability_low", "probability, lower end of its 95 % interval", f"Lower {_END}"),
+        ("probability_high", "probability, upper end of its 95 % interval", f"Upper {_END}"),
     )
 }
 """The variables over the axes that samples have in common, and over counts from one on."""

@@ -29,6 +29,7 @@ def contents(dataset: xr.Dataset) -> str:
     """The variables, attributes and configuration of a dataset, a line each."""
     variables = [
         f"  {name} ({', '.join(map(str, variable.dims))}): {variable.attrs.get('long_name', '')}"
+        + (f", in {units}" if (units := variable.attrs.get("units")) else "")
         for name, variable in dataset.data_vars.items()
     ]
     attributes = [f"{key}: {dataset.attrs[key]}" for key in sorted(set(dataset.attrs) - {"title", "config"})]

@@ -32,13 +32,14 @@ from sweep.results.provenance import provenance
 from sweep.studies.misfit import UNKNOWNS, Ask, Minimum, Problem, minimise
 from sweep.studies.search import require_certain
 from sweep.studies.together import together
+from sweep.units import ANGLE, SPIN, TIME
 from sweep.variables import Variable
 
-_TIME = Variable("float64", "1", "time since the film began, in sqrt(c/g)")
+_TIME = Variable("float64", TIME, "time t", "Time since the film began.")
 _SEEN = {
-    "spin": Variable("float64", "1", "spin, in sqrt(g/c)"),
-    "gyroscope": Variable("float64", "1", "angular velocity about the sensor's axis, in sqrt(g/c)"),
-    "heading": Variable("float64", "radian", "heading"),
+    "spin": Variable("float64", SPIN, "spin n"),
+    "gyroscope": Variable("float64", SPIN, "angular velocity about the sensor's axis"),
+    "heading": Variable("float64", ANGLE, "heading"),
 }
 
 LEVELS = {68: 1.0, 95: 3.84}

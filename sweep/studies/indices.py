@@ -17,6 +17,7 @@ from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.results.dataset import variables
 from sweep.studies.kept import Task
 from sweep.studies.search import Study, require_simulated
+from sweep.units import NUMBER
 from sweep.variables import Variable
 
 QUANTITIES = ("reversals", "t_first_reversal", "t_last_reversal", "spin_mean")
@@ -26,14 +27,14 @@ _RESAMPLED = 400
 """Resamples of an interval: its ends are then certain to a tenth of its width."""
 
 _ORDERS = {
-    "first_order": "first-order index of Sobol: share of the variance that goes where the parameter alone is known",
-    "total_order": "total index of Sobol: share of the variance that stays where all parameters but this are known",
+    "first_order": ("first-order Sobol index", "Share of the variance that goes where the parameter alone is known."),
+    "total_order": ("total Sobol index", "Share of the variance that stays where all parameters but this are known."),
 }
 
 VARIABLES = {
-    f"{order}{end}": Variable("float64", "1", f"{words}{where}")
-    for order, words in _ORDERS.items()
-    for end, where in (("", ""), ("_low", "; lower end of its interval of 95 %"), ("_high", "; upper end"))
+    f"{order}{end}": Variable("float64", NUMBER, f"{long_name}{where}", description)
+    for order, (long_name, description) in _ORDERS.items()
+    for end, where in (("", ""), ("_low", ", lower end of 95 %"), ("_high", ", upper end of 95 %"))
 }
 """The variables of the dataset, over quantities and parameters."""
 

@@ -19,8 +19,8 @@ from sweep.config.film import Film, read
 from sweep.engine.reporter import Reporter
 from sweep.faults import brief, fault_of, suggestion
 from sweep.models.general.laws import LAWS, Law
-from sweep.parameters import SI
 from sweep.studies.fit import fit
+from sweep.units import SI
 
 # Differences of the criterion up to which two laws cannot be told apart, and from which on one is ruled out.  A
 # parameter that is of no use makes a difference of two.

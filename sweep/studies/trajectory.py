@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from sweep import units as u
 from sweep.config import Config, ConfigError, ConfigLike, load_config
 from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.schema import FOREVER
@@ -32,13 +33,13 @@ from sweep.kernels.measures.measurement import RIPPLE
 from sweep.kernels.methods import METHODS, PLAIN
 from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
-from sweep.models.model import OWN, Columns, Model, take
+from sweep.models.model import Columns, Model, take
 from sweep.models.theory.linear import fastest_motion
 from sweep.models.user.blame import blamed
-from sweep.parameters import PAPER_UNITS, SI
 from sweep.results import dataset
 from sweep.results.provenance import provenance
 from sweep.studies.search import require_simulated
+from sweep.units import Unit, named
 from sweep.variables import Variable
 
 SAMPLES_A_RADIAN = 3
@@ -62,35 +63,38 @@ _PASSES, _SAMPLE_SECONDS = 2, 2e-6
 MAX_TRAJECTORIES = 1000
 """Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
 
-_TIME = ("1", "time, in sqrt(c/g)")
-
-_TIMES = {PAPER_UNITS: "sqrt(c/g)", SI: "s", OWN: "of time"}
-"""The unit in which progress counts time, by the `units` of a configuration."""
-
-# name: units, long_name
-SERIES: dict[str, tuple[str, str]] = {
-    "spin": ("1", "spin about the upward normal, in sqrt(g/c)"),
-    "ripple_free_spin": ("1", "spin without the ripple of the rattle, in sqrt(g/c)"),
-    "contact_x": ("1", "contact point along x, in c"),
-    "contact_y": ("1", "contact point along y, in c"),
-    "heading": ("radian", "angle by which the body has turned about the upward normal"),
-    "roll_angle": ("radian", "angle about the axis of a"),
-    "pitch_angle": ("radian", "angle about the axis of b, after roll"),
-    "table_x": ("1", "contact point on the table along x, where the heading is zero, in c"),
-    "table_y": ("1", "contact point on the table along y, to the left of x, in c"),
-    "slip_1": ("1", "slip velocity v_p along the body's x, in sqrt(g c)"),
-    "slip_2": ("1", "slip velocity v_p along the body's y, in sqrt(g c)"),
-    "slip_rate_1": ("1", "time derivative of the slip velocity along x, in g"),
-    "slip_rate_2": ("1", "time derivative of the slip velocity along y, in g"),
-    "v0_rate_1": ("1", "time derivative of v_0 = x_p × omega along x, in g"),
-    "v0_rate_2": ("1", "time derivative of v_0 = x_p × omega along y, in g"),
-    "normal_force": ("1", "normal force R, in m g"),
-    "amplitude_1": ("1", "averaged amplitude A of the first mode"),
-    "amplitude_2": ("1", "averaged amplitude B of the second mode"),
-    "mode_1": ("1", "normal coordinate X"),
-    "mode_2": ("1", "normal coordinate Y"),
-    "energy": ("1", "energy above rest, in m g c"),
-    "dissipated": ("1", "work done against friction, in m g c"),
+# name: units, long_name, and perhaps a description
+SERIES: dict[str, tuple[Unit, str] | tuple[Unit, str, str]] = {
+    "spin": (u.SPIN, "spin n", "Spin about the upward normal."),
+    "ripple_free_spin": (u.SPIN, "spin n without ripple", "Spin without the ripple of the rattle."),
+    "contact_x": (u.LENGTH, "contact point along x"),
+    "contact_y": (u.LENGTH, "contact point along y"),
+    "heading": (u.ANGLE, "heading", "Angle by which the body has turned about the upward normal."),
+    "roll_angle": (u.ANGLE, "angle about the axis of a"),
+    "pitch_angle": (u.ANGLE, "angle about the axis of b", "Angle about the axis of b, after roll."),
+    "table_x": (
+        u.LENGTH,
+        "contact point on the table along x",
+        "Contact point along x, the direction of heading zero.",
+    ),
+    "table_y": (
+        u.LENGTH,
+        "contact point on the table along y",
+        "Contact point along y, to the left of x.",
+    ),
+    "slip_1": (u.SPEED, "slip velocity along x", "Slip velocity v_p along the body's x."),
+    "slip_2": (u.SPEED, "slip velocity along y", "Slip velocity v_p along the body's y."),
+    "slip_rate_1": (u.ACCELERATION, "acceleration of the slip along x", "Time derivative of v_p along x."),
+    "slip_rate_2": (u.ACCELERATION, "acceleration of the slip along y", "Time derivative of v_p along y."),
+    "v0_rate_1": (u.ACCELERATION, "acceleration of v_0 along x", "Time derivative of v_0 = x_p × omega along x."),
+    "v0_rate_2": (u.ACCELERATION, "acceleration of v_0 along y", "Time derivative of v_0 = x_p × omega along y."),
+    "normal_force": (u.ACCELERATION, "normal force R per mass"),
+    "amplitude_1": (u.NUMBER, "amplitude A of the first mode", "Averaged amplitude of the first mode."),
+    "amplitude_2": (u.NUMBER, "amplitude B of the second mode", "Averaged amplitude of the second mode."),
+    "mode_1": (u.NUMBER, "normal coordinate X"),
+    "mode_2": (u.NUMBER, "normal coordinate Y"),
+    "energy": (u.ENERGY_PER_MASS, "energy above rest per mass"),
+    "dissipated": (u.ENERGY_PER_MASS, "work against friction per mass"),
 }
 
 _VECTORS = (("contact_x", "contact_y"), ("slip_1", "slip_2"))
@@ -144,7 +148,8 @@ def trajectory(
     if not samples or not load_config(config).distributions.keys() - at.keys():
         return found
     numbers = np.arange(found.sizes["trajectory"]) % samples
-    return found.assign_coords({SAMPLE: ("trajectory", numbers, {"long_name": dataset.ROWS[SAMPLE]})})
+    told = {"long_name": SAMPLE, "description": dataset.ROWS[SAMPLE]}
+    return found.assign_coords({SAMPLE: ("trajectory", numbers, told)})
 
 
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
@@ -158,7 +163,8 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
         table = kernel.table(images)
         covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
         seconds = time.perf_counter() - began
-        reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, seconds, _TIMES[chosen.units]))
+        unit = named(u.TIME, chosen.units) or "of time"
+        reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, seconds, unit))
 
     marks, steps = _run(kernel, images, settles, report), part.step.copy()
     work = Work(after_chunk=report)
@@ -173,15 +179,16 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     (found,) = job.by_grid(results(job, errors, work))
     labelled = dataset.label(chosen, grid, found, provenance(chosen, time.perf_counter() - began, grid.size))
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
-    index = ("trajectory", np.arange(grid.size), {"units": "1", "long_name": "number of the trajectory"})
+    index = ("trajectory", np.arange(grid.size), {"long_name": "trajectory"})
     return flat.assign_coords(trajectory=index).assign(_described(times, series, kernel.model, chosen.units))
 
 
 def _described(times: Array, series: dict[str, Array], model: Model, system: str) -> xr.Dataset:
     """The series over (trajectory, time), with their attributes, in the order of `SERIES`."""
-    own = {name: (units, words) for name, units, words in model.series}
-    words = {name: dataset.described(Variable("float64", *each), system) for name, each in {**SERIES, **own}.items()}
-    found: dict[str, Any] = {"time": ("time", times, dataset.described(Variable("float64", *_TIME), system))}
+    own = {name: each for name, *each in model.series}
+    specs = {"time": (u.TIME, "time t"), **SERIES, **own}
+    words = {name: dataset.described(Variable("float64", *spec), system) for name, spec in specs.items()}
+    found: dict[str, Any] = {"time": ("time", times, words["time"])}
     found |= {name: (("trajectory", "time"), series[name], words[name]) for name in words if name in series}
     return xr.Dataset(found)
 

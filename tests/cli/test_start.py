@@ -11,7 +11,7 @@ import pytest
 from support import ROOT, SMALL, Write
 from support.processes import python
 
-HEAVY = {"numba", "llvmlite", "xarray", "pandas", "netCDF4", "dask", "distributed", "matplotlib", "scipy", "pint"}
+HEAVY = {"numba", "llvmlite", "xarray", "pandas", "netCDF4", "dask", "distributed", "matplotlib", "scipy"}
 """Each takes from a tenth of a second to a whole one."""
 
 HELP = [["--help"], ["--version"], ["run", "--help"], ["body", "--help"], ["run", "--colour"], ["run"], ["colour"]]

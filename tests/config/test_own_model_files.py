@@ -97,6 +97,8 @@ BROKEN = {
     "law": after(FADING, "resistance,\n", "3,\n", "'int' object is not callable"),
     "law without linear_to": (re.sub("        linear_to=.*\n", "", FADING), line_of(FADING, "@inline"),
                               "the resistance depends on the slip velocity; say by linear_to"),
+    "a law's unit": after(FADING, 'SPEED, "slip velocity that halves friction"', '"1", "slip velocity, in sqrt(g c)"',
+                          "its unit stands in long_name"),
     "law's section": after(FADING, '"fading", "friction"', '"fading", "body"', "give it the section 'friction'"),
 }  # fmt: skip
 

@@ -27,7 +27,7 @@ def test_a_real_body(read: Read) -> None:
     columns = config.grid.columns()
     assert columns["roll"] == pytest.approx(np.pi / 360)
     assert config.integrator.method == "dopri5"
-    assert config.described("mu") == {"long_name": "coefficient of friction"}
+    assert config.described("mu") == {"long_name": "friction μ", "description": "Coefficient of friction."}
     assert config.described("speed")["units"] == "m s-1"
     assert config.described("Ixy")["units"] == "kg m2"
 
@@ -36,8 +36,9 @@ def test_what_the_numbers_of_a_paraboloid_mean(read: Read) -> None:
     config = read(BOWL)
     assert config.equations.name == "slip+coulomb-tanh+sigma+paraboloid"
     assert config.described("a") == {
-        "long_name": "coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)"
-    }  # fmt: skip
+        "long_name": "coefficient a of the paraboloid",
+        "description": "Coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2).",
+    }
     assert config.described("c")["units"] == config.described("offset")["units"] == "m"
     # A paraboloid has no outline: every contact point lies on it.
     text = "body: {surface: paraboloid, a: 0.1, b: 0.2, Ixx: 1, Iyy: 1, Izz: 1}\nfriction: {mu: 1}\nstart: {x0: 30}"

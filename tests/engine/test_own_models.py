@@ -54,9 +54,9 @@ def test_the_pendulum_swings_as_scipy_says(few: xr.Dataset, folder: Path) -> Non
 def test_its_dataset_tells_the_file_its_hash_and_its_parameters(few: xr.Dataset, folder: Path) -> None:
     assert few.attrs["model_place"] == str(folder / "pendulum.py")
     assert few.attrs["model_sha256"] == load_config(folder / "pendulum.yaml").origin.digest
-    assert few["torque"].attrs == {"long_name": "torque of the drive, in m g length"}
+    assert few["torque"].attrs == {"long_name": "torque of the drive", "units": "m g length"}
     assert not [name for name in few.data_vars if name.startswith("n_c") or name in ("form_factor", "energy_error")]
-    assert "g/c" not in " ".join(str(v.attrs["long_name"]) for v in few.data_vars.values())
+    assert not any("units" in v.attrs for v in few.data_vars.values())
     assert few.attrs["title"] == "pendulum: reversals (pendulum.py model)"
 
 
@@ -66,12 +66,12 @@ def test_pictures_and_summaries_take_its_words(folder: Path) -> None:
         PENDULUM.replace("damping", "mu").replace("drive", "friction"), encoding="utf-8"
     )
     one = sweep.trajectory({"model": str(folder / "pendulum.py"), "integrator": {"t_end": 5}}, torque=[1.0, 1.2])
-    assert labels.words(one, "mu") == "mu, in sqrt(g/length)"
+    assert labels.label(one, "mu") == "mu (√(g/length))"
     assert "  mu = 0.5, torque = 1.2, angle = 1: time_limit at t = 5" in describe(one)
     assert trajectories.draw(one).axes[0].get_lines()
     law = sweep.predict(folder / "fading.yaml")
     assert law["fading"].attrs == {"long_name": "slip velocity that halves friction", "units": "m s-1"}
-    assert law["mu"].attrs == {"long_name": "coefficient of friction"}
+    assert law["mu"].attrs == {"long_name": "friction μ", "description": "Coefficient of friction."}
     assert labels.words(law, "b") == "short semi-axis b"
 
 

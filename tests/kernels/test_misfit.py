@@ -60,7 +60,7 @@ def test_it_is_that_of_the_trajectories(write: Write, method: str) -> None:
     film(write, times)
     found = sweep.run(write(TEXT), mu=60.0, n0=0.05, step="auto", method=method)
     assert found.misfit.item() == pytest.approx(misfit(spins(times), times), rel=1e-8)
-    assert found.misfit.attrs["long_name"].startswith("sum of squares of (spin - film) / error")
+    assert found.misfit.attrs["description"].startswith("Sum of squares of (spin - film) / error")
 
 
 def test_all_other_numbers_are_those_of_a_run_without(config: Path) -> None:

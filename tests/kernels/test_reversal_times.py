@@ -54,7 +54,7 @@ def test_the_dataset_has_a_dimension_for_them(found: xr.Dataset, config: Path) -
     times = found.reversal_times
     assert times.dims == ("mu", "reversal")
     assert list(times.reversal) == [1, 2, 3]
-    assert times.attrs == {"long_name": "time of each spin reversal, in sqrt(c/g)"}
+    assert times.attrs == {"long_name": "time of each spin reversal", "units": "sqrt(c/g)"}
     xr.testing.assert_identical(times, xr.load_dataset(config.with_suffix(".nc")).reversal_times)
 
 

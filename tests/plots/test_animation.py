@@ -66,7 +66,7 @@ def test_a_clip_lasts_as_asked_and_moves(tmp_path: Path) -> None:
 def test_all_that_is_said_of_a_real_body_can_be_read(tmp_path: Path) -> None:
     inertia = dict.fromkeys(("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"), 1.23456e-5)
     given = turning(**inertia, mass=0.0123456, gravity=9.80665, mu=0.123456, sigma=1.23456e-6)
-    given["spin"].attrs["units"] = "radian s-1"
+    given["spin"].attrs = {"long_name": "spin n", "units": "radian s-1"}
     clip: Any = animation.animate(given, tmp_path / "clip.gif", begin=2, end=4, speed=10)
     words, title = (text.get_window_extent() for text in (clip._fig._suptitle, clip._fig.axes[1].title))
     assert 0 <= words.x0 < words.x1 <= clip._fig.bbox.x1

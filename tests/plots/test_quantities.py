@@ -53,7 +53,7 @@ def titles(figure: Any) -> list[str]:
 
 
 COUNTS = ["simulated", "predicted (Takano 2011)", "simulated − predicted"]
-TIMES = ["simulated", "predicted (Garcia and Hubbard 1988)", "simulated / predicted"]
+TIMES = ["simulated", "predicted (Garcia–Hubbard)", "simulated / predicted"]
 SHOWN = {
     "": ("reversals", COUNTS),
     "reversals first_reversal cycles lyapunov": ("reversals", COUNTS),

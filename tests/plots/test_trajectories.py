@@ -31,8 +31,8 @@ def made(mu: list[float], **given: Any) -> xr.Dataset:
     each |= {name: ("trajectory", v) for name, v in {"mu": bodies, **of_bodies}.items()}
     dataset = xr.Dataset({**values, **each, "reversals": ("trajectory", np.full(len(mu), 3))}, {"time": time})
     dataset["status"] = "trajectory", np.full(len(mu), SETTLED)
-    dataset["time"].attrs = {"long_name": "time, in sqrt(c/g)", "units": "1"}
-    dataset["spin"].attrs = {"long_name": "spin about the upward normal, in sqrt(g/c)", "units": "1"}
+    dataset["time"].attrs = {"long_name": "time t", "units": "sqrt(c/g)"}
+    dataset["spin"].attrs = {"long_name": "spin n", "units": "sqrt(g/c)"}
     return dataset
 
 
@@ -72,13 +72,13 @@ def test_axes_have_plain_names() -> None:
 def test_a_body_in_si_has_its_units_everywhere() -> None:
     dataset = made([60, 60], a=0.2, n0=[-1.0, 2.0])
     for name, units in (("a", "m"), ("n0", "radian s-1"), ("spin", "radian s-1"), ("energy", "m2 s-2")):
-        dataset[name].attrs = {"units": units, "long_name": f"{name} per unit mass" if name == "energy" else name}
+        dataset[name].attrs = {"units": units, "long_name": name}
     dataset["reversals"][:] = [1, 2]
     figure = picture.plot(dataset)
     assert constants(figure).startswith("a = 0.2 m,")
     assert entries(figure)[:2] == ["n₀ = −1 rad/s: 1 reversal", "n₀ = 2 rad/s: 2 reversals"]
     assert figure.axes[0].get_ylabel() == "spin n (rad/s)"
-    assert (figure.axes[-1].get_title("left"), figure.axes[-1].get_ylabel()) == ("energy per unit mass", "m²/s²")
+    assert (figure.axes[-1].get_title("left"), figure.axes[-1].get_ylabel()) == ("energy per mass", "m²/s²")
 
 
 def test_critical_spins_have_their_unit_and_sources() -> None:

@@ -15,6 +15,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import SPIN, Array
+from sweep.units import NUMBER, TIME
 
 
 class Cycles(Measurement):
@@ -25,10 +26,12 @@ class Cycles(Measurement):
     quantities = ("cycle_newest", "cycle_before", "cycle_first", "cycle_sum", "cycle_squares")
 
     variables = {
-        "cycle_mean": measured("float64", "mean time from a spin reversal to the second after it, in sqrt(c/g)"),
+        "cycle_mean": measured(
+            "float64", TIME, "mean time of a cycle", "Mean time from a spin reversal to the second after it."
+        ),
         "cycle_variation": measured(
-            "float64", "standard deviation of the times from a reversal to the second after it, by their mean",
-            words="variation of the cycles",
+            "float64", NUMBER, "variation of the cycles",
+            "Standard deviation of the times from a reversal to the second after it, divided by their mean.",
         ),
     }  # fmt: skip
 

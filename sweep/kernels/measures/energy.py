@@ -13,6 +13,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, Layout, Table
 from sweep.kernels.measures.measurement import WORK, Measurement, Stretch, measured
 from sweep.models.model import ENERGY, Array
+from sweep.units import NUMBER
 
 
 class EnergyError(Measurement):
@@ -25,12 +26,11 @@ class EnergyError(Measurement):
 
     variables = {
         "energy_error": measured(
-            "float64",
-            f"largest violation of the energy balance, looked at every {BLOCK} steps, "
-            "relative to the start energy above rest",
-            words="largest error of the energy, relative",
+            "float64", NUMBER, "largest error of the energy, relative",
+            f"Largest violation of the energy balance, checked every {BLOCK} steps, relative to the start energy above "
+            "rest.",
         )
-    }
+    }  # fmt: skip
 
     def make_step(self, layout: Layout, at_reversal):
         WORK = layout.at("work")

@@ -10,6 +10,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import SPIN, Array, Columns, Model
+from sweep.units import TIME
 
 
 class FirstReversal(Measurement):
@@ -19,11 +20,7 @@ class FirstReversal(Measurement):
     needs = ("reversals",)
     quantities = ("first_reversal",)
 
-    variables = {
-        "t_first_reversal": measured(
-            "float64", "time of the first spin reversal, in sqrt(c/g)", words="time of the first reversal"
-        )
-    }
+    variables = {"t_first_reversal": measured("float64", TIME, "time of the first reversal")}
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {"first_reversal": np.nan}

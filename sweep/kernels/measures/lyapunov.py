@@ -23,6 +23,7 @@ from sweep.kernels.layout import BLOCK, LANES, Layout, Table
 from sweep.kernels.measures.measurement import TANGENT, Measurement, measured
 from sweep.kernels.tangent import GROWTH
 from sweep.models.model import SPIN, Array, Columns, Model
+from sweep.units import RATE
 
 BINS = 32
 """Even; the exponent is the mean over 8 to 16 of them."""
@@ -43,10 +44,10 @@ class Lyapunov(Measurement):
 
     variables = {
         "lyapunov": measured(
-            "float64", "largest Lyapunov exponent over the later half of the trajectory, in 1/sqrt(c/g)",
-            words="largest Lyapunov exponent",
+            "float64", RATE, "largest Lyapunov exponent",
+            "Largest Lyapunov exponent over the later half of the trajectory.",
         ),
-        "lyapunov_error": measured("float64", "standard error of the largest Lyapunov exponent, in 1/sqrt(c/g)"),
+        "lyapunov_error": measured("float64", RATE, "standard error of the Lyapunov exponent"),
     }  # fmt: skip
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:

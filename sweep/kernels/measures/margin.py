@@ -21,6 +21,7 @@ from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import SETTLED
 from sweep.models.model import COUNT, Array
+from sweep.units import SPIN
 
 EXTREMES = ("overshoot", "nearest_approach")
 """The quantities that hold the margins, as far as the trajectory has come."""
@@ -41,18 +42,16 @@ class Margin(Measurement):
 
     variables = {
         "margin_more": measured(
-            "float64",
-            "smallest averaged spin after the largest since the last reversal: zero where one more begins, "
-            "missing where the count is not final, in sqrt(g/c)",
-            words="margin to one reversal more",
+            "float64", SPIN, "margin to one reversal more",
+            "Distance, in spin, to one more reversal: the smallest averaged spin after the largest since the last "
+            "reversal.  It is missing where the count is not final.",
         ),
         "margin_fewer": measured(
-            "float64",
-            "largest averaged spin since the last reversal: zero where this reversal begins, missing without one, "
-            "in sqrt(g/c)",
-            words="margin to one reversal fewer",
+            "float64", SPIN, "margin to one reversal fewer",
+            "Distance, in spin, to one reversal fewer: the largest averaged spin since the last reversal.  It is "
+            "missing without a reversal.",
         ),
-    }
+    }  # fmt: skip
 
     def make_look(self, layout: Layout):
         OVERSHOOT, NEAREST, _, COUNTED, TIME, SIZE, TIME_BEFORE, SIZE_BEFORE = map(layout.at, self.quantities)

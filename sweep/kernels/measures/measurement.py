@@ -36,17 +36,19 @@ from typing import ClassVar, NamedTuple
 
 from sweep.kernels.layout import Layout, Table
 from sweep.models.model import Array, Columns, Model
+from sweep.units import Unit
 from sweep.variables import Variable
 
 
-def measured(dtype: str, long_name: str, flag: str = "", along: str | None = None, words: str = "") -> Variable:
+def measured(
+    dtype: str, units: Unit, long_name: str, description: str = "", *, flag: str = "", along: str | None = None
+) -> Variable:
     """Describe a variable that a measurement adds to the dataset: it is undefined for a trajectory that failed.
 
     `flag` names the value 1 of a variable that marks some cells; the value 0 is called "firm".
-    `words` are what figures call it.
     """
     flags = {0: "firm", 1: flag} if flag else None
-    return Variable(dtype, "1", long_name, flags, along=along, words=words, of_sound_runs=True)
+    return Variable(dtype, units, long_name, description, flags, along=along, of_sound_runs=True)
 
 
 WORK, RIPPLE, TANGENT = "work", "ripple", "tangent"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import SPIN
+from sweep.units import NUMBER
 
 
 @dataclass(frozen=True)
@@ -16,4 +17,9 @@ class Misfit(Measurement):
     name = spec = "misfit"
     summary = "sum of squares of (spin - film) / error over the instants of a film: {misfit: film.csv}"
     asks = SPIN
-    variables = {"misfit": measured("float64", "sum of squares of (spin - film) / error over the instants of the film")}
+    variables = {
+        "misfit": measured(
+            "float64", NUMBER, "misfit of the film",
+            "Sum of squares of (spin - film) / error over the instants of the film.",
+        )
+    }  # fmt: skip

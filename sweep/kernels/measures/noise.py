@@ -23,6 +23,7 @@ from sweep.models.ladder import slip
 from sweep.models.model import MODES, Array, Columns, Model, stack
 from sweep.models.theory import linear
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
+from sweep.units import NUMBER
 
 # Ratio of amplitudes below which a mode counts as round-off of the other.
 DEPTH = 1e-14
@@ -50,12 +51,11 @@ class NoiseLimited(Measurement):
 
     variables = {
         "noise_limited": measured(
-            "int8",
-            "whether a mode of the rattle fell under the round-off of the other before it grew",
+            "int8", NUMBER, "are late times limited by round-off?",
+            "Whether a mode of the rattle fell under the round-off of the other before it grew.",
             flag="noise_limited",
-            words="are late times limited by round-off?",
         )
-    }
+    }  # fmt: skip
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         shares = _shares(columns)

@@ -8,6 +8,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.models.model import COUNT, Array, Columns, Model
+from sweep.units import NUMBER
 
 
 class RawReversals(Measurement):
@@ -16,7 +17,7 @@ class RawReversals(Measurement):
     asks = COUNT
     quantities = ("raw_reversals", "earlier_spin")
 
-    variables = {"raw_reversals": measured("int16", "sign changes of the spin, ripple included")}
+    variables = {"raw_reversals": measured("int16", NUMBER, "sign changes of the spin, with ripple")}
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         spin, _, _ = model.energy(model.start(columns), model.constants.of(columns))

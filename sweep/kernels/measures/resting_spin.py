@@ -22,6 +22,7 @@ from sweep.models.ladder import slip
 from sweep.models.model import MODES, Array, stack
 from sweep.models.stiff.final_spin import Ending, ending
 from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum
+from sweep.units import SPIN
 
 _NEEDED = {*constants_of(slip.MODEL)}
 
@@ -37,10 +38,10 @@ class RestingSpin(Measurement):
 
     variables = {
         "spin_rest": measured(
-            "float64",
-            "spin when the rattle of a settled trajectory has decayed, in sqrt(g/c); missing without two rocking modes",
+            "float64", SPIN, "spin after the rattle has decayed",
+            "Spin of a settled trajectory when its rattle has decayed; missing without two rocking modes.",
         )
-    }
+    }  # fmt: skip
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
         return {"spin_rest": endings(table, table["status"] == SETTLED).spin}

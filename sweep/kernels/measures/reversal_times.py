@@ -15,6 +15,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import SPIN, Array, Columns, Model
+from sweep.units import TIME
 
 LATEST = ("newest_reversal", "second_newest_reversal", "third_newest_reversal")
 """Of more than three reversals between two looks, which are windows apart, the earlier ones have no time."""
@@ -26,7 +27,7 @@ class ReversalTimes(Measurement):
     summary = "times of the first K reversals: {reversal_times: K}, by default K = 10"
     asks = SPIN
     needs = ("reversals",)
-    variables = {"reversal_times": measured("float64", "time of each spin reversal, in sqrt(c/g)", along="reversal")}
+    variables = {"reversal_times": measured("float64", TIME, "time of each spin reversal", along="reversal")}
     bounds = (1, 1000)
     count: int = 10
     """K, the number of reversals whose times are kept."""

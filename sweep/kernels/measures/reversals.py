@@ -18,6 +18,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import RIPPLE, Measurement, Stretch, measured
 from sweep.models.model import COUNT, Array, Columns, Model
+from sweep.units import NUMBER, SPIN, TIME
 
 
 class Reversals(Measurement):
@@ -32,17 +33,15 @@ class Reversals(Measurement):
     )  # fmt: skip
 
     variables = {
-        "reversals": measured("int16", "spin reversals of the simulated trajectory", words="spin reversals, simulated"),
-        "t_last_reversal": measured(
-            "float64", "time of the last spin reversal, in sqrt(c/g)", words="time of the last reversal"
-        ),
+        "reversals": measured("int16", NUMBER, "spin reversals, simulated"),
+        "t_last_reversal": measured("float64", TIME, "time of the last reversal"),
         "spin_mean": measured(
-            "float64", "ripple-free spin averaged over the last full window before t_stop, in sqrt(g/c)",
-            words="final spin n, without ripple",
+            "float64", SPIN, "final spin n, without ripple",
+            "Ripple-free spin averaged over the last full window before t_stop.",
         ),
         "window_dependent": measured(
-            "int8", "whether windows that begin half a period later give another number of reversals",
-            flag="window_dependent", words="does the count depend on the windows?",
+            "int8", NUMBER, "does the count depend on the windows?",
+            "Whether windows that begin half a period later give another number of reversals.", flag="window_dependent",
         ),
     }  # fmt: skip
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import COUNT
+from sweep.units import NUMBER
 
 SHORTER = 0.8
 """Ratio of the steps of further runs to those of the first, so that a count that depends on the step shows too."""
@@ -25,8 +26,8 @@ class Sensitivity(Measurement):
     asks = COUNT
     needs = ("reversals",)
     variables = {
-        "reversals_low": measured("int16", "fewest spin reversals from starts 1e-10 apart"),
-        "reversals_high": measured("int16", "most spin reversals from starts 1e-10 apart"),
+        "reversals_low": measured("int16", NUMBER, "fewest spin reversals from starts 1e-10 apart"),
+        "reversals_high": measured("int16", NUMBER, "most spin reversals from starts 1e-10 apart"),
     }  # fmt: skip
     bounds = (1, 100)
     count: int = 1

@@ -25,6 +25,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.model import Array, Columns
+from sweep.units import NUMBER
 
 
 @dataclass(frozen=True)
@@ -61,10 +62,8 @@ class Surface:
     """What holds of x and y within it, in words."""
     required: frozenset[str] = frozenset()
     """Parameters that have to be given, because their defaults in `sweep.parameters` are of an ellipsoid."""
-    meanings: Mapping[str, str] = field(default_factory=dict, hash=False)
-    """What parameters mean here, as a `long_name` of `sweep.parameters`, where that is of an ellipsoid."""
-    labels: Mapping[str, str] = field(default_factory=dict, hash=False)
-    """What these are called in figures."""
+    meanings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
+    """Fields of a `Parameter` that differ from those in `sweep.parameters`, which are of an ellipsoid."""
 
 
 def offset(columns: Columns) -> Array:
@@ -178,15 +177,19 @@ PARABOLOID = Surface(
     bounds="offset > c - c/(2 a) and offset > c - c/(2 b)",
     required=frozenset({"a", "b"}),
     meanings={
-        "a": "coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
-        "b": "coefficient b of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2)",
-        "c": "height of the paraboloid's origin above its lowest point, the unit of length",
-        "offset": "depth of the centre of mass below the paraboloid's origin, in c",
-    },
-    labels={
-        "a": "coefficient a of the paraboloid",
-        "b": "coefficient b of the paraboloid",
-        "c": "height c of the paraboloid's origin over the table",
+        **{
+            each: {
+                "units": NUMBER,
+                "long_name": f"coefficient {each} of the paraboloid",
+                "description": f"Coefficient {each} of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2).",
+            }
+            for each in ("a", "b")
+        },
+        "c": {
+            "long_name": "height c of the paraboloid's origin",
+            "description": "Height of the paraboloid's origin above its lowest point.",
+        },
+        "offset": {"description": "Depth of the centre of mass below the paraboloid's origin."},
     },
 )
 

@@ -22,7 +22,8 @@ from sweep.models.general.slip import slipping
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES, Surface
 from sweep.models.model import Model
 from sweep.models.origin import Origin
-from sweep.parameters import PAPER_PARAMETERS, PAPER_UNITS, PARAMETERS, SI, Parameter
+from sweep.parameters import PAPER_PARAMETERS, PARAMETERS, SI_ALONE, Parameter
+from sweep.units import PAPER_UNITS, SI
 
 BASES = ("slip", "noslip")
 
@@ -108,7 +109,7 @@ class Physics:
         """The variant of `slip` or `noslip` for it, whose parameters are those that follow from what is named."""
         homogeneous = self.surface.homogeneous and not self.names & {*INERTIA}
         moments = ("delta",) if homogeneous else INERTIA
-        system = ("mass", "gravity") if self.units == SI else ()
+        system = SI_ALONE if self.units == SI else ()
         by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
         start = by_angles if self.names & {*starts.ANGLES, *starts.SLIP} else starts.POINT
         couples = tuple(couple for couple in COUPLES.values() if self.names & {*couple.parameters})
@@ -127,7 +128,7 @@ class Physics:
             ways = f"either {', '.join(starts.POINT)} or angles, omega1 … omega3 and slip"
             found |= dict.fromkeys(starts.POINT, f"cannot be combined with {_some(angles)}; give {ways}")
         if self.units == PAPER_UNITS:
-            found |= dict.fromkeys(("mass", "gravity"), "is 1 in the paper's units; leave it out, or set units: SI")
+            found |= dict.fromkeys(SI_ALONE, "is 1 in the paper's units; leave it out, or set units: SI")
         known = {*self.law.parameters, "mu"}  # one file with mu serves every law
         takes = ", ".join((*self.law.parameters, *(name for couple in COUPLES.values() for name in couple.parameters)))
         # In the order of the laws: that of a set would change from process to process.

@@ -20,6 +20,7 @@ from sweep.models.theory.linear import fastest_motion
 from sweep.models.theory.stability import stable_ranges
 from sweep.models.user.blame import blamed
 from sweep.parameters import PARAMETERS, Parameter
+from sweep.units import is_of_paper
 
 _OFFERS = {COUNT: "COUNT", SPIN: "SPIN", ENERGY: "ENERGY", LINEAR: "LINEAR"}
 
@@ -92,6 +93,8 @@ def _names(name: str, taken: Collection[str], own: tuple[Parameter, ...], used: 
             yield None, f"parameter {p.path}: {wrong[0]!r} is no word of letters, digits and _; rename it"
         if p.default is not None and not p.allows(p.default):
             yield None, f"parameter {p.path}: its default {p.default:g} is out of its bounds; it has to be {p.allowed}"
+        if is_of_paper(p.long_name.rpartition(", in ")[2]):
+            yield None, f"parameter {p.path}: its unit stands in long_name; give it as units, such as sweep.units.SPEED"
     known = [p.name for p in own]
     if len(set(known)) < len(known):
         yield None, f"the parameters {', '.join(known)} need distinct names"

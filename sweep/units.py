@@ -1,0 +1,111 @@
+"""Units: the powers of a quantity, what they are called in the paper's units and in SI, and what users may write."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import pi
+
+PAPER_UNITS, SI = "paper", "SI"
+"""Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Powers of length, time, mass and angle; forces and energies of a moving body are those per unit mass."""
+
+    length: int = 0
+    time: int = 0
+    mass: int = 0
+    angle: int = 0
+
+    @property
+    def si(self) -> str:
+        """CF unit in SI, such as "kg m2 s-1"; empty for a plain number."""
+        powers = {"kg": self.mass, "radian": self.angle, "m": self.length, "s": self.time}
+        return _product(dict(sorted(powers.items(), key=lambda each: each[1] < 0)))
+
+    @property
+    def paper(self) -> str:
+        """The unit in the paper's c, g and m, such as "sqrt(g/c)"; empty for a plain number, "radian" for an angle."""
+        if self == ANGLE:
+            return self.si
+        g, c = -self.time, 2 * self.length + self.time  # twice the powers, as a time is sqrt(c/g)
+        whole = _product({"m": self.mass, "g": int(g / 2), "c": int(c / 2)})
+        return f"{whole} {_ROOTS[g - 2 * int(g / 2), c - 2 * int(c / 2)]}".strip()
+
+
+_ROOTS = {(0, 0): "", (1, 1): "sqrt(g c)", (1, -1): "sqrt(g/c)", (-1, 1): "sqrt(c/g)", (-1, -1): "1/sqrt(g c)"}
+
+
+def _product(powers: dict[str, int]) -> str:
+    return " ".join(f"{base}{power if power != 1 else ''}" for base, power in powers.items() if power)
+
+
+NUMBER, LENGTH, TIME, MASS, ANGLE = Unit(), Unit(length=1), Unit(time=1), Unit(mass=1), Unit(angle=1)
+SPEED, SLOWNESS = Unit(length=1, time=-1), Unit(length=-1, time=1)
+RATE, SPIN = Unit(time=-1), Unit(time=-1, angle=1)
+ACCELERATION, ENERGY_PER_MASS = Unit(length=1, time=-2), Unit(length=2, time=-2)
+MASS_DENSITY, INERTIA, DRAG = Unit(mass=1, length=-3), Unit(mass=1, length=2), Unit(mass=1, length=2, time=-1)
+
+_DEGREE = pi / 180
+_WRITTEN: dict[Unit, dict[str, float]] = {
+    LENGTH: {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
+    MASS: {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "oz": 0.028349523125, "lb": 0.45359237},
+    MASS_DENSITY: {"kg/m3": 1.0, "g/cm3": 1e3},
+    ANGLE: {"rad": 1.0, "deg": _DEGREE, "°": _DEGREE},
+    TIME: {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    SPIN: {"rad/s": 1.0, "1/s": 1.0, "deg/s": _DEGREE, "°/s": _DEGREE, "rpm": pi / 30},
+}
+"""Units that users may write, in those of SI."""
+
+_NUMBER = r"[-+]?(?:\.\d+|\d+(?:\.\d*)?)(?:[eE][-+]?\d+)?"
+_QUANTITY = re.compile(rf"({_NUMBER}) *(?:(?:±|\+/?-) *({_NUMBER}))? *(\D.*)")
+
+
+def known(unit: Unit) -> list[str]:
+    """The units that users may write for quantities of a unit."""
+    return list(_WRITTEN[unit])
+
+
+def factor(written: str, unit: Unit) -> float | None:
+    """How many units of SI a unit is, such as 1000 for "g/cm3"; None if it is none, or one of something else."""
+    return _WRITTEN[unit].get(written.replace("^", "").replace("³", "3"))
+
+
+def quantity(text: str, unit: Unit) -> tuple[float, float] | None:
+    """A number and its error in SI, such as (0.12, 0.001) for "12.0+-0.1 cm"; None if the text is something else."""
+    found = _QUANTITY.fullmatch(text.strip())
+    scale = factor(found[3], unit) if found else None
+    return (float(found[1]) * scale, float(found[2] or 0) * scale) if found and scale else None
+
+
+def named(units: Unit | str, system: str) -> str:
+    """The unit in a system of units; empty for a plain number, and in a system that only a user's model knows.
+
+    A unit that a user's model gives as text is the same in every system.
+    """
+    if isinstance(units, str):
+        return "" if units == "1" else units
+    own = units.si if units == ANGLE else ""
+    return {PAPER_UNITS: units.paper, SI: units.si}.get(system, own)
+
+
+def is_of_paper(units: str) -> bool:
+    """Tell whether a unit is made of the paper's c, g and m."""
+    letters = set(re.findall(r"[A-Za-z]+", units))
+    return letters <= {"sqrt", "c", "g", "m"} and not letters <= {"m"}
+
+
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def pretty(units: str) -> str:
+    """A unit as figures print it: kg m²/s for "kg m2 s-1", and √(g/c) for "sqrt(g/c)"."""
+    parts = [re.fullmatch(r"([A-Za-z]+)(-?)(\d*)", part) for part in units.replace("radian", "rad").split()]
+    if not all(parts):
+        return units.replace("sqrt", "√")
+    over, under = ([f"{p[1]}{p[3].translate(SUPERSCRIPT)}" for p in parts if p and p[2] == sign] for sign in ("", "-"))
+    under = [part.removesuffix("¹") for part in under]
+    below = f"({' '.join(under)})" if len(under) > 1 else "".join(under)
+    return f"{' '.join(over) or 1}/{below}" if below else " ".join(over)
