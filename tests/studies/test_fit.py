@@ -198,7 +198,6 @@ def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: 
         (["mu", "n0", "x0"], {"x0": 8.0}, "what is free reaches too far: start point off the ellipsoid at x0=12"),
         (["mu", "n0", "x0", "y0", "a", "b", "delta", "film_delay", "film_bias"], {}, "9 parameters are free"),
         (["mu", "n0", "x0"], {"x0": 0.0}, "give the ends of its range as two values"),
-        (["film_lean_x"], {}, "film_lean_x is no parameter of the slip model"),
         (["mu"], {"model": "analytic", "n0": 0.05}, "is a formula and cannot be simulated"),
         (["mu"], {"laws": ["viscuos"]}, "viscuos is no law of friction (did you mean viscous?); choose from viscous"),
         (["muu"], {"laws": ["viscous"]}, "muu is no parameter of the slip"),
