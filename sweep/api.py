@@ -306,8 +306,7 @@ def fit(
     film : a table of numbers with a header: a time, and a spin ("spin (rad/s)"), what a phone on the body tells
         ("Gyroscope z (rad/s)") or a heading ("angle (deg)"); with a column "error", intervals follow from that, and
         else from the residuals.  Or a `sweep.config.film.Film`
-    free : names of the parameters to find.  Of the film itself, film_delay, film_bias, film_lean_x and film_lean_y can
-        be found too
+    free : names of the parameters to find.  Of the film itself, film_delay and film_bias can be found too
     laws : laws of friction to compare, such as ``["viscous", "coulomb-tanh"]``.  Each takes from `config` what that
         says of its parameters, and finds those that `config` does not say as well; it does without what it has not
 

@@ -210,7 +210,7 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
 
     FILM is a table with a header: a time, and a spin, a gyroscope's reading or a heading, such as "Time (s), Gyroscope
     z (rad/s)".  A free parameter with several values in CONFIG is sought between the least and the largest; of the film
-    itself, film_delay, film_bias, film_lean_x and film_lean_y can be free.  Writes NAME_fit.nc and .png, and
+    itself, film_delay and film_bias can be free.  Writes NAME_fit.nc and .png, and
     NAME_fit.yaml, which runs the fitted body; with --laws, NAME_laws.nc, .png and .yaml, that of the best law.
     """
     from sweep.progress import Terminal

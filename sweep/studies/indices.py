@@ -1,6 +1,6 @@
 """Which of the uncertain parameters a result depends on: Sobol indices, from a run of samples that share parameters.
 
-The design, and the estimates from it, are those of Saltelli et al. (2010), doi 10.1016/j.cpc.2009.09.018.
+The design is that of Saltelli et al. (2010), doi 10.1016/j.cpc.2009.09.018, and SciPy estimates the indices.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
+from scipy.stats import bootstrap, sobol_indices
 
 from sweep.config import Config, ConfigError
 from sweep.config.distributions import chances
@@ -75,7 +76,7 @@ class Indices(Study):
         failed = np.isin(arrays["status"], (*FAILURES, IMPOSSIBLE))
         values = np.stack([np.where(failed, np.nan, arrays[name]) for name in names])
         parameters = list(self.config.cases)
-        found = with_intervals(values.reshape(len(names), len(parameters) + 2, -1), self.config.seed)
+        found = estimated(values.reshape(len(names), len(parameters) + 2, -1), self.config.seed)
         attributes = {"title": f"{self.config.name}: Sobol indices", **self._attributes(self.grid.size, apart)}
         return xr.Dataset(
             variables(VARIABLES, ("quantity", "parameter"), found),
@@ -84,26 +85,31 @@ class Indices(Study):
         )
 
 
-def sobol(values: Array) -> tuple[Array, Array]:
-    """Estimate first-order and total indices, both of shape (…, parameters).
+def estimated(values: Array, seed: int) -> dict[str, Array]:
+    """Estimate the indices and their intervals of 95 %, by name, each of shape (quantities, parameters).
 
     Parameters
     ----------
-    values : the results of the design, shape (…, parameters + 2, n)
+    values : the results of the design, shape (quantities, parameters + 2, n), n being a power of two
     """
-    first, second, mixed = values[..., :1, :], values[..., 1:2, :], values[..., 2:, :]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        variance = np.var(values[..., :2, :], axis=(-2, -1))[..., None]
-        alone = np.mean((second - np.mean(values[..., :2, :], axis=(-2, -1), keepdims=True)) * (mixed - first), axis=-1)
-        return alone / variance, np.mean((first - mixed) ** 2, axis=-1) / 2 / variance
+    known = np.ptp(values, axis=(1, 2)) > 0  # SciPy would give 0 for a result that is NaN, or always the same
+    quantities, both, n = values.shape
+    # SciPy drops dimensions of length one, and fails if there is no other: so one more quantity is there, all zero.
+    filled = np.zeros((quantities + 1, both, n))
+    filled[:-1][known] = values[known]
 
+    def find(rows: Array) -> Array:
+        first, second, *mixed = filled[..., rows].swapaxes(0, 1)
+        found = sobol_indices(func={"f_A": first, "f_B": second, "f_AB": np.stack(mixed)}, n=n)
+        return np.reshape([found.first_order, found.total_order], (len(_ORDERS), quantities + 1, both - 2))
 
-def with_intervals(values: Array, seed: int) -> dict[str, Array]:
-    """The indices of `values`, and their intervals of 95 % by resampling; `values` as of `sobol`."""
-    random, size = np.random.default_rng(seed), values.shape[-1]
-    again = [sobol(values[..., random.integers(size, size=size)]) for _ in range(_RESAMPLED)]
-    found = dict[str, Array]()
-    for k, (name, index) in enumerate(zip(("first_order", "total_order"), sobol(values), strict=True)):
-        low, high = np.quantile([each[k] for each in again], (0.025, 0.975), axis=0)
-        found |= {name: index, f"{name}_low": low, f"{name}_high": high}
-    return found
+    # `bootstrap` of what `sobol_indices` returns takes no seed.
+    low, high = bootstrap(
+        (np.arange(n),), find, vectorized=False, n_resamples=_RESAMPLED, method="percentile", rng=seed
+    ).confidence_interval
+    ends = {"": find(np.arange(n)), "_low": low, "_high": high}
+    return {
+        f"{order}{end}": np.where(known[:, None], each[k, :-1], np.nan)
+        for end, each in ends.items()
+        for k, order in enumerate(_ORDERS)
+    }

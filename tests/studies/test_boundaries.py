@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from support import Write
 from support.cli import invoke, refused
 from support.figures import entries
-from support.runs import Stop, same_numbers
+from support.runs import same_numbers
 
 import sweep
 from sweep.axis import Axis
@@ -233,27 +233,9 @@ def test_margins_of_a_grid_draw_the_curves_without_a_search(found: xr.Dataset) -
     assert not drawn.lines(grid.drop_vars("margin_more"), *axes)
 
 
-@pytest.mark.campaign
-@pytest.mark.usefixtures("short_chunks")
-def test_an_interrupted_search_goes_on(found: xr.Dataset, tmp_path: Path) -> None:
-    done, sittings = None, 0
-    while done is None:
-        try:
-            done = sweep.boundaries(SCENE, output=tmp_path, reporter=Stop(300), **AXES)
-        except KeyboardInterrupt:
-            sittings += 1
-    assert sittings > 1
-    same_numbers(done, found)
-    picture.plot(tmp_path / "sweep_boundaries.nc", output=tmp_path / "again.svg")
-    assert (tmp_path / "sweep_boundaries.png").exists()
-    assert "level4" in (tmp_path / "again.svg").read_text()
-    said = invoke("info", tmp_path / "sweep_boundaries.nc").output
-    assert f"{found.sizes['point']} points" in said
-    assert f"found {found.sizes['point']}, within" in said
-
-
-def test_what_does_not_end_is_open() -> None:
-    early = sweep.boundaries(SCENE, **AXES, t_end=4500.0)
+def test_what_does_not_end_is_open(tmp_path: Path) -> None:
+    early = sweep.boundaries(SCENE, output=tmp_path, **AXES, t_end=4500.0)
+    assert f"{early.sizes['point']} points" in invoke("info", tmp_path / "sweep_boundaries.nc").output
     assert (early.outcome == OPEN).any()
     assert "did not end" in " ".join(entries(picture.plot(early)))
 
@@ -282,12 +264,7 @@ def traced(edge: Callable[[Array], Array], points: int, deviation: float) -> tup
         cells = {place: cell({"x": across, "y": place}) for place in (0.0, 1.0)}
         return Point.between(y, {"x": across}, cells, (0.0, 1.0), deviation)
 
-    return followed(Curve(1, False, (x, y), [point(across) for across in x.values.tolist()]), cell, deviation)
-
-
-def followed(curve: Curve, cell: Callable[[Mapping[str, float]], Cell], deviation: float) -> tuple[Curve, int]:
-    """The curve when no more cells are asked for, and how many were."""
-    calls = 0
+    curve, calls = Curve(1, False, (x, y), [point(across) for across in x.values.tolist()]), 0
     while wanted := [(each, place) for each in curve.searched() for place in each.wanted()] or calls == 0:
         for each, place in wanted:
             at = each.parameters(place)
@@ -320,24 +297,6 @@ def test_a_smooth_curve_gets_none() -> None:
     curve, _ = traced(lambda x: 0.5 + 0.1 * np.sin(3 * x), 20, 1e-3)
     assert len(curve.points) == 20
     assert len(curve.middles) == 19
-
-
-def test_a_closed_curve_is_followed_all_around() -> None:
-    axes = Axis("x", np.linspace(0, 1, 2)), Axis("y", np.linspace(0, 1, 2))
-
-    def cell(at: Mapping[str, float]) -> Cell:
-        return Cell(np.hypot(at["x"] - 0.5, at["y"] - 0.5) - 0.3, 0, True, True)
-
-    points = []
-    for i, ends in ((0, (0.5, 1.0)), (1, (0.5, 1.0)), (0, (0.0, 0.5)), (1, (0.0, 0.5))):
-        other = {axes[1 - i].name: 0.5}
-        cells = {place: cell(other | {axes[i].name: place}) for place in ends}
-        points.append(Point.between(axes[i], other, cells, ends, 1e-4))
-    curve = followed(Curve(1, True, axes, points), cell, 1e-4)[0]
-    places = np.array([[point.parameters(point.root.expected)[name] for name in "xy"] for point in curve.points])
-    off = np.hypot(*(np.stack(smoothed(*places.T, closed=True)) - 0.5)) - 0.3
-    assert np.abs(off).max() < 2e-4
-    assert 8 <= len(curve.points) <= 64
 
 
 def test_no_cell_beyond_the_map_is_asked_for() -> None:

@@ -87,9 +87,3 @@ def test_trajectories_of_every_model(model: str, write: Write) -> None:
     series = sweep.trajectory(config)
     assert float(series.spin[0, 0]) == pytest.approx(0.05)
     assert np.isfinite(series.spin).all()
-
-
-def test_first_reversal_is_measured_on_request(write: Write) -> None:
-    dataset = sweep.run(write(STANDARD), method="dopri5", measure=["reversals", "first_reversal"])
-    one = sweep.trajectory(write(STANDARD), mu=60).isel(trajectory=0)
-    assert float(dataset.t_first_reversal[0]) == pytest.approx(reversal_times(one)[0], abs=0.05)
