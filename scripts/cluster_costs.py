@@ -42,7 +42,7 @@ def replace_work(arrays: dict[str, Any]) -> None:
 
 
 def main(workers: int = 8) -> None:
-    config = load_config(CONFIG, {"verify": 0, "t_end": 20, "mu": list(range(1, 1 + CELLS)), "b": 3, "n0": 0.05})
+    config = load_config(CONFIG, {"t_end": 20, "mu": list(range(1, 1 + CELLS)), "b": 3, "n0": 0.05})
     grid = config.grid
     tiles = grid.tiles(CELLS)
     ((_, real),) = local.run_batch(config, tiles, [0])

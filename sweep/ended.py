@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-ENDED: dict[str, str] = {}
+ENDED: dict[str, str] = {
+    "verify": "leave it out; to compare a few cells with dopri5 at half its step, see how-to/check",
+    "until": "give a number of samples instead",
+    "sensitivity": "leave it out; sensitive shows which counts depend on the step",
+}
 """What to do instead of keys of a configuration ("verify", "integrator.step"), measurements, free parameters of `fit`
 and options of all commands ("--workers") or of one ("plot --histogram")."""
 

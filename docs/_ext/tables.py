@@ -65,8 +65,6 @@ def _variables() -> tuple[Row, list[Row]]:
         rows.append((f"`{name}`", spec.dtype, over, words))
     for name, spec in PROBABILITIES.items():
         rows.append((f"`{name}`", spec.dtype, "all but `sample`, and `count`", spec.long_name))
-    for name, spec in dataset.VERIFIED.items():
-        rows.append((f"`{name}`", spec.dtype, "`verified`", spec.long_name))
     return ("variable", "type", "axes", "meaning"), rows
 
 

@@ -13,7 +13,7 @@ from sweep.engine.local import BATCH
 from sweep.engine.plan import Choice, choose, kernels
 from sweep.grid import Array
 from sweep.kernels.build import compile_seconds, missing
-from sweep.kernels.methods import METHODS, PLAIN, automatic_step
+from sweep.kernels.methods import METHODS
 from sweep.models import MODELS
 from sweep.models.user.blame import blamed
 
@@ -60,7 +60,7 @@ def estimate(config: Config) -> str:
 
 
 def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share: float) -> Iterator[Array]:
-    """The work for each cell, in steps of dopri5 alone: for each method, and for the cells run again to verify it."""
+    """The work for each cell, in steps of dopri5 alone: for each method."""
     if not chosen:
         return  # no body of the sample is possible
     relative = 1.0 if config.equations.name in MODELS else _GENERAL
@@ -70,8 +70,3 @@ def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share
         work = method.step_cost * relative * (theirs + method.start_up_cost)
         work *= 1 + 1 / method.companion if config.integrator.estimate_errors else 1
         yield np.resize(work, round(len(work) * share))
-    if config.verify:
-        again = chosen[0]
-        number = math.ceil(config.verify * share * sum(len(each.cells) for each in chosen))
-        step, _ = automatic_step(PLAIN, config.equations, again.columns, config.integrator.tolerance)
-        yield np.resize(2 * config.integrator.patient.t_end / step, number) * relative

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from enum import IntEnum
 from typing import Any
 
@@ -83,8 +82,8 @@ VARIABLES: dict[str, Variable] = {
     "spin_error": _number("estimated error of the spin at t_stop, in sqrt(g/c)", of_sound_runs=True,
                           words="estimated error of the final spin"),
     "sensitive": _flag(
-        "whether other steps, or starts 1e-10 apart, give another number of reversals", {0: "firm", 1: "sensitive"},
-        of_sound_runs=True, words="does the count depend on steps or the start's 10th digit?",
+        "whether other steps give another number of reversals", {0: "firm", 1: "sensitive"},
+        of_sound_runs=True, words="does the count depend on the steps?",
     ),
     "decided": _flag(
         "whether the number of reversals is final, and its margins are larger than ten times their errors",
@@ -120,22 +119,6 @@ VARIABLES: dict[str, Variable] = {
     },
     "critical_reason": _flag("first of the four reasons that is not exists", REASONS, per_body=True),
 }  # fmt: skip
-
-
-def _again(name: str) -> Variable:
-    return replace(VARIABLES[name], long_name=f"{VARIABLES[name].long_name}; second run, with finer steps")
-
-
-VERIFIED: dict[str, Variable] = {
-    "verified_cell": Variable("int64", "1", "cell run again: its index in the C order of the axes"),
-    **{
-        f"verified_{name}": _again(name)
-        for name in ("reversals", "t_last_reversal", "spin_final", "status", "energy_error", "step")
-    },
-    "verified_spin_difference": _number("difference in spin between the two runs at t_stop, in sqrt(g/c)"),
-    "verified_count_changed": _flag("whether the two runs count other reversals", {0: "no", 1: "yes"}),
-}
-"""The variables over the cells that were run again."""
 
 
 def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
@@ -193,7 +176,7 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
 
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
     """Raise a `ConfigError` if a parameter has the name of a variable, or of one of these `series`."""
-    own = {*VARIABLES, *PROBABILITIES, *ROWS, *VERIFIED, *series}
+    own = {*VARIABLES, *PROBABILITIES, *ROWS, *series}
     names = own & set(config.tier.parameters)
     if names:
         words = f"parameter {min(names)}: is reserved for a variable of the dataset; rename it"
@@ -228,16 +211,6 @@ def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, A
         for name, place, values in pieces(grid, tile, arrays):
             whole[name][place] = values
     return whole
-
-
-def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
-    """`result`, with the results of a second run of some cells (`again`) along the dimension `verified`."""
-    result = result.assign(variables(VERIFIED, ["verified"], again, config.units))
-    if "verified_count_changed" in again:
-        result.attrs["verified_counts_changed"] = int(again["verified_count_changed"].sum())
-    if "verified_spin_difference" in again:
-        result.attrs["verified_largest_spin_difference"] = float(again["verified_spin_difference"].max())
-    return result
 
 
 def variables(

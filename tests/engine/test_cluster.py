@@ -35,7 +35,6 @@ body: {b: {start: 2, stop: 6, num: 40}}
 friction: {mu: {start: 40, stop: 60, num: 40}}
 start: {n0: [0.02, 0.05, 0.07]}
 integrator: {t_end: 100}
-verify: 0.01
 """
 TILES, SMALL_TILES = 5, 20
 
@@ -314,6 +313,6 @@ def test_a_lost_scheduler_leaves_finished_tiles(config: Path, tmp_path: Path, by
 
 
 def test_formulas_run_on_a_cluster(config: Path, client: distributed.Client) -> None:
-    asked = {"model": "analytic", "verify": 0}
+    asked = {"model": "analytic"}
     here, there = sweep.run(config, **asked), sweep.run(config, cluster=Cluster(client), **asked)
     xr.testing.assert_identical(here.drop_attrs(deep=False), there.drop_attrs(deep=False))
