@@ -36,7 +36,7 @@ def main(side: int, sample: int, deviation: float = BOUNDARY_DEVIATION) -> None:
     axes: dict[str, Any] = {"mu": np.linspace(20, 200, side), "b": np.linspace(1.2, 9.8, side)}
     sweep.run(CONFIG, n0=0.05, mu=[60, 70], b=[3, 4])  # compiles
     began = time.perf_counter()
-    grid = sweep.run(CONFIG, n0=0.05, verify=0.0, **axes)
+    grid = sweep.run(CONFIG, n0=0.05, **axes)
     of_map, began = time.perf_counter() - began, time.perf_counter()
     found = sweep.boundaries(CONFIG, n0=0.05, deviation=deviation, **axes)
     seconds = time.perf_counter() - began
@@ -95,7 +95,7 @@ def counted(grid: xr.Dataset, found: xr.Dataset, sample: int, cell: Array) -> No
     """Count random cells by the curves: on the way from the nearest cell of the grid, each curve changes the count."""
     random = np.random.default_rng(23)
     places = np.stack([random.uniform(1.2, 9.8, sample), random.uniform(20, 200, sample)], axis=1)
-    true = sweep.run(comparison.table([OTHERS | {"b": b, "mu": mu} for b, mu in places.tolist()]), verify=0.0)
+    true = sweep.run(comparison.table([OTHERS | {"b": b, "mu": mu} for b, mu in places.tolist()]))
     nearest = grid.sel(b=xr.DataArray(places[:, 0]), mu=xr.DataArray(places[:, 1]), method="nearest")
     count, here = nearest.reversals.values.astype(int), np.stack([nearest.b.values, nearest.mu.values], axis=1)
     told = np.zeros(sample, int)

@@ -23,7 +23,6 @@ friction: {{mu: {{start: 20, stop: 200, num: {frictions}}}}}
 start: {{n0: {{start: 0.02, stop: 0.1, num: {spins}}}}}
 measure: [reversals]
 integrator: {{method: dopri5, t_end: 2, estimate_errors: false, stop_when_settled: false}}
-verify: 0
 """
 
 

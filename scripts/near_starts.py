@@ -26,9 +26,9 @@ def main(count: int, seed: int) -> None:
         drawn += reference_wide.draw(seed)
         seed += 1
     drawn = drawn[:count]
-    first = sweep.run(comparison.table(drawn), verify=0.0)
+    first = sweep.run(comparison.table(drawn))
     nudged = [{name: value * NUDGE if name in START else value for name, value in cell.items()} for cell in drawn]
-    near = sweep.run(comparison.table(nudged), verify=0.0)
+    near = sweep.run(comparison.table(nudged))
     sound = np.isin(first.status, (SETTLED, TIME_LIMIT)) & np.isin(near.status, (SETTLED, TIME_LIMIT))
     changed = sound & (first.reversals != near.reversals).values
     said = (first.sensitive == 1).values

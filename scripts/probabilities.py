@@ -22,7 +22,7 @@ from sweep.kernels.status import FAILURES
 from sweep.results.dataset import measured
 
 SCENE: dict[str, Any] = {
-    "body": {"a": 10, "b": 3, "delta": 0.1}, "friction": {"mu": 5}, "measure": ["reversals"], "verify": 0,
+    "body": {"a": 10, "b": 3, "delta": 0.1}, "friction": {"mu": 5}, "measure": ["reversals"],
     "integrator": {"method": "dopri5", "tolerance": 1e-6, "t_end": 40, "estimate_errors": False},
 }  # fmt: skip
 MILLION, BATCH, STEP = 1_000_000, 100_000, 0.01

@@ -22,7 +22,7 @@ CONFIG = Path(__file__).parent.parent / "configs" / "mu_b.yaml"
 
 def main(side: int, depths: list[int], folder: str | None, parameters: dict[str, float]) -> None:
     """Print share, wrong cells and seconds."""
-    settings: dict[str, Any] = {"n0": 0.05, "estimate_errors": False, "verify": 0.0, "measure": ["reversals", "margin"]}
+    settings: dict[str, Any] = {"n0": 0.05, "estimate_errors": False, "measure": ["reversals", "margin"]}
     settings |= parameters
     sweep.run(CONFIG, **settings, mu=[60, 70], b=[3, 4])  # compiles
     mu = {"start": 20.0, "stop": 200.0, "num": side}

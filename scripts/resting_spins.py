@@ -28,7 +28,7 @@ ENDS = (1e5, 1.5e5)
 
 def compare(name: str, config: Config, **axes: Any) -> str:
     """Tell how far the resting spins of settled cells are off."""
-    settings: dict[str, Any] = {"measure": MEASURE, "tolerance": 1e-9, "estimate_errors": False, "verify": 0.0} | axes
+    settings: dict[str, Any] = {"measure": MEASURE, "tolerance": 1e-9, "estimate_errors": False} | axes
     left = sweep.run(config, t_end=30_000.0, **settings)
     first, last = (
         sweep.run(config, t_end=t_end, stop_when_settled=False, **settings).spin_final.values for t_end in ENDS

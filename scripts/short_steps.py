@@ -84,7 +84,7 @@ def compared(config: Config, cells: int = 0) -> xr.Dataset:
     if cells:
         rows_of = [dict(zip(columns, row, strict=True)) for row in np.stack([*columns.values()], axis=1).tolist()]
         config = sweep.load_config(comparison.table(rows_of), {"t_end": config.integrator.t_end})
-    found = sweep.run(config, verify=0.0)
+    found = sweep.run(config)
     flat = {name: found[name].values.ravel() for name in ("step", "t_stop", "spin_final", "spin_error", "status")}
     sound = np.isin(flat["status"], (SETTLED, TIME_LIMIT))
     kernel, unit = kernel_of(PLAIN, config), config.equations.spin_unit(columns)

@@ -29,7 +29,7 @@ def compare(method: str, tolerance: float, table: Path) -> str:
     began = time.perf_counter()
     found = sweep.run(
         comparison.table({name: row[name] for name in names} for row in rows), method=method, tolerance=tolerance,
-        t_end=400.0, stop_when_settled=False, verify=0.0,
+        t_end=400.0, stop_when_settled=False,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     true, known = (np.array([float(row[name]) for row in rows]) for name in ("spin_400", "uncertainty_400"))

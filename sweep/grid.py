@@ -95,10 +95,6 @@ class Grid:
         places = [np.unique(np.linspace(0, n - 1, min(each, n)).round().astype(int)) for n in self.shape]
         return self.part(places)
 
-    def first_cell(self, tile: Tile) -> int:
-        """Index of the first cell of a tile, in the C order of the grid."""
-        return int(np.ravel_multi_index([at.start for at in tile], self.shape)) if tile else 0
-
     def of_bodies(self) -> Grid:
         """The grid of the bodies, without the start parameters.  Every case is a body of its own."""
         fixed = {name: float(values[0]) for name, values in self._at([slice(1)] * len(self.shape)).items()}

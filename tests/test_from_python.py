@@ -120,10 +120,10 @@ def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name(
 
 
 def test_overrides_of_a_config_act_as_on_its_file(write: Write) -> None:
-    """Also on what was filled in by default, here the method and the cells that are verified."""
+    """Also on what was filled in by default, here the method."""
     path = write("friction: {mu: {start: 20, stop: 200, num: 600}}\n")
     config = load_config(path)
-    assert (config.integrator.method, config.verify) == ("auto", 0.002)
+    assert config.integrator.method == "auto"
     for overrides in ({"step": 0.01}, {"model": "analytic"}, {"mu": 60}, {"friction.mu": [3, 4], "name": "x"}):
         assert load_config(config, overrides) == load_config(path, overrides)
     assert load_config(load_config(config, {"mu": 60}), {"b": 2}) == load_config(path, {"mu": 60, "b": 2})
@@ -212,7 +212,6 @@ HALVES: dict[str, list[dict[str, Any]]] = {
     "mu": [{"mu": [40, 60]}, {"mu": [80]}],
     "n0, on which no body depends": [{"n0": [0.02]}, {"n0": [0.05, 0.1]}],
     "mu and b": [{"mu": mu, "b": b} for mu in ([40, 60], [80]) for b in ([2], [3, 4])],
-    "mu, verified": [{"mu": [40, 60], "verify": 0.9}, {"mu": [80], "verify": 0.5}],
 }
 """Runs that together cover a grid."""
 
@@ -222,12 +221,10 @@ def test_parts_of_a_grid_are_combined_without_loss(parts: list[dict[str, Any]], 
     """By the call that `docs/how-to/python.md` shows; integers stay integers, also from files."""
     whole: dict[str, Any] = {}
     for part in parts:
-        whole |= {name: sorted({*whole.get(name, ()), *axis}) for name, axis in part.items() if name != "verify"}
+        whole |= {name: sorted({*whole.get(name, ()), *axis}) for name, axis in part.items()}
     for i, part in enumerate(parts):
         sweep.run(SAID, tmp_path / str(i), **part)
-    runs = [
-        sweep.open(tmp_path / str(i) / "quick.nc").drop_dims("verified", errors="ignore") for i in range(len(parts))
-    ]
+    runs = [sweep.open(tmp_path / str(i) / "quick.nc") for i in range(len(parts))]
     combined = xr.combine_by_coords(runs[::-1], data_vars="minimal", compat="equals", combine_attrs="drop_conflicts")
     assert isinstance(combined, xr.Dataset)
     same_numbers(combined.transpose(*(wanted := sweep.run(SAID, **whole)).dims), wanted)

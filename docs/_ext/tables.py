@@ -67,7 +67,6 @@ def _variables() -> tuple[Row, list[Row]]:
         "all": {name: spec for name, spec in dataset.VARIABLES.items() if not spec.per_body},
         "all but the start's": {name: spec for name, spec in dataset.VARIABLES.items() if spec.per_body},
         "all but `sample`, and `count`": PROBABILITIES,
-        "`verified`": dataset.VERIFIED,
     }
     rows = []
     for over, table in tables.items():

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
+from sweep.ended import ended
 from sweep.faults import ConfigError, Fault, Refused, fault_of, printable
 from sweep.interrupt import INTERRUPTED
 from sweep.parameters import Parameter
@@ -76,6 +77,11 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
+        except click.NoSuchOption as error:
+            verb = error.ctx.info_name if error.ctx else ""
+            if not (words := ended(error.option_name, f"{verb} {error.option_name}")):
+                raise
+            say(f"{error.option_name}: {words}", err=True)
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)

@@ -6,9 +6,8 @@ import os
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from copy import deepcopy
-from dataclasses import replace
 from itertools import islice
-from math import ceil, log2, sqrt
+from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
 from sweep.config.messages import describe
 from sweep.config.schema import Integrator
-from sweep.config.values import MAX_AXIS, Values
+from sweep.config.values import Values
 from sweep.faults import ConfigError, Fault
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
@@ -142,7 +141,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     _refuse(source, cross_checks.of_physics(values, physics, origin))
     model = model_of(values.model, origin, physics)
     uncertain = {n: v.distribution for n, v in given.items() if v.distribution and n in model.parameters}
-    samples = values.samples or (_samples(values.until) if uncertain else None)
+    samples = values.samples or (schema.SAMPLES if uncertain else None)
     if samples and uncertain and values.cases is None:
         columns = drawn(uncertain, samples, values.seed)
     parameters = _parameters(model, given, columns, known, physics)
@@ -156,12 +155,10 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         measure=tuple(measures.default(model) if values.measure is None else values.measure),
         max_failed_fraction=values.max_failed_fraction,
         picture=_pictures(values, source),
-        verify=values.verify or 0.0,
         refine=values.refine,
         cases=columns,
         cases_file=values.cases,
         samples=samples,
-        until=values.until,
         seed=values.seed,
         film=source.once("film", seen, lambda: film.read(Path(source.file).parent / seen)) if seen else None,
         units=physics.units,
@@ -169,8 +166,6 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         surface=physics.surface.name,
         origin=origin,
     )
-    if values.verify is None and config.integrator.method == methods.AUTO and not config.refine:
-        config = replace(config, verify=schema.VERIFIED if config.grid.size * schema.VERIFIED >= 1 else 0.0)
     object.__setattr__(config, "source", source)
     _refuse(source, cross_checks.of_values(config, given))
     user_models.try_out(config)
@@ -182,11 +177,6 @@ def _pictures(values: Any, source: document.Document) -> tuple[str, ...]:
     """The variables to be drawn; those of a file are not of what is measured in place of its measurements."""
     other = ("measure",) in source.arguments and ("picture",) not in source.arguments
     return () if other else tuple(values.picture or ())
-
-
-def _samples(until: float | None) -> int:
-    """How many samples are drawn unasked: at most as many as tell a probability of one half to ± `until`."""
-    return min(2 ** ceil(-2 * log2(until)), MAX_AXIS) if until else schema.SAMPLES
 
 
 def _refuse(source: document.Document, misfits: Iterable[cross_checks.Misfit]) -> None:

@@ -1,11 +1,10 @@
-"""Tables of cases, with a column per parameter and a row per trajectory: CSV or Parquet files, or lists by column."""
+"""Tables of cases, with a column per parameter and a row per trajectory: CSV files, or lists by column."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from sweep import faults
@@ -40,7 +39,10 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns
     ConfigError
         if the file cannot be read, or with a `Fault` for each cell that is wrong.
     """
-    return _checked(*(_of_parquet if name.endswith(".parquet") else _of_csv)(source, name), known)
+    if name.endswith(".parquet"):
+        words = "Parquet files have ended; read it with pandas and pass the DataFrame, or save it as CSV"
+        raise ConfigError([source.fault(("cases",), f"{brief(name)}: {words}")])
+    return _checked(*_of_csv(source, name), known)
 
 
 def of_columns(source: Document, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> Columns:
@@ -84,22 +86,6 @@ def _misshapen(file: str, top: int, header: list[str], rows: list[tuple[int, lis
     for line, row in rows:
         if len(row) != len(header):
             yield Fault(file, line, None, (), f"{len(row)} values, but {len(header)} columns in line {top}")
-
-
-def _of_parquet(source: Document, name: str) -> _Table:
-    import pandas
-
-    path = Path(source.file).parent / name
-    try:
-        with path.open("rb") as stream:
-            table = pandas.read_parquet(stream).to_dict("list")
-    except ImportError:
-        reason = "cannot be read without pyarrow; install it (pip install 'rattleback-sweep[parquet]')"
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "not a readable Parquet file"
-    else:
-        return table, lambda at, words: Fault(str(path), None, None, at, words), []
-    raise ConfigError([source.fault(("cases",), f"{brief(str(path))}: {reason}")])
 
 
 def _checked(table: Mapping[str, Any], place: Place, misshapen: list[Fault], known: Mapping[str, Parameter]) -> Columns:

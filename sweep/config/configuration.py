@@ -62,7 +62,6 @@ class Config:
     max_failed_fraction: float
     picture: tuple[str, ...] = ()
     """Variables to be drawn, as `sweep.plots.quantities.field` takes them; empty for what was measured first."""
-    verify: float = 0.0
     repeats: bool = True
     """Whether cells whose error is above the tolerance are run again, in shorter steps."""
     refine: int = 0
@@ -71,8 +70,6 @@ class Config:
     cases_file: str | None = None
     samples: int | None = None
     """How many samples are drawn of the parameters that are distributions, if there are such."""
-    until: float | None = None
-    """How closely every probability is to be known, if sampling ends when it is."""
     seed: int = 0
     film: Film | None = None
     """What the misfit is measured against."""
@@ -119,7 +116,7 @@ class Config:
         if not self.samples:
             return self
         medians = {name: Values.one(known.median) for name, known in self.distributions.items()}
-        return replace(self, parameters=self.parameters | medians, cases={}, samples=None, until=None)
+        return replace(self, parameters=self.parameters | medians, cases={}, samples=None)
 
     @property
     def axes(self) -> dict[str, tuple[float, ...]]:
@@ -200,7 +197,6 @@ class Config:
             **top,
             **({"cases": self.cases_file} if self.cases_file else {}),
             **({"samples": self.samples, "seed": self.seed} if self.samples else {}),
-            **({"until": self.until} if self.until else {}),
             **{section: values for section, values in found.items() if values},
             "integrator": self.integrator.model_dump(),
             "measure": [
@@ -208,7 +204,6 @@ class Config:
                 for name, _, n in (m.partition("=") for m in self.measure)
             ],
             **({"picture": list(self.picture)} if self.picture else {}),
-            "verify": self.verify,
             "refine": self.refine,
             "max_failed_fraction": self.max_failed_fraction,
         }

@@ -93,11 +93,8 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
             yield path, f"must be {config.table[name].allowed}, but {words}; choose another distribution"
         if name in model.positive and 0.0 in value.numbers:
             yield path, f"must be > 0 for the {model.name} model, not 0"
-    for name in ("samples", "until"):
-        if getattr(config, name) and not config.distributions:
-            yield (name,), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
-    if config.until and "reversals" not in config.measure:
-        yield ("measure",), "must have reversals, on which until depends; add them, or leave out until"
+    if config.samples and not config.distributions:
+        yield ("samples",), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
     for name, column in () if config.samples else columns.items():
         if name not in model.parameters:
             yield ("cases",), f"column {name}: the {model.name} model has no {name}; remove it"
@@ -111,8 +108,6 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
 def _of_integrator(config: Config) -> Iterator[Misfit]:
     model, integrator = config.tier, config.integrator
     if not isinstance(model, Model):
-        if config.verify:
-            yield ("verify",), f"the {model.name} model takes no steps to be verified; set it to 0"
         return
     usable = (*methods.allowed(model), methods.AUTO)
     if integrator.method not in usable:
@@ -126,8 +121,6 @@ def _of_refinement(config: Config) -> Iterator[Misfit]:
         yield ("refine",), f"needs a simulation, but the {config.model} model is a formula; set it to 0"
     if config.cases:
         yield ("refine",), f"cannot be combined with {config.row}s, which have no neighbours; set it to 0"
-    if config.verify:
-        yield ("verify",), "cannot be combined with refine; set it to 0"
     if "reversals" not in config.measure:
         yield ("measure",), "must have reversals, on which refine depends; add them, or set refine to 0"
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
+from sweep.ended import ended
 from sweep.faults import Path, either, refusal, suggestion
 
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
@@ -41,7 +42,8 @@ def describe(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple
             found[path] = "a key that is no text; correct its spelling", False
         elif kind == "extra_forbidden":
             meant = _other_key(path[-1], section, sections)
-            found[path] = f"unknown key{meant}; the keys here are {', '.join(section.model_fields)}", True
+            unknown = f"unknown key{meant}; the keys here are {', '.join(section.model_fields)}"
+            found[path] = ended(".".join(map(str, path))) or unknown, True
         elif kind == "value":
             found[*path, *error["ctx"]["at"]] = error["ctx"]["reason"], False
         elif kind == "missing":

@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from sweep.config.messages import Allowed, wrong
 from sweep.config.values import MAX_AXIS, Strict, Whole, parse_values, whole
+from sweep.ended import ended
 from sweep.faults import either, refusal
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.misfit import Misfit
@@ -39,6 +40,8 @@ def _measures(raw: Any) -> Any:
 
 def _measure(raw: Any, i: int) -> str:
     name, setting = next(iter(raw.items())) if isinstance(raw, dict) and len(raw) == 1 else (raw, None)
+    if isinstance(name, str) and (words := ended(name)):
+        raise wrong(f"{name} {words}", i)
     if not isinstance(name, str) or name not in MEASURES:
         raise wrong(refusal(name, either(MEASURES), MEASURES), i)
     kind = MEASURES[name]
@@ -63,9 +66,6 @@ def _each_once(raw: Any) -> Any:
             raise wrong(f"{name} twice; name each once", i)
     return raw
 
-
-VERIFIED = 0.002
-"""Share of the cells that are run again unasked, in runs of so many cells that it amounts to one."""
 
 SAMPLES = 1024
 """Default of `samples`."""
@@ -196,10 +196,10 @@ class _Top(Strict):
     units: Literal[PAPER_UNITS, SI] = Field(  # type: ignore[valid-type]
         default=PAPER_UNITS, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
     )
-    cases: Annotated[str | None, Allowed("a CSV or Parquet file, or lists of numbers by parameter")] = Field(
+    cases: Annotated[str | None, Allowed("a CSV file, or lists of numbers by parameter")] = Field(
         default=None,
         description="table with a column for each parameter and a row for each trajectory, instead of axes: the name "
-        "of a CSV or Parquet file, or lists of numbers",
+        "of a CSV file, or lists of numbers",
     )  # fmt: skip
     integrator: Integrator = Integrator()
     measure: Annotated[list[str] | None, BeforeValidator(_measures), Allowed(f"a list of {', '.join(MEASURES)}")] = (
@@ -208,20 +208,10 @@ class _Top(Strict):
     picture: Annotated[
         list[str] | None, BeforeValidator(_each_once), Allowed("a list of variables, such as [reversals, spin_mean]")
     ] = Field(default=None, description="variables that `run` draws; by default what `measure` names first")
-    verify: float | None = Field(
-        default=None, ge=0, le=1,
-        description=f"share of the cells, drawn at random, to run again with the plain method at half its step; by "
-        f"default {VERIFIED:g} with `method: auto` where that is a cell or more and nothing is inferred, else 0",
-    )  # fmt: skip
     samples: Annotated[Whole | None, Allowed(f"a whole number >= 1 and <= {MAX_AXIS}")] = Field(
         default=None, ge=1, le=MAX_AXIS,
         description="how many samples to draw of the parameters that are given as distributions; by default "
         f"{SAMPLES} if there is one",
-    )  # fmt: skip
-    until: Annotated[float | None, Allowed("a number >= 0.001 and < 0.5")] = Field(
-        default=None, ge=0.001, lt=0.5,
-        description="stop sampling when every probability is known to so much on either side, with 95 % confidence; "
-        "`samples` is then the most, by default as many as it can take",
     )  # fmt: skip
     seed: Whole = Field(default=0, ge=0, lt=2**32, description="seed of the samples; the same gives the same")
     refine: Whole = Field(

@@ -12,6 +12,7 @@ import numpy as np
 from sweep.config.configuration import Config
 from sweep.config.document import Document
 from sweep.config.schema import SETTINGS
+from sweep.ended import ENDED
 from sweep.faults import ConfigError, brief, either, fault_of
 from sweep.grid import CASE, SAMPLE
 from sweep.models import TIERS
@@ -20,7 +21,7 @@ from sweep.models.user import loading, trial
 
 SUFFIX = ".py"
 
-TAKEN = frozenset({path.rpartition(".")[2] for path in SETTINGS}) | {
+TAKEN = frozenset({path.rpartition(".")[2] for path in (*SETTINGS, *ENDED)}) | {
     "integrator", CASE, SAMPLE, "trajectory", "time",
 }  # fmt: skip
 """Names that mean something else in a configuration, or as a dimension.  A user's parameter cannot have them."""

@@ -12,14 +12,12 @@ import xarray as xr
 
 from sweep.config import Config
 from sweep.config.document import parse_value
-from sweep.engine.checks import verify
-from sweep.engine.executor import Work
+from sweep.ended import without_ended
 from sweep.engine.plan import choose
-from sweep.engine.whole import Apart, Some
-from sweep.grid import SAMPLE, Array, Grid
+from sweep.engine.whole import Some
+from sweep.grid import Array, Grid
 from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures import MEASURES
-from sweep.kernels.measures.sensitivity import Sensitivity
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import FAILURES, TIME_LIMIT
 from sweep.models.model import Model
@@ -35,9 +33,7 @@ RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
 """Names of the cells that a run can be asked to compute again, with their statuses."""
 
 # What may differ between a run and the one that it enlarges; one that computes cells again may change the integrator.
-_FREE = {
-    "name", "max_failed_fraction", "picture", "verify", "measure", "samples", "seed", "until", "integrator.t_end",
-}  # fmt: skip
+_FREE = {"name", "max_failed_fraction", "picture", "measure", "samples", "seed", "integrator.t_end"}
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,7 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     edited = "a run, but has been edited since"
     if _is_edited(config, there):
         return edited
-    old, new = (_settings(parse_value(each.config, "dataset"), config.table) for each in (found, wanted))
+    old, new = (_settings(_document(each.config), config.table) for each in (found, wanted))
     # Of a user's model, `model_sha256` tells what `model` only names.
     free = _FREE | ({"model"} if config.origin else set())
     changed = {key for key in {**old, **new} if old.get(key) != new.get(key)} - free
@@ -122,8 +118,7 @@ def is_whole(config: Config, path: Path) -> bool:
     """Tell whether the dataset of the run of `config` has all its cells: it may have been cut since."""
     with open_dataset(path, load=False) as there:
         sizes = dict(there["status"].sizes) if "status" in there else {"": 0}
-    rows = {SAMPLE: sizes[SAMPLE]} if config.until and SAMPLE in sizes else {}  # drawn until they were enough
-    return sizes == dict(zip(config.grid.dims, config.grid.shape, strict=True)) | rows
+    return sizes == dict(zip(config.grid.dims, config.grid.shape, strict=True))
 
 
 def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
@@ -132,7 +127,7 @@ def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
     status = there["status"].values.ravel()
     if rerun:
         return Earlier(there, np.where(np.isin(status, RERUN[rerun])[cells], -1, cells), rerun)
-    old = parse_value(str(there.attrs["config"]), "dataset")
+    old = _document(str(there.attrs["config"]))
     if old["measure"] != config.document()["measure"] or not isinstance(config.tier, Model):
         return Earlier(there, np.full(len(cells), -1))
     if old["integrator"]["t_end"] != config.integrator.t_end:
@@ -140,6 +135,11 @@ def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
         depends = _depends_on_limit(config, config.grid.take(taken), there, cells[taken], old["integrator"]["t_end"])
         cells[taken[depends]] = -1
     return Earlier(there, cells)
+
+
+def _document(text: str) -> dict[str, Any]:
+    """Read the configuration of a dataset."""
+    return without_ended(parse_value(text, "dataset"))
 
 
 def _settings(document: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
@@ -156,8 +156,6 @@ def _depends_on_limit(config: Config, grid: Grid, there: xr.Dataset, cells: Arra
     These are the cells that had not ended at the earlier limit `t_end`, or so late that the method had taken it into
     account, and those that now take other steps.
     """
-    if any(spec.partition("=")[0] == Sensitivity.name for spec in config.measure):
-        return np.ones(len(cells), bool)  # its further runs may have met the limit
 
     def before(name: str) -> Array:
         return np.asarray(there[name].values.ravel()[cells])
@@ -213,24 +211,11 @@ class Enlarged(Some):
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all cells, in memory."""
-        labelled = self.labelled()
-        if not self.config.verify:
-            return labelled
-        arrays, _ = self._arrays()
-        return dataset.beside(self.config, labelled, verify(self.config, np.arange(self.grid.size), arrays, Work()))
-
-    def labelled(self) -> xr.Dataset:
-        """Label all cells, without a check of some of them."""
-        arrays, apart = self._arrays()
-        words = self._attributes(len(self.cells), apart)
+        arrays, (found, costs) = dict[str, Array](), self._gather()
+        self._place(*self.earlier.taken(), arrays)
+        self._place(self.cells, found, arrays)
+        words = self._attributes(len(self.cells), costs)
         if (self.earlier.cells >= 0).any():
             words["taken_over"] = self.earlier.words
         words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash
         return dataset.label(self.config, self.grid, arrays, words)
-
-    def _arrays(self) -> tuple[dict[str, Array], list[Apart]]:
-        """Arrays over all cells or bodies, and what the tiles hold apart from them."""
-        arrays, (found, apart) = dict[str, Array](), self._gather()
-        self._place(*self.earlier.taken(), arrays)
-        self._place(self.cells, found, arrays)
-        return arrays, apart

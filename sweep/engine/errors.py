@@ -19,6 +19,7 @@ the first run.  Figures: docs/explanation/accuracy.md.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -32,7 +33,7 @@ from sweep.grid import Array
 from sweep.kernels.measures.margin import EXTREMES
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.methods import METHODS
-from sweep.kernels.status import FAILURES, RUNNING
+from sweep.kernels.status import FAILURES, RUNNING, SETTLED
 from sweep.models.model import take
 
 ROUNDS = 3
@@ -62,6 +63,10 @@ OF_RATTLE = 1 / 20
 """Share of the error of the rattle beyond which spins are taken to agree by chance.  With a sixtieth, one of 300 wide
 cells was off by five times the tolerance unawares.  Where nothing else is to be expected, an error is told as at least
 that much."""
+
+DECIDED = 10.0
+"""How many times its estimated error the margin of a count has to be: of estimates, one in some hundred is more than
+ten times too small (docs/explanation/accuracy.md)."""
 
 _MILD = 2.0
 
@@ -229,3 +234,32 @@ def _ratio(part: Part) -> Array:
     with np.errstate(divide="ignore"):
         stable = _NEARER * method.stable_step(part.config.equations, part.columns)
     return np.asarray(np.clip(stable / part.kernel.table(part.images)["step"], _NEARER, ratio))
+
+
+def results(job: Plan, errors: Errors | None) -> dict[str, Array]:
+    """Collect what was simulated and, with `errors`, how exact it is: by name, each over all cells of `job`."""
+    found = job.results()
+    if errors is None:
+        return found
+    found["spin_error"] = errors.told
+    if "reversals" in found:
+        found["sensitive"] = _sensitive(job, errors.reversals)
+    if "margin_more" in found:
+        found["decided"] = _decided(found, errors)
+    return found
+
+
+def _sensitive(job: Plan, companions: Array) -> Array:
+    """Find the cells whose companion counts other reversals or failed, shape (cells,)."""
+    sensitive = np.zeros(len(companions), bool)
+    for part in job.parts:
+        counts = part.kernel.table(part.images)["reversals"]
+        sensitive[part.cells] = (companions[part.cells] != counts) & ~part.failed
+    return sensitive
+
+
+def _decided(found: Mapping[str, Array], errors: Errors) -> Array:
+    """Find the counts that are final and certain, shape (cells,)."""
+    firm = (found["sensitive"] == 0) & (found["window_dependent"] == 0) & (found["status"] == SETTLED)
+    below = (found["reversals"] == 0) | (found["margin_fewer"] > DECIDED * errors.overshoot)
+    return np.asarray(firm & below & (found["margin_more"] > DECIDED * errors.nearest_approach))

@@ -60,7 +60,7 @@ def estimate(config: Config) -> str:
 
 
 def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share: float) -> Iterator[Array]:
-    """The work for each cell, in steps of dopri5 alone: for each method, and for the cells run again to verify it."""
+    """The work for each cell, in steps of dopri5 alone: for each method."""
     if not chosen:
         return  # no body of the sample is possible
     relative = 1.0 if config.equations.name in MODELS else _GENERAL
@@ -72,8 +72,3 @@ def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share
         if config.film:
             work += relative * config.film.time[-1] / automatic_step(PLAIN, config.equations, each.columns)[0]
         yield np.resize(work, round(len(work) * share))
-    if config.verify:
-        again = chosen[0]
-        number = math.ceil(config.verify * share * sum(len(each.cells) for each in chosen))
-        step, _ = automatic_step(PLAIN, config.equations, again.columns, config.integrator.tolerance)
-        yield np.resize(2 * config.integrator.patient.t_end / step, number) * relative

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
 
 from sweep.config import Config
 from sweep.engine import final
-from sweep.engine.checks import results, verify
-from sweep.engine.errors import keep_tolerance
+from sweep.engine.errors import keep_tolerance, results
 from sweep.engine.executor import Work
+from sweep.engine.misfits import misfits
 from sweep.engine.plan import plan
 from sweep.engine.repeats import decide_failures
 from sweep.grid import Array, Grid, Tile
@@ -86,21 +86,10 @@ def run_batch(
         decide_failures(part, work, part.method)
     work.after_chunk = partial(save, 1 - first, first)
     errors = keep_tolerance(job, work) if twice else None
-    found = results(job, errors, work)
-    numbers = np.concatenate([grid.first_cell(tiles[i]) + np.arange(grid.part(tiles[i]).size) for i in batch])
-    again = verify(config, numbers, found, work) if config.verify else {}
+    found = results(job, errors) | misfits(job)
     cost = {"seconds": np.array((time.perf_counter() - began) / len(batch)), "cpu": cpu}
     for i, arrays in zip(batch, job.by_grid(found), strict=True):
-        yield i, arrays | _inside(grid, tiles[i], again) | cost
-
-
-def _inside(grid: Grid, tile: Tile, again: Mapping[str, Array]) -> dict[str, Array]:
-    """Of the cells that were run again, those of a tile."""
-    if not again:
-        return {}
-    number = again["verified_cell"] - grid.first_cell(tile)
-    inside = (number >= 0) & (number < grid.part(tile).size)
-    return {name: values[inside] for name, values in again.items()}
+        yield i, arrays | cost
 
 
 def batches(

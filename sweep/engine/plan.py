@@ -149,10 +149,9 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
 
 
 def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
-    """The kernels that run the cells of `chosen`, or all that a run may need, and the one that verifies some cells."""
+    """The kernels that run the cells of `chosen`, or all that a run may need."""
     method = config.integrator.method
     names = [each.method for each in chosen] or (methods.allowed(config.equations) if method == AUTO else [method])
-    names = [*names, methods.PLAIN] if config.verify else names
     return [kernel_of(name, config) for name in dict.fromkeys(names)]
 
 

@@ -76,8 +76,8 @@ class Refined(Some):
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all nodes, in memory."""
-        found, apart = self._gather()
-        words = self._attributes(len(self.cells), apart) | {"simulated_share": len(self.cells) / self.grid.size}
+        found, costs = self._gather()
+        words = self._attributes(len(self.cells), costs) | {"simulated_share": len(self.cells) / self.grid.size}
         return dataset.label(self.config, self.grid, self._arrays(found), words)
 
     def _arrays(self, found: Mapping[str, Array]) -> dict[str, Array]:

@@ -23,7 +23,6 @@ from sweep.engine.cluster import connected, run_tiles
 from sweep.engine.enlarged import RERUN, Earlier, Enlarged, is_whole, reason_against, taken_over
 from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
-from sweep.engine.sampled import Sampled
 from sweep.engine.whole import Whole
 from sweep.grid import Tile
 from sweep.interrupt import deferred, point
@@ -136,10 +135,8 @@ def _compute(
 ) -> Whole:
     if earlier:
         reporter.note(earlier.words)
-    if config.until:
-        result: Whole = Sampled(config, store, earlier)
-    elif earlier:
-        result = Enlarged(config, store, earlier)
+    if earlier:
+        result: Whole = Enlarged(config, store, earlier)
     else:
         # A single cell has no neighbours from which it could be inferred.
         result = Refined(config, store) if config.refine and config.axes else Whole(config, store)

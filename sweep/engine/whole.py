@@ -17,8 +17,8 @@ from sweep.results import dataset, netcdf
 from sweep.results.provenance import provenance
 from sweep.results.store import Store
 
-Apart = dict[str, Array]
-"""What a tile holds apart from the results of its cells: its cost, and the cells that were run again."""
+Cost = dict[str, Array]
+"""What a tile holds apart from the results of its cells: the `seconds` that it took, and the type of `cpu`."""
 
 
 class Whole:
@@ -47,27 +47,28 @@ class Whole:
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset, in memory."""
-        return self._frame(*self._gather())
+        arrays, costs = self._gather()
+        return self._labelled(arrays, costs)
 
     def save(self, path: Path) -> None:
         """Write the labelled dataset, tile by tile; it need not fit into memory.
 
-        Every tile is read twice: the file begins with what the tiles hold apart from their cells.
+        Every tile is read twice: the file begins with what they have cost.
         """
         if self.config.samples:  # a probability is of all samples together
             netcdf.write(path, self.dataset())
             return
-        tails, apart = dict[str, tuple[int, ...]](), list[Apart]()
+        tails, costs = dict[str, tuple[int, ...]](), list[Cost]()
         for _, arrays in self._finished():
             tails |= {name: values.shape[1:] for name, values in arrays.items()}
-            apart.append(apart_from(arrays))
+            costs.append(cost_of(arrays))
         first = dict(zip(self.grid.dims, self.tiles[0], strict=True))
         empty, sizes = dict[str, Array](), dict[str, tuple[int, ...]]()
         for name, (over, spec) in dataset.layout(self.grid, tails).items():
             empty[name] = np.broadcast_to(np.zeros((), spec.dtype), over.shape + tails[name])
             sizes[name] = tuple(first[dim].stop for dim in over.dims) + tails[name]
         pieces = (piece for tile, arrays in self._finished() for piece in dataset.pieces(self.grid, tile, arrays))
-        netcdf.write(path, self._frame(empty, apart), sizes, pieces)
+        netcdf.write(path, self._labelled(empty, costs), sizes, pieces)
 
     def _cut(self, cells: int, tile_size: Callable[[int], int]) -> bool:
         """Simulate so many cases more, in tiles of their own; False if there are none."""
@@ -75,38 +76,35 @@ class Whole:
         self.tiles += [(slice(i, min(i + step, first + cells)),) for i in range(first, first + cells, step)]
         return cells > 0
 
-    def _gather(self) -> tuple[dict[str, Array], list[Apart]]:
-        """Arrays over all simulated cells (or bodies), and what the tiles hold apart from them."""
-        apart: list[Apart] = []
+    def _gather(self) -> tuple[dict[str, Array], list[Cost]]:
+        """Collect arrays over all simulated cells (or bodies), and the costs of the tiles."""
+        costs: list[Cost] = []
 
         def read() -> Iterator[tuple[Tile, dict[str, Array]]]:
             for tile, arrays in self._finished():
-                apart.append(apart_from(arrays))
+                costs.append(cost_of(arrays))
                 yield tile, arrays
 
-        return dataset.assemble(self.simulated().grid, read()), apart
+        return dataset.assemble(self.simulated().grid, read()), costs
 
     def _finished(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
         """Read the tiles one after another, with what each holds."""
         return ((tile, self.store.load(i)) for i, tile in enumerate(self.tiles))
 
-    def _frame(self, arrays: Mapping[str, Array], apart: Sequence[Apart]) -> xr.Dataset:
-        """A dataset of `arrays` with coordinates, attributes, and the cells that were run again."""
-        framed = dataset.label(self.config, self.grid, arrays, self._attributes(self.grid.size, apart))
-        names = dict.fromkeys(name for tile in apart for name in tile if name.startswith("verified_"))
-        again = {name: np.concatenate([tile[name] for tile in apart if name in tile]) for name in names}
-        return dataset.beside(self.config, framed, again) if again else framed
+    def _labelled(self, arrays: Mapping[str, Array], costs: Sequence[Cost]) -> xr.Dataset:
+        """Give `arrays` over all cells their coordinates and attributes."""
+        return dataset.label(self.config, self.grid, arrays, self._attributes(self.grid.size, costs))
 
-    def _attributes(self, cells: int, apart: Sequence[Apart]) -> dict[str, Any]:
+    def _attributes(self, cells: int, costs: Sequence[Cost]) -> dict[str, Any]:
         """Where the numbers of a finished run come from, and what its `cells` have cost."""
-        seconds, cpus = sum(float(tile["seconds"]) for tile in apart), {str(tile["cpu"]) for tile in apart}
+        seconds, cpus = sum(float(tile["seconds"]) for tile in costs), {str(tile["cpu"]) for tile in costs}
         return provenance(self.config, seconds, cells, cpus) | described_impossible(self.config)
 
 
 class Some(Whole):
     """Cells of a configuration that are simulated as a table of cases, which may grow; the others are known otherwise.
 
-    A table of cases has no neighbours, so that it is neither refined nor verified.
+    A table of cases has no neighbours, so that it is not refined.
     """
 
     def __init__(self, config: Config, store: Store) -> None:
@@ -119,7 +117,7 @@ class Some(Whole):
         table = self.grid.take(self.cells)
         constants = {name: self.config.parameters[name] for name in table.constants}
         cases = {name: tuple(values.tolist()) for name, values in table.table.items()}
-        return replace(self.config, refine=0, verify=0.0, parameters=constants, cases=cases, samples=None, until=None)
+        return replace(self.config, refine=0, parameters=constants, cases=cases, samples=None)
 
     def save(self, path: Path) -> None:
         """Write the labelled dataset, which has to fit into memory."""
@@ -140,6 +138,6 @@ class Some(Whole):
             arrays[name][body[cells] if spec.per_body else cells] = found[name]
 
 
-def apart_from(arrays: Mapping[str, Array]) -> Apart:
-    """Pick what the arrays of a tile hold apart from its cells."""
-    return {n: values for n, values in arrays.items() if n in ("seconds", "cpu") or n.startswith("verified_")}
+def cost_of(arrays: Mapping[str, Array]) -> Cost:
+    """Pick the cost of a tile from its arrays."""
+    return {name: arrays[name] for name in ("seconds", "cpu")}

@@ -29,7 +29,7 @@ WORDS = {
 BLANK = ("not_run", "failed", "impossible", "no_value")
 """The kinds of cell without a result to draw."""
 
-_GROWING = {"reversals", "raw_reversals", "reversals_low", "reversals_high", "t_last_reversal", "difference"}
+_GROWING = {"reversals", "raw_reversals", "t_last_reversal", "difference"}
 """What a longer trajectory can only raise; of the difference, the simulated part."""
 
 _PER_VARIABLE = {

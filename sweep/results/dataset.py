@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from enum import IntEnum
 from typing import Any
 
@@ -79,7 +78,7 @@ VARIABLES: dict[str, Variable] = {
     "spin_error": Variable("float64", SPIN, "estimated error of the final spin", of_sound_runs=True),
     "sensitive": _flag(
         "is the count sensitive?", {0: "firm", 1: "sensitive"},
-        "Whether other steps, or starts 1e-10 apart, give another number of reversals.", of_sound_runs=True,
+        "Whether other steps give another number of reversals.", of_sound_runs=True,
     ),
     "decided": _flag(
         "is the count certain?", {0: "open", 1: "decided"},
@@ -124,22 +123,6 @@ VARIABLES: dict[str, Variable] = {
     "critical_reason": _flag("why a critical spin is missing", REASONS,
                              "First of the four reasons that is not exists.", per_body=True),
 }  # fmt: skip
-
-
-def _again(name: str) -> Variable:
-    return replace(VARIABLES[name], long_name=f"{VARIABLES[name].long_name}; second run", description="")
-
-
-VERIFIED: dict[str, Variable] = {
-    "verified_cell": Variable("int64", NUMBER, "cell run again", "Index of the cell in the C order of the axes."),
-    **{
-        f"verified_{name}": _again(name)
-        for name in ("reversals", "t_last_reversal", "spin_final", "status", "energy_error", "step")
-    },
-    "verified_spin_difference": Variable("float64", SPIN, "difference in spin between the two runs"),
-    "verified_count_changed": _flag("do the two runs count other reversals?", {0: "no", 1: "yes"}),
-}
-"""The variables over the cells that were run again."""
 
 
 def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
@@ -197,7 +180,7 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
 
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
     """Raise a `ConfigError` if a parameter has the name of a variable, or of one of these `series`."""
-    own = {*VARIABLES, *PROBABILITIES, *ROWS, *VERIFIED, *series}
+    own = {*VARIABLES, *PROBABILITIES, *ROWS, *series}
     names = own & set(config.tier.parameters)
     if names:
         words = f"parameter {min(names)}: is reserved for a variable of the dataset; rename it"
@@ -232,16 +215,6 @@ def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, A
         for name, place, values in pieces(grid, tile, arrays):
             whole[name][place] = values
     return whole
-
-
-def beside(config: Config, result: xr.Dataset, again: Mapping[str, Array]) -> xr.Dataset:
-    """`result`, with the results of a second run of some cells (`again`) along the dimension `verified`."""
-    result = result.assign(variables(VERIFIED, ["verified"], again, config.units))
-    if "verified_count_changed" in again:
-        result.attrs["verified_counts_changed"] = int(again["verified_count_changed"].sum())
-    if "verified_spin_difference" in again:
-        result.attrs["verified_largest_spin_difference"] = float(again["verified_spin_difference"].max())
-    return result
 
 
 def variables(

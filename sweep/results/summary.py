@@ -162,14 +162,6 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         rule, step = (np.ravel(dataset[name].values)[status != IMPOSSIBLE] for name in ("step_rule", "step"))
         who = ", ".join(f"{name} in {(rule == code).sum()}" for code, name in STEP_RULES.items() if code in rule)
         yield f"step: {step.min():.3g} to {step.max():.3g}, set by {who} cells"
-    if "verified_cell" in dataset:
-        changed = dataset.attrs.get("verified_counts_changed")
-        counts = f"{changed} counts changed, " if changed is not None else ""
-        spin = dataset.attrs.get("verified_largest_spin_difference")
-        found = (
-            f"{counts}the largest difference in spin is {spin:.1e}" if spin is not None else "none of them to its end"
-        )
-        yield f"verified: {dataset.sizes['verified']} cells run again with finer steps: {found}"
     if "wall_time" in dataset.attrs:
         seconds, rate = dataset.attrs["wall_time"], dataset.attrs["trajectories_per_second"]
         yield f"cost: {seconds:.3g} s, {rate:.3g} trajectories/s"

@@ -22,6 +22,7 @@ from scipy.stats import qmc
 from sweep.config import Config, ConfigError, Values
 from sweep.config.cross_checks import misplaced
 from sweep.config.film import Film
+from sweep.ended import ended
 from sweep.faults import brief, fault_of, suggestion
 from sweep.grid import BODY, Array
 from sweep.interrupt import deferred
@@ -101,6 +102,8 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
     if not free:
         raise fault_of(f"name the free parameters, out of {', '.join(known)}")
     for name in free:
+        if name not in known and (words := ended(name)):
+            raise fault_of(words, name)
         if name not in known:
             message = f"{brief(name)} is no parameter of the {config.tier.name} model{suggestion(name, known)}"
             raise fault_of(f"{message}; free may be {', '.join(known)}")

@@ -63,7 +63,7 @@ def designed(config: Config) -> Config:
     mixed = [np.where(np.arange(len(known)) == i, second, first) for i in range(len(known))]
     chance = np.concatenate([first, second, *mixed])
     cases = {name: tuple(each.at(chance[:, i]).tolist()) for i, (name, each) in enumerate(known.items())}
-    return replace(config, cases=cases, samples=len(chance), verify=0.0)
+    return replace(config, cases=cases, samples=len(chance))
 
 
 class Indices(Study):

@@ -16,7 +16,7 @@ import xarray as xr
 
 from sweep.config import Config, ConfigError
 from sweep.engine.errors import ROUND_OFF
-from sweep.engine.whole import Apart, Whole, apart_from
+from sweep.engine.whole import Cost, Whole, cost_of
 from sweep.faults import either
 from sweep.grid import Array
 from sweep.kernels.measures import default
@@ -39,7 +39,7 @@ def measuring(config: Config) -> Config:
     usual = default(config.equations)
     measure = tuple(spec for spec in usual if spec in _NEEDED or spec in config.measure)
     integrator = config.integrator.model_copy(update={"stop_when_settled": True})
-    return replace(config, measure=measure, verify=0.0, repeats=False, refine=0, integrator=integrator)
+    return replace(config, measure=measure, repeats=False, refine=0, integrator=integrator)
 
 
 def require_certain(config: Config) -> None:
@@ -78,8 +78,8 @@ class Search(Study):
         """That of the cells that were asked for last."""
         self.estimates = False
         """Whether their errors are estimated."""
-        self.apart: list[Apart] = []
-        """What the tiles that the search has learned from hold apart from their cells."""
+        self.costs: list[Cost] = []
+        """Those of the tiles that the search has learned from."""
 
     @abstractmethod
     def ask(self) -> Mapping[str, Array]:
@@ -100,10 +100,10 @@ class Search(Study):
     def grow(self, tile_size: Callable[[int], int]) -> bool:
         """Add the cells to simulate next, judging by all results so far; False if the search has ended."""
         if self.tiles:
-            new = [self.store.load(i) for i in range(len(self.apart), len(self.tiles))]
-            self.apart += map(apart_from, new)
+            new = [self.store.load(i) for i in range(len(self.costs), len(self.tiles))]
+            self.costs += map(cost_of, new)
             self.learn(
-                {name: np.concatenate([tile[name] for tile in new]) for name in new[0].keys() - {*self.apart[0]}}
+                {name: np.concatenate([tile[name] for tile in new]) for name in new[0].keys() - {*self.costs[0]}}
             )
         asked = self.ask()
         cells = len(next(iter(asked.values())))
@@ -119,4 +119,4 @@ class Search(Study):
         """The attributes of a dataset: how exact it is, where it comes from, what it has cost."""
         simulations = self.tiles[-1][0].stop if self.tiles else 0
         exact = {"relative_width": self.width, "bracket_tolerance": self.sharp(self.width), "trajectories": simulations}
-        return exact | self._attributes(simulations, self.apart)
+        return exact | self._attributes(simulations, self.costs)

@@ -16,8 +16,7 @@ from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.schema import FOREVER
 from sweep.config.values import numbers_of
 from sweep.engine import executor, final
-from sweep.engine.checks import results
-from sweep.engine.errors import keep_tolerance
+from sweep.engine.errors import keep_tolerance, results
 from sweep.engine.executor import UNTIL_ALL_STOP, Work, nominal_seconds
 from sweep.engine.plan import plan, steps_of
 from sweep.engine.repeats import decide_failures
@@ -176,7 +175,7 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     final.settle(part)
     times = _times(kernel, images, every or _intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
-    (found,) = job.by_grid(results(job, errors, work))
+    (found,) = job.by_grid(results(job, errors))
     labelled = dataset.label(chosen, grid, found, provenance(chosen, time.perf_counter() - began, grid.size))
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(grid.size), {"long_name": "trajectory"})

@@ -97,26 +97,6 @@ def test_wrong_columns_of_cases_are_refused(columns: dict[str, Any], said: str) 
     assert len(refusal.value.faults) == 1
 
 
-def test_cases_of_a_parquet_file(write: Write, tmp_path: Path) -> None:
-    columns = {"mu": [60.0, 130.0], "n0": [0.05, -0.02]}
-    pandas.DataFrame(columns).to_parquet(tmp_path / "cells.parquet")
-    config = load_config(write(CASES.replace(".csv", ".parquet")))
-    assert config.cases == {name: tuple(values) for name, values in columns.items()}
-    pandas.DataFrame({"mu": [60.0, None], "n00": [1, 2]}).to_parquet(tmp_path / "cells.parquet")
-    with pytest.raises(ConfigError) as refusal:
-        load_config(write(CASES.replace(".csv", ".parquet")))
-    assert [f"{fault}".removeprefix(f"{tmp_path}/") for fault in refusal.value.faults] == [
-        "cells.parquet: mu[1]: must be a finite number >= 0 and < 1e+12, not nan",
-        "cells.parquet: n00: unknown parameter (did you mean n0?); the parameters are " + ", ".join(config.table),
-    ]
-    for wrong, words in ((b"mu\n60\n", "not a readable Parquet file"), (None, "No such file or directory")):
-        (tmp_path / "cells.parquet").unlink()
-        if wrong:
-            (tmp_path / "cells.parquet").write_bytes(wrong)
-        with pytest.raises(ConfigError, match=rf"small.yaml:2:8: cases: .*cells.parquet: {words}"):
-            load_config(write(CASES.replace(".csv", ".parquet")))
-
-
 def test_cases(write: Write, tmp_path: Path) -> None:
     (tmp_path / "cells.csv").write_text("mu, b,n0\n60,3,0.05\n1e2,2.5,-0.02\n\n", encoding="utf-8")
     config = load_config(write(CASES))

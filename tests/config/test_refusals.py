@@ -107,9 +107,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     ("- 1\n- 2\n", 1, "", "a configuration is a mapping of keys to values"),
     ("", 1, "", "a configuration is a mapping of keys to values"),
     (SMALL + "---\nname: b\n", 6, "", "not YAML"),
-    ("model: analytic\nfriction: {mu: 60}\nverify: 0.1\n", 3, "verify", "the analytic model takes no steps to be verified; set it to 0"),
     *((SMALL + f"refine: {n}\n", 6, "refine", f"must be a whole number >= 0 and <= 24, not {n}") for n in (-1, 1.5, 25)),
-    (SMALL + "refine: 2\nverify: 0.1\n", 7, "verify", "cannot be combined with refine; set it to 0"),
     (SMALL + "refine: 2\nmeasure: [energy_error]\n", 7, "measure", "must have reversals, on which refine depends"),
     ("model: analytic\nfriction: {mu: [40, 60]}\nrefine: 2\n", 3, "refine", "is a formula; set it to 0"),
     ("friction: {mu: {start: 1, stop: 2, num: 5000}}\nbody: {b: {start: 2, stop: 3, num: 5000}}\nrefine: 1\n", 3, "refine", "keep to 16777216"),
@@ -123,9 +121,6 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (drawn("{normal: [0.05, 0.01]}", "samples: 32\nrefine: 2"), 7, "refine", "cannot be combined with samples"),
     ("cases: {mu: [60]}\nstart: {n0: {normal: [0.05, 0.01]}}\n", 2, "start.n0", "cannot be a distribution beside cases"),
     (drawn("{normal: [0.05, 0.01]}", "samples: 0"), 6, "samples", "must be a whole number >= 1 and <= 1000000, not 0"),
-    (drawn("0.05", "until: 0.1"), 6, "until", "needs a parameter that is a distribution"),
-    (drawn("{normal: [0.05, 0.01]}", "until: 0.1\nmeasure: [energy_error]"), 7, "measure", "must have reversals, on which until depends"),
-    (drawn("{normal: [0.05, 0.01]}", "until: 0.5"), 6, "until", "a number >= 0.001 and < 0.5"),
     # Beyond the paper: bodies, friction, starts and units.
     (stone(("1.7e-3", "1.9e-3")), 4, "body", "none of the principal ones may exceed the sum"),
     (stone(("Ixy: -2.0e-5", "Ixy: 6.0e-4")), 4, "body", "not positive definite"),
@@ -253,7 +248,6 @@ def test_broken_cases(table: str, place: str, said: str, write: Write, tmp_path:
         ("body: {b: [1, 2]}\n", r"small\.yaml:4:8: body\.b: cannot be an axis beside cases"),
         ("model: averaged\n", "column mu: must be > 0 for the averaged model"),
         ("samples: 5\n", "samples: needs a parameter that is a distribution"),
-        ("until: 0.05\n", "until: needs a parameter that is a distribution"),
     ],
 )
 def test_what_cannot_stand_beside_cases_is_refused(beside: str, said: str, write: Write, tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ def _many_tiles() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def config(kept: Write) -> Path:
-    return kept(SMALL + "verify: 0.3\n")
+    return kept(SMALL)
 
 
 @pytest.fixture(scope="module")

@@ -56,10 +56,8 @@ FEWER = by("dopri5", ONE) + "measure: [reversals]\n"
 GROWN = {
     "more": (ONE, MORE, "12 of 24"),
     "later": (ONE, LATER, ANY),
-    "verified": (ONE, LATER + "verify: 0.3\n", ANY),
     "more, dopri5": (by("dopri5", ONE), by("dopri5", MORE), "12 of 24"),
     "later, dopri5": (by("dopri5", ONE), by("dopri5", LATER), ANY),
-    "verified, dopri5": (by("dopri5", ONE), by("dopri5", LATER) + "verify: 0.3\n", ANY),
     "measured": (by("adams", ONE) + MEASURED, by("adams", MORE) + MEASURED, "12 of 24"),
     "measured further": (FEWER, FEWER.replace("[reversals]", "[reversals, first_reversal]"), "0 of 12"),
     "single": (SINGLE, SINGLE.replace("100", "300"), "0 of 1"),

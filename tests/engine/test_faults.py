@@ -26,7 +26,7 @@ from support.processes import python
 from support.runs import same_numbers
 from support.same import contents, without_clock
 
-TEXT = SMALL + "verify: 0.3\n"
+TEXT = SMALL
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +158,6 @@ body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e
 friction: {law: coulomb, mu: [0.2, 0.5], regularisation: tanh, speed: 0.02, sigma: [5.0e-5, 1.0e-4]}
 start: {roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 4, 5], slip1: 0.05}
 integrator: {t_end: 12}
-verify: 0.3
 """
 """Any body and any law of friction."""
 

@@ -83,12 +83,12 @@ def test_a_run_that_settles_at_its_first_look_is_decided() -> None:
 )
 def test_shipped_configurations_end_decided(name: str) -> None:
     """Of the others, three are of nearly round bodies too, two go to a published time, and two reverse for ever."""
-    found = sweep.run(ROOT / "configs" / f"{name}.yaml", verify=0.0)
+    found = sweep.run(ROOT / "configs" / f"{name}.yaml")
     assert float(found.decided.mean()) >= 0.98
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", ["b", "quick"])
 def test_nearly_round_bodies_have_settled_in_the_end(name: str) -> None:
-    found = sweep.run(ROOT / "configs" / f"{name}.yaml", verify=0.0, estimate_errors=False)
+    found = sweep.run(ROOT / "configs" / f"{name}.yaml", estimate_errors=False)
     assert (found.status == SETTLED).all()

@@ -13,7 +13,7 @@ from scipy import stats
 from support import Write
 from support.cli import invoke, refused
 from support.figures import maps
-from support.runs import Heard, Stop, same_numbers
+from support.runs import Heard, same_numbers
 
 import sweep
 from sweep.config.distributions import Distribution, drawn
@@ -120,42 +120,6 @@ def test_more_samples_take_over_the_fewer(write: Write, tmp_path: Path) -> None:
     assert sweep.load_config(write(found.attrs["config"])).samples == 48
 
 
-def widest(dataset: xr.Dataset) -> float:
-    """Half of the widest interval."""
-    return float((dataset["probability_high"] - dataset["probability_low"]).max() / 2)
-
-
-def test_sampling_stops_when_every_probability_is_known_so_closely(write: Write, tmp_path: Path) -> None:
-    sparing, reporter = write(SCENE.replace("samples: 32", "until: 0.1\nverify: 0.05")), Heard()
-    found = sweep.run(sparing, tmp_path, reporter=reporter)
-    assert found.sizes["sample"] == 128
-    assert widest(found) <= 0.1 < widest(sweep.run(sparing, until=None, samples=64))
-    whole = sweep.run(sparing, until=None, samples=128, verify=0.0)
-    same_numbers(found.drop_vars([name for name in found.variables if "verified" in str(name)]), whole)
-    b, sample = np.divmod(found["verified_cell"].values, 128)
-    np.testing.assert_array_equal(found["verified_reversals"], found["reversals"].values[b, sample])
-    closer = sweep.run(sparing, tmp_path, until=0.06, reporter=reporter)
-    assert reporter.notes[-1].startswith("256 of 1024 cells are taken over")
-    assert closer.sizes["sample"] == 256
-    assert widest(closer) <= 0.06
-    assert (
-        sweep.run(sparing, tmp_path, until=0.2, samples=512, reporter=reporter).sizes["sample"] == 256
-    )  # none is lost
-
-
-def test_samples_end_at_their_number_however_wide_the_intervals_are(write: Write) -> None:
-    found = sweep.run(write(SCENE + "until: 0.001\n"), samples=80)
-    assert found.sizes["sample"] == 80
-    same_numbers(found, sweep.run(write(SCENE), samples=80))
-
-
-def test_an_interrupted_round_goes_on(write: Write, tmp_path: Path) -> None:
-    sparing = write(SCENE.replace("samples: 32", "until: 0.1"))
-    with pytest.raises(KeyboardInterrupt):
-        sweep.run(sparing, tmp_path, reporter=Stop(3))
-    same_numbers(sweep.run(sparing, tmp_path), sweep.run(sparing))
-
-
 def test_trajectories_of_samples_are_those_of_the_run_and_drawn_as_bands(write: Write) -> None:
     scene = write(SCENE)
     found = sweep.run(scene, samples=5)
@@ -199,7 +163,6 @@ def test_tiles_cells_and_bodies_of_a_grid_with_a_table(
     assert [len(values) for values in columns.values()] == [grid.size] * len(columns)
     assert len(set(zip(*columns.values(), strict=True))) == grid.size
     tiles = grid.tiles(3)
-    assert [grid.first_cell(tile) for tile in tiles] == list(np.cumsum([0, *[grid.part(t).size for t in tiles]])[:-1])
     for name, values in columns.items():
         np.testing.assert_array_equal(np.concatenate([grid.part(tile).columns()[name] for tile in tiles]), values)
         np.testing.assert_array_equal(grid.take(np.arange(grid.size)[::-1]).columns()[name], values[::-1])

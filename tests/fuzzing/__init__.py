@@ -101,7 +101,7 @@ def yaml_bytes(random: Random, folder: Path) -> bool:
 
 def setting(random: Random, folder: Path) -> bool:
     """`--set PATH=VALUE`, alone or several."""
-    paths = (*PARAMETERS, "friction.mu", "body.a", "integrator.step", "step", "t_end", "verify", "measure", "cases",
+    paths = (*PARAMETERS, "friction.mu", "body.a", "integrator.step", "step", "t_end", "measure", "cases",
              "name", "model", "integrator", "friction", "mu.start", "name.x", ".", "a..b", *KEYS)  # fmt: skip
     given = []
     for _ in range(random.choice((1, 1, 2))):
@@ -128,7 +128,7 @@ def mapping(random: Random, folder: Path) -> bool:  # noqa: ARG001
     """Values from Python, as a mapping and as overrides."""
     said: dict[str, Any] = {"friction": {"mu": 60}}
     if random.random() < 0.5:
-        said |= {random.choice(("body", "start", "model", "verify", "mu", "a b")): random.choice(LEAVES)}
+        said |= {random.choice(("body", "start", "model", "mu", "a b")): random.choice(LEAVES)}
     given = {random.choice(sorted(PATHS.keys() - {"cases"})): random.choice(LEAVES) for _ in range(random.randrange(3))}
     return _refused(lambda: load_config(said, given), "") is not None
 
@@ -220,7 +220,7 @@ def dry_run(random: Random, folder: Path) -> bool:
 
 def foreign(random: Random, folder: Path) -> bool:
     """A dataset of another program, whose variables may have the same names as ours."""
-    names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step", "verified_cell",
+    names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step",
              "wall_time", "spin_final", "form_factor", "b", "mu", "temperature")  # fmt: skip
     dims = {"b": 6, "mu": random.choice((0, 1, 7)), "time": random.choice((0, 3, 20)), "lat": 2}
     odd: dict[str, Any] = {

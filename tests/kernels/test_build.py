@@ -44,7 +44,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
 
 
 def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...]]) -> None:
-    measure = ("reversals", "sensitivity=3", "resting_spin")
+    measure = ("reversals", "resting_spin")
     build(kernel(method, measure=measure) for method in ("adams", "dopri5", "adams"))
     assert started == [
         ("kernel", "adams", "slip", "reversals"),
@@ -117,7 +117,7 @@ def test_measurements_without_a_place_in_the_kernel_share_it() -> None:
         return str(kernel(measure=measure).advancing._cache._cache_file._index_name)
 
     alone = name("reversals")
-    assert name("reversals", "resting_spin", "sensitivity=2") == alone
+    assert name("reversals", "resting_spin") == alone
     for other in ("first_reversal", "energy_error", "raw_reversals", "reversal_times=3", "noise_limited"):
         assert name("reversals", other) != alone
 

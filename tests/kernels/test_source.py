@@ -14,7 +14,7 @@ from sweep.kernels import source
 from sweep.models.ladder import slip
 from sweep.models.stiff import slip as stiff_slip
 
-SCENE = {"body": {"b": 3.0}, "friction": {"mu": 60.0}, "start": {"n0": [0.05, -0.02]}, "verify": 0}
+SCENE = {"body": {"b": 3.0}, "friction": {"mu": 60.0}, "start": {"n0": [0.05, -0.02]}}
 
 DEBUGGED = """
 import bdb, json, sys

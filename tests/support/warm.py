@@ -6,7 +6,7 @@ from pathlib import Path
 from support import nursery  # noqa: F401
 from sweep.cli import main
 
-TEXT = "body: {b: [2, 3]}\nfriction: {mu: [50, 60]}\nintegrator: {t_end: 5}\nverify: 1\n"
+TEXT = "body: {b: [2, 3]}\nfriction: {mu: [50, 60]}\nintegrator: {t_end: 5}\n"
 
 with tempfile.TemporaryDirectory() as folder:
     (Path(folder) / "warm.yaml").write_text(TEXT, encoding="utf-8")

@@ -16,12 +16,11 @@ from sweep.kernels.measures.raw_reversals import RawReversals
 from sweep.kernels.measures.resting_spin import RestingSpin
 from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
-from sweep.kernels.measures.sensitivity import Sensitivity
 from sweep.models.model import Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
-    Reversals, EnergyError, Margin, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Sensitivity,
-    Cycles, Lyapunov, Misfit,
+    Reversals, EnergyError, Margin, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Cycles,
+    Lyapunov, Misfit,
 )  # fmt: skip
 
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}
