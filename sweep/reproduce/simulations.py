@@ -33,7 +33,6 @@ def configure(
         "friction": {"mu": 60.0},
         "integrator": {"t_end": t_end},
         **({} if measure is None else {"measure": [name for name in measure if name in possible(tier)]}),
-        "verify": 0.0,
         "max_failed_fraction": 1.0,
     }
     return load_config(settings, {name: values for name, values in parameters.items() if name in tier.parameters})
