@@ -24,17 +24,16 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from reversals import T_END, Means, window_and_ripple
+from benchmark_references import UNIT, window_of
+from reversals import T_END, Means
 from tracing import taylor_system
 
-from sweep.models import ellipsoid
 from sweep.models.ladder import slip
 from sweep.models.model import Array, stack
 from sweep.models.theory import linear
 from sweep.parameters import PAPER_PARAMETERS
 
 SEED, CELLS = 20250500, 500
-UNIT = 2.0**-100
 
 TOLERANCE, OTHER_TOLERANCE, EXTENDED_TOLERANCE = 1e-16, 1e-15, 1.1e-19
 NUDGE = 1 + 1e-9
@@ -119,24 +118,16 @@ class Run(Means):
         return min(self.window / 2 * (len(self.integrals) - 1), T_END)
 
 
-def one_window_and_ripple(columns: dict[str, Array]) -> tuple[float, Array]:
-    """The window, and K11, K12, K21, K22, of a body."""
-    A11, A12, A22, A33 = (float(column[0]) for column in ellipsoid.shape(columns))
-    inertia = np.array([float(moment[0]) for moment in ellipsoid.inertia(columns)])
-    window, K = window_and_ripple(np.array([[A11, A12, 0], [A12, A22, 0], [0, 0, A33]]), inertia)
-    return window, K.ravel()
-
-
 def follow(cell: Cell, integrator: Any, real: Any) -> Run:
     """Integrate a cell to its end."""
     columns = {name: np.array([real(value)]) for name, value in cell.items()}
-    window, ripple = one_window_and_ripple(columns)
+    window, K = window_of(cell)
     constants = stack(slip.Constants.of(columns))[:, 0]
     states = np.append(stack(slip.start(columns))[:, 0] / SCALE, real(0))
     run, steps = Run(window), np.arange(WINDOWS * SAMPLES + 1) / real(SAMPLES) * window
     while run.status == "running":
         integrator.time = real(0)
-        integrator.state[:], integrator.pars[:] = states, [*constants, *ripple]
+        integrator.state[:], integrator.pars[:] = states, [*constants, *K.ravel()]
         path = np.asarray(integrator.propagate_grid(steps)[-1])
         look(run, path, constants)
         states = np.append(path[-1, :-1], real(0))
