@@ -25,13 +25,11 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from reference_spins import Extended, Rhs, first_times, problem, radau_path
+from reference_spins import Case, Extended, Rhs, first_times, problem, radau_path
 from reversals import Means, window_and_ripple
 
 from sweep.models import find
 from sweep.models.model import Array
-
-Case = dict[str, float]
 
 FOLDER = Path(__file__).parents[1] / "data" / "benchmark"
 sys.path.append(str(FOLDER))

@@ -15,8 +15,8 @@ times make a curve.  The errors are measured, whatever was asked for.
 The time of a run begins with arrays of parameters and ends with the spins at T; constants, starts and steps are part
 of it.  Compilation is not.  All tools run in double precision on two processors and take turns, so that other work on
 the machine affects all alike.  Tools that would take too long get fewer of the bodies, evenly spread, and are compared
-by the time of one trajectory.  The error is that of the spin at T, the largest over eight of the bodies (as many of
-them as a tool runs), against the Taylor series in 80-bit arithmetic of `reference_spins.py`.
+by the time of one trajectory.  The error is that of the spin at T, the largest over eight of the bodies or more (as
+many of them as a tool runs), against the Taylor series in 80-bit arithmetic of `reference_spins.py`.
 
     pip install -e .[peers]
     python scripts/peers.py [--mu 60 200 1000] [--bodies 1024] [--repeats 5] [--output FOLDER]
@@ -64,7 +64,7 @@ MOST_STEPS = 100_000_000
 """For numbalsoda, which needs a limit."""
 
 COMPARED = 8
-"""Bodies whose errors are computed."""
+"""Bodies whose errors are computed, at least."""
 
 OURS = (1e-4, 1e-6, 1e-8, 1e-10)
 """Tolerances of sweep's runs; the others' are such that the errors cover the same range."""
@@ -101,9 +101,10 @@ Setting = tuple[str, str, Solve]
 """The names of a tool and of a setting, and what runs it."""
 
 
-def spin(states: Array, constants: Array) -> Array:
-    """Spins of states of shape (states, bodies)."""
-    return np.asarray(MODEL.rhs(states, MODEL.constants(*constants))[1][0])
+def from_states(solve: Callable[[Array, Array], Array], problem: Problem) -> Array:
+    """Spins at T by a tool that turns states at t = 0, shape (states, bodies), and constants into states at T."""
+    states, constants = problem.start()
+    return np.asarray(MODEL.rhs(solve(states, constants), MODEL.constants(*constants))[1][0])
 
 
 # --- the tools --------------------------------------------------------------------------------
@@ -134,14 +135,14 @@ def heyoka_settings() -> Iterator[Setting]:
             system, state=np.zeros((N_STATES, size)), pars=np.ones((N_CONSTANTS, size)), tol=tolerance, fast_math=True
         )
         integrators = [original, *(copy.copy(original) for _ in range(THREADS - 1))]
-        yield "heyoka batch", f"tol={tolerance:g} batch={size}", partial(heyoka_run, integrators, size)
+        solve = partial(heyoka_run, integrators, size)
+        yield "heyoka batch", f"tol={tolerance:g} batch={size}", partial(from_states, solve)
 
 
-def heyoka_run(integrators: list[Any], size: int, problem: Problem) -> Array:
+def heyoka_run(integrators: list[Any], size: int, states: Array, constants: Array) -> Array:
     """Every second batch in each of two threads; the last batch is filled up with copies of the last body."""
-    states, constants = problem.start()
-    ends = np.empty_like(states)
-    batches = np.minimum(np.arange(problem.size + -problem.size % size), problem.size - 1).reshape(-1, size)
+    ends, bodies = np.empty_like(states), states.shape[1]
+    batches = np.minimum(np.arange(bodies + -bodies % size), bodies - 1).reshape(-1, size)
 
     def run_share(share: int) -> None:
         integrator = integrators[share]
@@ -153,7 +154,7 @@ def heyoka_run(integrators: list[Any], size: int, problem: Problem) -> Array:
 
     with ThreadPoolExecutor(THREADS) as pool:
         list(pool.map(run_share, range(THREADS)))  # which raises what a thread has raised
-    return spin(ends, constants)
+    return ends
 
 
 def numbalsoda_settings() -> Iterator[Setting]:
@@ -164,7 +165,8 @@ def numbalsoda_settings() -> Iterator[Setting]:
     ):  # fmt: skip
         solve_all = numbalsoda_loop(solver)
         for rtol in tolerances:
-            yield f"numbalsoda {method}", f"rtol={rtol:g}", partial(numbalsoda_run, solve_all, rtol)
+            solve = partial(solve_all, rtol)
+            yield f"numbalsoda {method}", f"rtol={rtol:g}", partial(from_states, solve)
 
 
 def numbalsoda_loop(solver: Any) -> Any:
@@ -183,30 +185,24 @@ def numbalsoda_loop(solver: Any) -> Any:
     address = slopes.address
 
     @numba.njit(parallel=True)
-    def solve_all(starts: Array, constants: Array, rtol: float) -> Array:
+    def solve_all(rtol: float, starts: Array, constants: Array) -> Array:
         ends = np.empty_like(starts)
-        for i in numba.prange(len(starts)):
-            found, arrived = solver(
-                address, starts[i], np.array([0.0, T_END]), constants[i], rtol, rtol * RTOL_TO_ATOL, MOST_STEPS
-            )
-            ends[i] = found[-1] if arrived else np.nan
+        for i in numba.prange(starts.shape[1]):
+            start, p = starts[:, i].copy(), constants[:, i].copy()
+            found, arrived = solver(address, start, np.array([0.0, T_END]), p, rtol, rtol * RTOL_TO_ATOL, MOST_STEPS)
+            ends[:, i] = found[-1] if arrived else np.nan
         return ends
 
     solve_all.keep = slopes  # or its code would be freed
     return solve_all
 
 
-def numbalsoda_run(solve_all: Any, rtol: float, problem: Problem) -> Array:
-    states, constants = problem.start()
-    return spin(solve_all(states.T.copy(), constants.T.copy(), rtol).T, constants)
-
-
 def diffrax_settings() -> Iterator[Setting]:
     for rtol in TSIT5:
-        yield "diffrax Tsit5", f"rtol={rtol:g}", diffrax_run(rtol)
+        yield "diffrax Tsit5", f"rtol={rtol:g}", partial(from_states, diffrax_solver(rtol))
 
 
-def diffrax_run(rtol: float) -> Solve:
+def diffrax_solver(rtol: float) -> Callable[[Array, Array], Array]:
     import diffrax
     import jax
     import jax.numpy as jnp
@@ -223,19 +219,15 @@ def diffrax_run(rtol: float) -> Solve:
         ).ys[0]  # fmt: skip
 
     # In one call: two Python threads with half the trajectories each are no faster.
-    solve_all = jax.jit(jax.vmap(solve))
-
-    def run(problem: Problem) -> Array:
-        states, constants = problem.start()
-        return spin(np.asarray(solve_all(jnp.asarray(states.T), jnp.asarray(constants.T))).T, constants)
-
-    return run
+    solve_all = jax.jit(jax.vmap(solve, in_axes=1, out_axes=1))
+    return lambda states, constants: np.asarray(solve_all(jnp.asarray(states), jnp.asarray(constants)))
 
 
 def scipy_settings() -> Iterator[Setting]:
     for method, tolerances in (("DOP853", DOP853), ("LSODA", LSODA)):
         for rtol in tolerances:
-            yield f"SciPy {method}, 1 process", f"rtol={rtol:g}", partial(scipy_run, method, rtol)
+            solve = partial(scipy_run, method, rtol)
+            yield f"SciPy {method}, 1 process", f"rtol={rtol:g}", partial(from_states, solve)
 
 
 @cache
@@ -250,16 +242,15 @@ def compiled_rhs() -> Any:
     return slopes
 
 
-def scipy_run(method: str, rtol: float, problem: Problem) -> Array:
+def scipy_run(method: str, rtol: float, states: Array, constants: Array) -> Array:
     from scipy.integrate import solve_ivp
 
-    states, constants = problem.start()
     tolerances = {"rtol": rtol, "atol": rtol * RTOL_TO_ATOL}
     ends = [
         solve_ivp(compiled_rhs(), (0, T_END), y, method, t_eval=[T_END], args=(p,), **tolerances).y[:, -1]
         for y, p in zip(states.T.copy(), constants.T.copy(), strict=True)
     ]
-    return spin(np.array(ends).T, constants)
+    return np.array(ends).T
 
 
 TOOLS: dict[str, tuple[Callable[[], Iterator[Setting]], float]] = {
@@ -300,7 +291,7 @@ def affordable(problem: Problem, most: float) -> Problem:
 
 def prepare(problem: Problem) -> list[Entry]:
     """Entries of the installed tools, compiled by an untimed run, which also gives their errors."""
-    reference, entries = problem.every(problem.size // COMPARED), list[Entry]()
+    reference, entries = problem.every(max(1, problem.size // COMPARED)), list[Entry]()
     cases = [FIXED | {"b": b, "mu": problem.mu} for b in reference.b.tolist()]
     exact = np.array([float(taylor_spins(MODEL, case, Extended, EXTENDED_TOLERANCE)[-1]) for case in cases])
     for module, (settings, most) in TOOLS.items():
@@ -382,12 +373,10 @@ def draw(path: Path, found: dict[float, list[Entry]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--mu", type=float, nargs="+", default=[60.0, 200.0, 1000.0])
-    parser.add_argument("--bodies", type=int, default=1024, help=f"a multiple of {COMPARED}")
+    parser.add_argument("--bodies", type=int, default=1024)
     parser.add_argument("--repeats", type=int, default=5, help="timed runs of each quick entry")
     parser.add_argument("--output", type=Path, default=Path("runs/peers"), help="folder for peers.csv and peers.png")
     options = parser.parse_args()
-    if options.bodies < COMPARED or options.bodies % COMPARED:
-        parser.error(f"--bodies must be a multiple of {COMPARED}, not {options.bodies}")
     if hasattr(os, "sched_setaffinity"):  # XLA cannot be limited to some of the processors otherwise.
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
     numba.set_num_threads(THREADS)

@@ -24,7 +24,7 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from benchmark_references import UNIT, window_of
+from benchmark_references import UNIT, Case, window_of
 from reversals import T_END, Means
 from tracing import taylor_system
 
@@ -59,10 +59,7 @@ RATTLE = [i for i in range(len(slip.MODEL.states)) if i != SPIN]
 SCALE = np.array([1.0 if i == SPIN else UNIT for i in range(len(slip.MODEL.states))])
 
 
-Cell = dict[str, float]
-
-
-def draw() -> list[Cell]:
+def draw() -> list[Case]:
     """The sample, in units of c and sqrt(c/g); written with six digits."""
     random = np.random.default_rng(SEED)
     drawn = {
@@ -118,7 +115,7 @@ class Run(Means):
         return min(self.window / 2 * (len(self.integrals) - 1), T_END)
 
 
-def follow(cell: Cell, integrator: Any, real: Any) -> Run:
+def follow(cell: Case, integrator: Any, real: Any) -> Run:
     """Integrate a cell to its end."""
     columns = {name: np.array([real(value)]) for name, value in cell.items()}
     window, K = window_of(cell)
@@ -236,7 +233,7 @@ def differ(one: Run, other: Run, tolerance: float) -> bool:
     return abs(one.last_reversal() - other.last_reversal()) > tolerance * other.last_reversal()
 
 
-def row(cell: Cell, runs: list[Run]) -> dict[str, Any]:
+def row(cell: Case, runs: list[Run]) -> dict[str, Any]:
     """The table's row for a cell.  The last of its runs is taken as the best."""
     best, limited = runs[-1], any(differ(run, runs[-1], ROUGHLY_SAME_TIME) for run in runs[:-1])
     counts = {run.reversals(shift) for run in runs for shift in (0, 1)}
