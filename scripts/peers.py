@@ -19,6 +19,7 @@ by the time of one trajectory.  The error is that of the spin at T, the largest 
 many of them as a tool runs), against the Taylor series in 80-bit arithmetic of `reference_spins.py`.
 
     pip install -e .[peers]
+    apt-get install gfortran && pip install -e .[peers-fortran]
     python scripts/peers.py [--mu 60 200 1000] [--bodies 1024] [--repeats 5] [--output FOLDER]
 
 writes peers.csv and peers.png.  Tools that are not installed are left out.

@@ -37,7 +37,7 @@ SCRAPS = (
 
 # The measurements are those of a run by default, whose kernels are compiled already.
 MEASURE = "measure: [reversals, energy_error, noise_limited]"
-FILE_LIKE = ("name: x", "max_failed_fraction: 0.01", MEASURE)
+FILE_LIKE = ("name: x", "refine: 0", "max_failed_fraction: 0.01", MEASURE)
 
 
 def tree(random: Random) -> list[list[Any]]:
