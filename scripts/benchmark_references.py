@@ -8,9 +8,9 @@
 Both are in 80-bit arithmetic.  Parameters are the double-precision numbers nearest to the decimals of cases.csv;
 everything else is computed from them in 80 bits.  Reversals are those of `data/README.md`.
 
-    python scripts/benchmark_references.py data/benchmark [CASE ...]
+    python scripts/benchmark_references.py FOLDER [CASE ...]
 
-With names, only these cases are computed, and their rows replaced.
+With names, only these cases are computed.
 """
 
 from __future__ import annotations
@@ -19,20 +19,17 @@ import csv
 import sys
 import time
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import heyoka
 import numpy as np
-from reference_spins import Extended, Rhs, first_times, problem, radau, radau_step
-from reversals import reversal_times, window_and_ripple
+from reference_spins import Case, Extended, Rhs, first_times, problem, radau_path
+from reversals import Means, window_and_ripple
 
 from sweep.models import find
 from sweep.models.model import Array
-
-Case = dict[str, float]
 
 FOLDER = Path(__file__).parents[1] / "data" / "benchmark"
 sys.path.append(str(FOLDER))
@@ -60,7 +57,6 @@ WIDE = {
 }
 """Rows of `data/reference_wide.csv`."""
 
-STAGES = 9
 STEPS_A_PERIOD = {"slip": (10, 30), "roll": (60,)}
 """Steps of Radau in a period of the fastest rocking: more, where the methods differ by more than `ENOUGH`."""
 ENOUGH = 1e-13
@@ -257,42 +253,28 @@ def fastest_period(case: Case) -> float:
 def radau_run(case: Case, times: Array, edges: Array, steps: int) -> tuple[Array, Array, float]:
     """As `Taylor.run`, with so many steps a period, and the least normal force by weight, seen at all of them."""
     states, rhs, seen = package_equations(case)
-    A, longest = radau(STAGES), fastest_period(case) / steps
-    stops = np.union1d(times, edges)
+    longest, stops = fastest_period(case) / steps, np.union1d(times, edges)
     passed = [Extended(0)] if rolls(case) else [t for t in first_times(case, longest) if t < stops[0]]
     spins, integrals, least = {}, {}, np.inf
-    for stop in stops:
-        count = int(np.ceil((stop - passed[-1]) / longest))
-        for before, now in pairwise([*passed, *np.linspace(passed[-1], Extended(stop), count + 1)[1:]]):
-            states = radau_step(A, rhs, states, now - before)
-            spin, force = seen(states)
-            least = min(least, float(force))
-        spins[stop], integrals[stop] = spin, states[-1]
-        passed = [Extended(stop)]
+    for stop, reached in radau_path(rhs, states, passed, stops, longest):
+        spin, force = seen(reached)
+        least = min(least, float(force))
+        spins[stop], integrals[stop] = spin, reached[-1]
     return np.array([spins[t] for t in times]), np.array([integrals[t] for t in edges]), least
 
 
 # --- reversals --------------------------------------------------------------------------------
 
 
-def means_reverse(integrals: Array, half: float, shift: int) -> tuple[Array, bool]:
-    """Times of the reversals, with windows that begin `shift` halves late; and whether no mean grazes zero."""
-    means = np.diff(np.concatenate([[0], integrals])[shift::2]).astype(float)
-    times = reversal_times(means, 2 * half) + shift * half
-    rise = np.diff(means)
-    turns = means[1:-1][rise[:-1] * rise[1:] <= 0]
-    closest = np.abs(np.append(turns, means[-1])).min()
-    return times, bool(closest > GRAZING * np.abs(means).max())
-
-
-def firm_reversals(ours: Array, others: Array, half: float) -> tuple[Array, float] | None:
+def firm_reversals(ours: Array, others: Array, window: float) -> tuple[Array, float] | None:
     """Times of the reversals and the largest difference of the two methods; None if the count is not firm."""
-    (times, clear), (again, _), (late, clear_late) = (
-        means_reverse(integrals, half, shift) for integrals, shift in ((ours, 0), (others, 0), (ours, 1))
-    )
-    if not (clear and clear_late) or not len(times) == len(again) == len(late):
+    means, again = (Means(window, [0, *integrals]) for integrals in (ours, others))
+    if not means.reversals() == again.reversals() == means.reversals(1):
         return None
-    return times, float(np.abs(times - again).max(initial=0.0))
+    if any(means.closest(shift) <= GRAZING * np.abs(means.averages(shift)).max() for shift in (0, 1)):
+        return None
+    times = means.times().astype(float)
+    return times, float(np.abs(times - again.times()).max(initial=0.0))
 
 
 # --- the tables -------------------------------------------------------------------------------
@@ -303,28 +285,6 @@ HEADERS = {
     "references.csv": ["case", "t", "spin", "error_bound"],
     "reversals.csv": ["case", "kind", "until", "reversals", "times", "error_bound"],
 }
-
-Rows = dict[str, list[list[str]]]
-"""Rows by case."""
-
-
-def read(path: Path) -> Rows:
-    """The rows of a table, none if there is no such file."""
-    rows: Rows = {}
-    if path.exists():
-        with path.open(encoding="utf-8", newline="") as stream:
-            for row in list(csv.reader(stream))[1:]:
-                rows.setdefault(row[0], []).append(row)
-    return rows
-
-
-def write(path: Path, header: list[str], rows: Rows) -> None:
-    """The table, with its cases in the order of `all_cases`."""
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        table = csv.writer(stream, lineterminator="\n")
-        table.writerow(header)
-        for name in all_cases():
-            table.writerows(rows.get(name, []))
 
 
 def compute(name: str, case: Case, times: Array, taylor: Taylor) -> SimpleNamespace:
@@ -339,7 +299,7 @@ def compute(name: str, case: Case, times: Array, taylor: Taylor) -> SimpleNamesp
             break
     assert least > LEAST_FORCE, f"{name}: the body nearly lifts off, {least}"
     last_zero = np.array(zeros[-1:]), None
-    found = last_zero if rolls(case) else firm_reversals(integrals, again, edges[0])
+    found = last_zero if rolls(case) else firm_reversals(integrals, again, 2 * edges[0])
     return SimpleNamespace(spins=spins, bounds=bounds, reversals=found, least=least)
 
 
@@ -367,18 +327,21 @@ def rows_of(name: str, case: Case, times: Array, why: str, found: SimpleNamespac
 
 
 def main(folder: Path, chosen: list[str]) -> None:
-    """Bring the tables in the folder up to date, and write a line for each case to the terminal."""
-    cases, tables = all_cases(), {name: read(folder / name) if chosen else {} for name in HEADERS}
+    """Write the tables of the chosen cases, by default of all, and a line for each case to the terminal."""
+    cases = all_cases()
     integrators = {"slip": Taylor("slip"), "roll": Taylor("roll")}
+    tables = {name: [header] for name, header in HEADERS.items()}
     for name in chosen or cases:
         case, ends, why = cases[name]
         times, began = np.array(ends, float), time.process_time()
         found = compute(name, case, times, integrators[model_of(case)])
-        for (file, header), rows in zip(HEADERS.items(), rows_of(name, case, times, why, found), strict=True):
-            tables[file][name] = rows
-            write(folder / file, header, tables[file])
+        for table, rows in zip(tables.values(), rows_of(name, case, times, why, found), strict=True):
+            table += rows
         seconds = time.process_time() - began
         print(f"{name} {found.bounds} {found.reversals} R > {found.least:.3f}, {seconds:.0f} s", flush=True)
+    for name, table in tables.items():
+        with (folder / name).open("w", encoding="utf-8", newline="") as stream:
+            csv.writer(stream, lineterminator="\n").writerows(table)
 
 
 if __name__ == "__main__":

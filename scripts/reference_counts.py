@@ -9,24 +9,24 @@ At each moment ω', v_g' and the normal force R solve one linear system of seven
     u · v_g' - (u × x_p) · ω'  = (x_p' × ω) · u - v_p · u'     from (v_p · u)' = 0, v_p = v_g - x_p × ω
 
 and SciPy's DOP853 integrates it at tight tolerances, with the integral of the ripple-free spin n* (`reversals.py`) as a
-tenth state.  A cell whose count a tiny change could alter (see `Trajectory.fault` and `reference`) is left out.  One
-process takes half an hour.
+tenth state.  A cell whose count a tiny change could alter (see `Trajectory.fault` and `reference`) is left out.
 
-    python scripts/reference_counts.py data/reference_counts.csv
+    python scripts/reference_counts.py OUTPUT
+
+computes the cells of `data/reference_counts.csv` again, which takes one process half an hour.
 """
 
 from __future__ import annotations
 
 import csv
 import sys
-import time
 from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from reversals import last_reversal, sign_changes, window_and_ripple
+from reversals import T_END, Means, window_and_ripple
 from scipy.integrate import DOP853
 
 Array = NDArray[np.float64]
@@ -34,13 +34,10 @@ Array = NDArray[np.float64]
 # A matrix, the moments of inertia, μ and K: what `motion` takes beside the state.
 Body = tuple[Array, Array, float, Array]
 
-# Random cells: (seed, how many, fewest reversals by the paper's estimate).
-DRAWS = [(20111221, 95, 0.0), (20111222, 24, 4.0)]
-T_END = 30_000.0
-# Steps allowed for a trajectory (about 25 s), and for one of the cells in `PAPER` and `LONG`.
-MAX_STEPS, MAX_STEPS_LONG = 300_000, 3_000_000
-# Random cells expected to take more steps are not tried.
-MAX_EXPECTED_STEPS = 80_000
+TABLE = Path(__file__).parents[1] / "data" / "reference_counts.csv"
+
+# Steps allowed for a trajectory: some minutes.
+MAX_STEPS = 3_000_000
 
 # u, ω, v_g and the integral of n*.  All but u3, ω3 and the integral vanish in upright spin.
 ATOL = np.array([1e-18, 1e-18, 1e-14, 1e-18, 1e-18, 1e-16, 1e-18, 1e-18, 1e-18, 1e-12])
@@ -86,24 +83,12 @@ class Cell:
         return np.concatenate([u, omega, np.cross(x_p, omega), [0.0]])
 
 
-@dataclass(frozen=True)
-class Trajectory:
-    """The integral of n* after each half window, and how the integration ended."""
+@dataclass
+class Trajectory(Means):
+    """Means of n*, and how the integration ended."""
 
-    window: float
-    integrals: Array
-    end: str
-    steps: int
-
-    def averages(self, shift: int = 0) -> Array:
-        """Averages of n* over successive windows that begin `shift` half windows after the start."""
-        return np.asarray(np.diff(self.integrals[shift::2]) / self.window)
-
-    def reversals(self, shift: int = 0) -> int:
-        return len(sign_changes(self.averages(shift)))
-
-    def last_reversal(self) -> float:
-        return last_reversal(self.averages(), self.window)
+    end: str = "step limit"
+    steps: int = 0
 
     def fault(self) -> str:
         """Why the count cannot be trusted; empty if it can."""
@@ -111,11 +96,7 @@ class Trajectory:
             return self.end
         if self.reversals(1) != self.reversals():
             return "count depends on the window's start"
-        averages = self.averages()
-        rise = np.diff(averages)
-        turns = averages[1:-1][rise[:-1] * rise[1:] <= 0]
-        closest = np.abs(np.append(turns, averages[-1])).min()
-        return "grazing" if closest < GRAZING else ""
+        return "grazing" if self.closest() < GRAZING else ""
 
 
 @njit
@@ -178,95 +159,56 @@ def has_settled(state: Array, average: float, body: Body) -> bool:
     return all(growth_rate(spin, body) < 0 for spin in (n, SETTLED_MARGIN * n))
 
 
-def simulate(cell: Cell, rtol: float, max_steps: int) -> Trajectory:
+def simulate(cell: Cell, rtol: float) -> Trajectory:
     """Integrate one cell until it settles, lifts off, or reaches the time or step limit."""
     shape, inertia = cell.shape(), cell.inertia()
     window, ripple = window_and_ripple(shape, inertia)
     body = shape, inertia, cell.mu, ripple
     solver = DOP853(lambda _t, state: motion(state, *body)[0], 0.0, cell.start(), T_END, rtol=rtol, atol=ATOL)
-    integrals = [0.0]
-    end, steps = "step limit", 0
-    while end == "step limit" and steps < max_steps:
+    found = Trajectory(window)
+    while found.end == "step limit" and found.steps < MAX_STEPS:
         solver.step()
-        steps += 1
+        found.steps += 1
         if solver.status != "running":
-            end = "time limit" if solver.status == "finished" else "solver failed"
+            found.end = "time limit" if solver.status == "finished" else "solver failed"
         if motion(solver.y, *body)[1] <= 0:
-            end = "lift-off"
-        if solver.t >= len(integrals) * window / 2:
+            found.end = "lift-off"
+        if solver.t >= len(found.integrals) * window / 2:
             dense = solver.dense_output()
-            while solver.t >= (edge := len(integrals) * window / 2):
-                integrals.append(float(dense(edge)[9]))
-            if len(integrals) > 2 and has_settled(solver.y, (integrals[-1] - integrals[-3]) / window, body):
-                end = "settled"
-    return Trajectory(window, np.array(integrals), end, steps)
+            while solver.t >= (edge := len(found.integrals) * window / 2):
+                found.integrals.append(float(dense(edge)[9]))
+            if len(found.integrals) > 2:
+                average = (found.integrals[-1] - found.integrals[-3]) / window
+                found.end = "settled" if has_settled(solver.y, average, body) else found.end
+    return found
 
 
-def reference(cell: Cell, max_steps: int) -> tuple[Trajectory, str]:
+def reference(cell: Cell) -> tuple[Trajectory, str]:
     """A trajectory and why its count is in doubt, empty if it is not: its own fault, or that of a looser run nearby."""
-    first = simulate(cell, 1e-11, max_steps)
+    first = simulate(cell, 1e-11)
     if fault := first.fault():
         return first, fault
-    second = simulate(replace(cell, x0=cell.x0 * (1 + 1e-9)), 1e-10, max_steps)
+    second = simulate(replace(cell, x0=cell.x0 * (1 + 1e-9)), 1e-10)
     if fault := second.fault():
         return first, f"{fault} in the repetition"
     return first, "" if second.reversals() == first.reversals() else "count differs in the repetition"
 
 
-PAPER = [Cell(10.0, 3.0, 0.03, mu, 0.05, 0.01, 0.01) for mu in (20.0, 40.0, 60.0, 75.0, 100.0)]
-LONG = [Cell(10.0, 5.0, 0.03, 160.0, 0.1, 0.01, 0.01), Cell(10.0, 7.2, 0.03, 188.0, 0.05, 0.01, 0.01)]
-STARTS = [(0.05, 0.05), (0.05, -0.02), (-0.01, 0.03), (0.001, 0.01)]
-
-
-def expected_steps(cell: Cell) -> float:
-    """Steps until the rattle settles: stability bounds the step, and the friction of the slower mode sets the time."""
-    step = 5.5 / (cell.mu * (1 + 5 / (cell.b**2 + 1)))
-    decay = 25 / ((cell.a**2 + 6) * cell.mu)
-    return float(-np.log(SETTLED_RATTLE) / decay / step)
-
-
-def expected_reversals(cell: Cell) -> float:
-    """The paper's estimate 2x = J2 μ |n0 sin θ cos θ| L(f)."""
-    j1, j2 = (cell.b**2 + 6) / 5, (cell.a**2 + 6) / 5
-    p = np.linalg.inv(cell.shape())
-    double_theta = np.arctan(2 * p[0, 1] * np.sqrt(j1 * j2) / (j1 * p[1, 1] - j2 * p[0, 0]))
-    f = np.sqrt(j2 / j1)
-    return float(j2 * cell.mu * abs(cell.n0 * np.sin(double_theta) / 2) * (f - 1 / f) / (1 + f**2))
-
-
-def random_cells(seed: int, count: int, fewest: float) -> list[Cell]:
-    """Random cells of many shapes, spins and frictions that are not expected to take too long."""
-    random = np.random.default_rng(seed)
-    cells: list[Cell] = []
-    while len(cells) < count:
-        a = round(random.uniform(4, 14), 2)
-        b = round(random.uniform(max(1.25, 0.15 * a), 0.94 * a), 2)
-        delta = round(float(random.choice([-1, 1]) * random.uniform(0.01, 0.08)), 4)
-        mu = round(10 * 20 ** random.uniform(0, 1), 1)
-        n0 = round(float(random.choice([-1, 1]) * random.uniform(0.01, 0.1)), 4)
-        x0, y0 = STARTS[len(cells) // 5 % len(STARTS)] if len(cells) % 5 == 0 else (0.01, 0.01)
-        cell = Cell(a, b, delta, mu, n0, x0, y0)
-        if expected_steps(cell) < MAX_EXPECTED_STEPS and expected_reversals(cell) >= fewest:
-            cells.append(cell)
-    return cells
-
-
 def main(output: Path) -> None:
-    """Write the cells with a firm count to `output`, and a line for every candidate to the terminal."""
-    candidates = [(cell, MAX_STEPS_LONG) for cell in PAPER]
-    candidates += [(cell, MAX_STEPS) for draw in DRAWS for cell in random_cells(*draw)]
-    candidates += [(cell, MAX_STEPS_LONG) for cell in LONG]
+    """Compute the cells of the table again, write those with a firm count, and print a line for each."""
+    names = [field.name for field in fields(Cell)]
+    with TABLE.open(encoding="utf-8", newline="") as stream:
+        cells = [Cell(*(float(row[name]) for name in names)) for row in csv.DictReader(stream)]
     with output.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([*(field.name for field in fields(Cell)), "reversals", "t_last_reversal"])
-        for cell, max_steps in candidates:
-            before = time.process_time()
-            run, fault = reference(cell, max_steps)
-            seconds, count, last = time.process_time() - before, run.reversals(), run.last_reversal()
+        writer.writerow([*names, "reversals", "t_last_reversal"])
+        for cell in cells:
+            run, fault = reference(cell)
+            count, last = run.reversals(), run.last_reversal()
             if not fault:
                 writer.writerow([*astuple(cell), count, f"{last:.2f}"])
                 stream.flush()
-            print(f"{cell} {count=} {last=:.2f} {run.steps=} {seconds=:.1f} {fault or 'recorded'}", flush=True)
+            print(f"{cell} {count=} {last=:.2f} {run.steps=} {fault or 'recorded'}", flush=True)
 
 
 if __name__ == "__main__":

@@ -18,25 +18,22 @@ from __future__ import annotations
 import csv
 import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import heyoka
 import numpy as np
-from reversals import last_reversal, sign_changes, window_and_ripple
+from benchmark_references import UNIT, Case, window_of
+from reversals import T_END, Means
 from tracing import taylor_system
 
-from sweep.models import ellipsoid
 from sweep.models.ladder import slip
 from sweep.models.model import Array, stack
 from sweep.models.theory import linear
+from sweep.parameters import PAPER_PARAMETERS
 
 SEED, CELLS = 20250500, 500
-T_END = 30_000.0
-LANES = 8
-UNIT = 2.0**-100
 
 TOLERANCE, OTHER_TOLERANCE, EXTENDED_TOLERANCE = 1e-16, 1e-15, 1.1e-19
 NUDGE = 1 + 1e-9
@@ -62,20 +59,17 @@ RATTLE = [i for i in range(len(slip.MODEL.states)) if i != SPIN]
 SCALE = np.array([1.0 if i == SPIN else UNIT for i in range(len(slip.MODEL.states))])
 
 
-def draw() -> dict[str, Array]:
-    """Parameters of the sample, shape (cells,), in units of c and sqrt(c/g); written with six digits."""
+def draw() -> list[Case]:
+    """The sample, in units of c and sqrt(c/g); written with six digits."""
     random = np.random.default_rng(SEED)
-    columns = {
-        "a": np.full(CELLS, 10.0),
+    drawn = {
         "b": random.uniform(1.2, 9.8, CELLS),
-        "c": np.ones(CELLS),
-        "delta": np.full(CELLS, 0.03),
         "mu": 20 * 10 ** random.random(CELLS),
         "n0": 0.01 * 10 ** random.random(CELLS),
-        "x0": np.full(CELLS, 0.01),
-        "y0": np.full(CELLS, 0.01),
     }
-    return {name: np.array([float(f"{value:.6g}") for value in column]) for name, column in columns.items()}
+    fixed = {"a": 10.0, "c": 1.0, "delta": 0.03, "x0": 0.01, "y0": 0.01}
+    cells = [fixed | {name: float(f"{column[i]:.6g}") for name, column in drawn.items()} for i in range(CELLS)]
+    return [{name: cell[name] for name in PAPER_PARAMETERS} for cell in cells]
 
 
 # --- integration ------------------------------------------------------------------------------
@@ -103,145 +97,75 @@ def momentum(states: tuple[Any, ...], p: slip.Constants) -> tuple[Any, Any]:
     return w1 / p.inv_I1 - (y * g3 - z * g2), w2 / p.inv_I2 - (z * g1 - x * g3)
 
 
-Advance = Callable[[Array, Array, Array], Array]
-"""(states at grid[0], constants and K, times) of shapes (8, lanes), (k + 4, lanes), (samples, lanes) -> states at
-these times, shape (samples, 8, lanes)."""
-
-
-def double_precision(tolerance: float) -> Advance:
-    integrator = heyoka.taylor_adaptive_batch(
-        system(), state=np.zeros((8, LANES)), pars=np.ones((CONSTANTS + 4, LANES)), tol=tolerance
+def make_integrator(real: Any, tolerance: float) -> Any:
+    """Taylor series in the arithmetic of the type `real`."""
+    return heyoka.taylor_adaptive(
+        system(), state=[real(0)] * 8, pars=[real(1)] * (CONSTANTS + 4), fp_type=real, tol=real(tolerance)
     )
-
-    def advance(states: Array, parameters: Array, times: Array) -> Array:
-        integrator.set_time(0.0)
-        integrator.state[:], integrator.pars[:] = states, parameters
-        return np.asarray(integrator.propagate_grid(times)[1])
-
-    return advance
-
-
-def extended_precision() -> Advance:
-    real = np.longdouble
-    integrator = heyoka.taylor_adaptive(
-        system(), state=[real(0)] * 8, pars=[real(1)] * (CONSTANTS + 4), fp_type=real, tol=real(EXTENDED_TOLERANCE)
-    )
-
-    def advance(states: Array, parameters: Array, times: Array) -> Array:
-        integrator.time = real(0)
-        integrator.state[:], integrator.pars[:] = states[:, 0], parameters[:, 0]
-        return np.asarray(integrator.propagate_grid(times[:, 0])[-1])[:, :, None]
-
-    return advance
 
 
 @dataclass
-class Run:
+class Run(Means):
     """One cell integrated to its end."""
 
-    window: float
-    integrals: list[Any] = field(default_factory=lambda: [0.0])
-    """Integral of n*, after each half window."""
     least_force: float = np.inf
     status: str = "running"
 
     def time(self) -> float:
         return min(self.window / 2 * (len(self.integrals) - 1), T_END)
 
-    def averages(self, shift: int) -> Array:
-        """Averages of n* over windows that begin `shift` half windows after the start."""
-        last = int(2 * T_END / self.window)
-        return np.asarray(np.diff(np.array(self.integrals[: last + 1])[shift::2]) / self.window)
 
-    def reversals(self, shift: int = 0) -> int:
-        return len(sign_changes(self.averages(shift)))
-
-    def last_reversal(self) -> float:
-        return last_reversal(self.averages(0), self.window)
-
-
-def windows_and_ripples(columns: dict[str, Array]) -> tuple[Array, Array]:
-    """Windows, shape (cells,), and K11, K12, K21, K22, shape (4, cells), of all bodies."""
-    A11, A12, A22, A33 = (column.astype(float) for column in ellipsoid.shape(columns))
-    zero = np.zeros_like(A11)
-    shapes = np.moveaxis(np.array([[A11, A12, zero], [A12, A22, zero], [zero, zero, A33]]), -1, 0)
-    inertias = np.array(ellipsoid.inertia(columns)).astype(float).T
-    pairs = [window_and_ripple(shape, inertia) for shape, inertia in zip(shapes, inertias, strict=True)]
-    return np.array([window for window, _ in pairs]), np.array([K.ravel() for _, K in pairs]).T
+def follow(cell: Case, integrator: Any, real: Any) -> Run:
+    """Integrate a cell to its end."""
+    columns = {name: np.array([real(value)]) for name, value in cell.items()}
+    window, K = window_of(cell)
+    constants = stack(slip.Constants.of(columns))[:, 0]
+    states = np.append(stack(slip.start(columns))[:, 0] / SCALE, real(0))
+    run, steps = Run(window), np.arange(WINDOWS * SAMPLES + 1) / real(SAMPLES) * window
+    while run.status == "running":
+        integrator.time = real(0)
+        integrator.state[:], integrator.pars[:] = states, [*constants, *K.ravel()]
+        path = np.asarray(integrator.propagate_grid(steps)[-1])
+        look(run, path, constants)
+        states = np.append(path[-1, :-1], real(0))
+        if run.status == "running" and reach(states[:-1] * SCALE, constants) < LINEAR:
+            leap(run, states, constants)
+    return run
 
 
-def follow(columns: dict[str, Array], advance: Advance, lanes: int, real: Any) -> list[Run]:
-    """Integrate all cells, `lanes` at a time.  A lane whose cell has ended takes the next, of similar stiffness."""
-    columns = {name: column.astype(real) for name, column in columns.items()}
-    (window, ripple), constants = windows_and_ripples(columns), stack(slip.Constants.of(columns))
-    parameters = np.vstack([constants, ripple.astype(real)])
-    start = np.vstack([stack(slip.start(columns)) / SCALE[:, None], np.zeros((1, len(window)))])
-    runs = [Run(float(w)) for w in window]
-    waiting: Iterator[int] = iter(np.argsort(slip.fastest_decay(columns) * window))
-    steps = np.arange(WINDOWS * SAMPLES + 1)[:, None] / real(SAMPLES)
-
-    held = np.array([next(waiting) for _ in range(lanes)])
-    states = start[:, held]
-    while any(runs[cell].status == "running" for cell in held):
-        path = advance(states, parameters[:, held], steps * window[held])
-        states = path[-1].copy()
-        look(runs, held, path, constants[:, held])
-        states[-1] = 0
-        for lane in np.flatnonzero(reach(states[:-1] * SCALE[:, None], constants[:, held]) < LINEAR):
-            if runs[held[lane]].status == "running" and lane == first_lane(held, held[lane]):
-                leap(runs[held[lane]], states[:, lane], constants[:, held[lane]])
-        for lane in np.flatnonzero([runs[cell].status != "running" for cell in held]):
-            # If no cell is left, the lane repeats another one.
-            if (cell := next(waiting, None)) is not None:
-                held[lane], states[:, lane] = cell, start[:, cell]
-            else:
-                other = next((o for o in range(lanes) if runs[held[o]].status == "running"), lane)
-                held[lane], states[:, lane] = held[other], states[:, other]
-    return runs
-
-
-def look(runs: list[Run], held: Array, path: Array, constants: Array) -> None:
-    """Record a stretch of all lanes' paths, shape (samples, 8, lanes), and end the cells that are done."""
-    states = np.moveaxis(path[:, :-1] * SCALE[:, None], 1, 0)
+def look(run: Run, path: Array, constants: Array) -> None:
+    """Record a stretch of the path, shape (samples, 8), and end the run if it is done."""
+    states = path[:, :-1].T * SCALE[:, None]
     _, (_, _, force, _) = slip.rhs(tuple(states), slip.Constants(*constants))
-    settled = have_settled(states[:, -1].astype(float), constants.astype(float))
-    for cell in np.unique(held):
-        lane, run = first_lane(held, cell), runs[cell]
-        base = run.integrals[-1]
-        run.integrals += [base + part for part in path[SAMPLES // 2 :: SAMPLES // 2, -1, lane]]
-        run.least_force = min(run.least_force, float(force[:, lane].min()))
-        upright = float(states[SPIN, -1, lane]) * run.averages(0)[-1] < 0
-        if run.least_force <= 0:
-            run.status = "lift_off"
-        elif run.time() >= T_END:
-            run.status = "time_limit"
-        elif settled[lane] and upright:
-            run.status = "settled"
+    base = run.integrals[-1]
+    run.integrals += [base + part for part in path[SAMPLES // 2 :: SAMPLES // 2, -1]]
+    run.least_force = min(run.least_force, float(force.min()))
+    last = states[:, -1].astype(float)
+    if run.least_force <= 0:
+        run.status = "lift_off"
+    elif run.time() >= T_END:
+        run.status = "time_limit"
+    elif last[SPIN] * run.averages()[-1] < 0 and has_settled(last, constants.astype(float)):
+        run.status = "settled"
 
 
-def first_lane(held: Array, cell: int) -> int:
-    """The lane that holds `cell`; later lanes may repeat it."""
-    return int(np.argmax(held == cell))
-
-
-def reach(states: Array, constants: Array) -> Array:
-    """sqrt(2E/I3): the rattle moves the spin by no more while it decays.  Shape (lanes,).
+def reach(states: Array, constants: Array) -> float:
+    """sqrt(2E/I3): the rattle moves the spin by no more while it decays.
 
     The averaged equations (ndotab, abdot) integrate to Δn = sqrt(d² + 2E/I3) - d for a mode of energy E
     at distance d from its critical spin.
     """
     _, rattle, inertia = slip.energy(states.astype(float), slip.Constants(*constants.astype(float)))
-    return np.asarray(np.sqrt(np.maximum(2 * rattle / inertia, 0)))
+    return float(np.sqrt(np.maximum(2 * rattle / inertia, 0)))
 
 
-def have_settled(states: Array, constants: Array) -> Array:
-    """Whether the rattle decays at all spins within reach and a margin, and these have one sign.  Shape (lanes,)."""
+def has_settled(states: Array, constants: Array) -> bool:
+    """Whether the rattle decays at all spins within reach and a margin, and these have one sign."""
     p = slip.Constants(*constants)
     spin, *_ = slip.energy(states, p)
     within = MARGIN * reach(states, constants)
-    near = [spin + share * within for share in np.linspace(-1, 1, 5)]
-    decays = np.all([linear.growth_rate(slip.MODEL, p, n) < 0 for n in near], axis=0)
-    return np.asarray(decays & (within < np.abs(spin)))
+    near = spin + np.linspace(-1, 1, 5) * within
+    return bool(within < abs(spin) and all(linear.growth_rate(slip.MODEL, p, n) < 0 for n in near))
 
 
 # --- while the rattle is tiny -----------------------------------------------------------------
@@ -309,14 +233,14 @@ def differ(one: Run, other: Run, tolerance: float) -> bool:
     return abs(one.last_reversal() - other.last_reversal()) > tolerance * other.last_reversal()
 
 
-def row(columns: dict[str, Array], cell: int, runs: list[Run]) -> dict[str, Any]:
+def row(cell: Case, runs: list[Run]) -> dict[str, Any]:
     """The table's row for a cell.  The last of its runs is taken as the best."""
     best, limited = runs[-1], any(differ(run, runs[-1], ROUGHLY_SAME_TIME) for run in runs[:-1])
     counts = {run.reversals(shift) for run in runs for shift in (0, 1)}
     ends = {run.status for run in runs}
     firm = len(counts) == len(ends) == 1 and all(run.least_force > LEAST_FORCE for run in runs)
     return {
-        **{name: f"{column[cell]:g}" for name, column in columns.items()},
+        **{name: f"{value:g}" for name, value in cell.items()},
         "reversals": best.reversals(),
         "t_last_reversal": f"{best.last_reversal():.4f}",
         "status": best.status,
@@ -328,34 +252,24 @@ def row(columns: dict[str, Array], cell: int, runs: list[Run]) -> dict[str, Any]
     }
 
 
-def all_runs(columns: dict[str, Array]) -> list[list[Run]]:
-    """Runs of each cell: in double precision from the nudged and the true start, and in 80 bits if they differ."""
-    nudged = columns | {"x0": columns["x0"] * NUDGE}
-    doubled = [
-        follow(nudged, double_precision(OTHER_TOLERANCE), LANES, float),
-        follow(columns, double_precision(TOLERANCE), LANES, float),
-    ]
-    print(f"in double precision: {time.process_time():.0f} s", flush=True)
-    runs = [list(pair) for pair in zip(*doubled, strict=True)]
-    extended = extended_precision()
-    for cell, pair in enumerate(runs):
-        if differ(*pair, SAME_TIME):
-            alone = {name: column[[cell]] for name, column in columns.items()}
-            began = time.process_time()
-            pair += follow(alone, extended, 1, np.longdouble)
-            print(f"cell {cell} in 80 bits: {time.process_time() - began:.0f} s", flush=True)
-    return runs
-
-
 def main(output: Path) -> None:
-    columns = draw()
-    runs = all_runs(columns)
-    rows = [row(columns, cell, of_cell) for cell, of_cell in enumerate(runs)]
+    """Write the table, and a line for each cell to the terminal.
+
+    A cell is followed in double precision from a nudged and from the true start, and in 80 bits if these differ.
+    """
+    nudged, true = make_integrator(float, OTHER_TOLERANCE), make_integrator(float, TOLERANCE)
+    extended = make_integrator(np.longdouble, EXTENDED_TOLERANCE)
+    rows = []
+    for cell in draw():
+        runs = [follow(cell | {"x0": cell["x0"] * NUDGE}, nudged, float), follow(cell, true, float)]
+        if differ(*runs, SAME_TIME):
+            runs.append(follow(cell, extended, np.longdouble))
+        rows.append(row(cell, runs))
+        print(f"{rows[-1]} {time.process_time():.0f} s", flush=True)
     with output.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-    print(f"{time.process_time():.0f} s of CPU time")
 
 
 if __name__ == "__main__":

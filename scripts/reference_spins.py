@@ -18,7 +18,7 @@ from __future__ import annotations
 import csv
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
@@ -190,22 +190,28 @@ def first_times(case: Case, longest: float) -> list[Any]:
     return times
 
 
+def radau_path(rhs: Rhs, states: Array, passed: list[Any], stops: Array, longest: float) -> Iterator[tuple[Any, Array]]:
+    """After each step, the next stop and the states.  Steps end first at the times `passed`, and are then `longest`."""
+    A = radau(STAGES)
+    for stop in stops:
+        steps = int(np.ceil((stop - passed[-1]) / longest))
+        for before, now in pairwise([*passed, *np.linspace(passed[-1], Extended(stop), steps + 1)[1:]]):
+            states = radau_step(A, rhs, states, now - before)
+            yield stop, states
+        passed = [Extended(stop)]
+
+
 def radau_spins(case: Case, longest: float) -> list[Any]:
     """Spins of the slip model at `TIMES`."""
     states, constants = (np.array(numbers) for numbers in problem(slip.MODEL, case, Extended))
-    A, spins, passed = radau(STAGES), [], first_times(case, longest)
 
     def rhs(y: Array) -> Any:
         return slip.rhs(y, slip.Constants(*constants))[0]
 
-    for end in TIMES:
-        steps = int(np.ceil((end - passed[-1]) / longest))
-        edges = [*passed, *np.linspace(passed[-1], Extended(end), steps + 1)[1:]]
-        for before, now in pairwise(edges):
-            states = radau_step(A, rhs, states, now - before)
-        spins.append(check_contact(slip.MODEL, states, constants))
-        passed = [Extended(end)]
-    return spins
+    spins = {}
+    for stop, reached in radau_path(rhs, states, first_times(case, longest), TIMES, longest):
+        spins[stop] = check_contact(slip.MODEL, reached, constants)
+    return list(spins.values())
 
 
 # --- the table --------------------------------------------------------------------------------

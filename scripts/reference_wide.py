@@ -20,14 +20,13 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from benchmark_references import UNIT, example, fastest_period
+from benchmark_references import UNIT, Case, example, fastest_period
 from numpy.typing import NDArray
 from tracing import taylor_system
 
 from sweep.models.ladder import slip
 
 Array = NDArray[np.float64]
-Cell = dict[str, float]
 
 SEED, CELLS = 20251101, 300
 TIMES = np.array([50.0, 100.0, 200.0, 400.0])
@@ -47,14 +46,14 @@ SAME_END = 1e-6
 """Largest difference allowed between the two runs' times of the end."""
 
 
-def draw(seed: int) -> list[Cell]:
+def draw(seed: int) -> list[Case]:
     """The cells, in units in which g = 1 and the mass is one; every parameter is rounded to six digits first."""
     random = np.random.default_rng(seed)
 
     def log_uniform(low: float, high: float) -> float:
         return float(low * (high / low) ** random.random())
 
-    cells: list[Cell] = []
+    cells: list[Case] = []
     while len(cells) < CELLS:
         a, c = log_uniform(1.5, 50), random.uniform(0.5, 2)
         if a < 1.5 * c:
@@ -79,7 +78,7 @@ def draw(seed: int) -> list[Cell]:
 # --- nine equations ---------------------------------------------------------------------------
 
 
-def height_squared(cell: Cell) -> float:
+def height_squared(cell: Case) -> float:
     """(z/c)² of the contact point at the start; negative if (x0, y0) lies outside the body."""
     (A11, A22, _, A12), *_ = example.slipping_body(cell)
     x, y = cell["x0"], cell["y0"]
@@ -102,14 +101,14 @@ def own_integrator(tolerance: float) -> Any:
     )
 
 
-def sample_times(cell: Cell) -> Array:
+def sample_times(cell: Case) -> Array:
     """Times at which R is seen: equal steps from zero to the last of `TIMES`, and the onset of slip before them."""
     times = np.arange(0, TIMES[-1], fastest_period(cell) / SAMPLES)
     onset = np.geomspace(1e-3 / (1 + cell["mu"]), times[1], 40)[:-1]
     return np.unique(np.concatenate([times, onset, TIMES]))
 
 
-def own_run(cell: Cell, integrator: Any) -> tuple[Array, float, str, float]:
+def own_run(cell: Case, integrator: Any) -> tuple[Array, float, str, float]:
     """Spins at `TIMES` (NaN after the end), the least normal force seen, the end and its time."""
     times, body = sample_times(cell), example.slipping_body(cell)
     shape, inertia, mu = body
@@ -154,7 +153,7 @@ def traced_integrator(tolerance: float) -> Any:
     )
 
 
-def traced_spins(cell: Cell, integrator: Any, end: float) -> Array:
+def traced_spins(cell: Case, integrator: Any, end: float) -> Array:
     """Spins at those of `TIMES` that come before the end; NaN after it."""
     columns = {name: np.array([value]) for name, value in cell.items()}
     p = slip.Constants(*(float(value[0]) for value in slip.Constants.of(columns)))

@@ -13,12 +13,17 @@ does not vanish.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from itertools import combinations_with_replacement
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+T_END = 30_000.0
+"""Reversals are counted up to this time, in sqrt(c/g)."""
 
 AMPLITUDE = 1e-10
 """Size of the rocking, in radians, from which L and G are computed.  Their error is its square, times (a/c)⁴ at worst.
@@ -69,19 +74,35 @@ def rolling(z: Array, shape: Array, inertia: Array) -> tuple[Array, float]:
     return np.concatenate([du[:2], dM[:2]]), float(u @ np.linalg.solve(about_contact, torque))
 
 
-def sign_changes(averages: Array) -> NDArray[np.int64]:
-    """Windows after which the sign changes."""
-    return np.flatnonzero(averages[1:] * averages[:-1] < 0)
+@dataclass
+class Means:
+    """Means of n* over windows, from its integral after each half window."""
 
+    window: float
+    integrals: list[Any] = field(default_factory=lambda: [0.0])
 
-def reversal_times(averages: Array, window: float) -> Array:
-    """Zeros of the lines between two averages of opposite sign, each at its window's centre."""
-    k = sign_changes(averages)
-    here, after = averages[k], averages[k + 1]
-    return np.asarray(window * (k + 0.5 + here / (here - after)))
+    def averages(self, shift: int = 0) -> Array:
+        """Means over successive windows that begin `shift` half windows after the start and end by `T_END`."""
+        last = int(2 * T_END / self.window)
+        return np.asarray(np.diff(np.array(self.integrals[: last + 1])[shift::2]) / self.window)
 
+    def times(self, shift: int = 0) -> Array:
+        """Zeros of the lines between two means of opposite sign, each at its window's centre."""
+        means = self.averages(shift)
+        k = np.flatnonzero(means[1:] * means[:-1] < 0)
+        here, after = means[k], means[k + 1]
+        return np.asarray(self.window * (shift / 2 + k + 0.5 + here / (here - after)))
 
-def last_reversal(averages: Array, window: float) -> float:
-    """The last of these times; NaN for none."""
-    times = reversal_times(averages, window)
-    return float(times[-1]) if len(times) else float("nan")
+    def reversals(self, shift: int = 0) -> int:
+        return len(self.times(shift))
+
+    def last_reversal(self) -> float:
+        """The time of the last reversal; NaN if there is none."""
+        return float(self.times()[-1]) if self.reversals() else float("nan")
+
+    def closest(self, shift: int = 0) -> float:
+        """How close to zero a mean turns back, or ends: close ones may be counted or not."""
+        means = self.averages(shift).astype(float)
+        rise = np.diff(means)
+        turns = means[1:-1][rise[:-1] * rise[1:] <= 0]
+        return float(np.abs(np.append(turns, means[-1])).min())

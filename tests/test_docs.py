@@ -169,7 +169,7 @@ def test_console_blocks_hold_commands_and_no_output() -> None:
     assert not wrong
 
 
-@pytest.mark.parametrize("page", [*PAGES, ROOT / "data" / "README.md"], ids=_name)
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "data" / "README.md", ROOT / "scripts" / "LOG.md"], ids=_name)
 def test_links_paths_and_names_lead_somewhere(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     targets = [m["target"].split("#")[0] for m in _LINK.finditer(text) if "://" not in m["target"]]

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sweep.bench.section import BenchSection
-from sweep.bench.timing import LONGEST, Effort
 from sweep.grid import Array
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import METHODS, automatic_step
@@ -17,11 +15,11 @@ from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import Columns
 from sweep.report.direct import simulate, standard
-from sweep.report.rows import Row, states
+from sweep.report.rows import Row, Section, states
 from sweep.results.dataset import STATUSES
 
-LONG = 1e6
-"""End of the longest run, in sqrt(c/g)."""
+LONGEST, LONG = 30_000.0, 1e6
+"""Ends of runs until all has settled, and of the longest run, in sqrt(c/g)."""
 
 TIMES = 1e-3
 """Bound of the error in the time at which a trajectory fails."""
@@ -90,7 +88,7 @@ def cases() -> Iterator[Case]:
 
 
 def rows(case: Case) -> Iterator[Row]:
-    """A row for each method and trajectory."""
+    """Run a case, and make a row for each method and trajectory."""
     methods = [name for name, method in METHODS.items() if not case.stiff or method.stable_step is None]
     by = methods[0]
     step = automatic_step(by, MODELS["slip"], case.columns, 1e-10 if case.stiff else TOLERANCE)[0] / 2
@@ -117,6 +115,6 @@ def rows(case: Case) -> Iterator[Row]:
             yield states(name, method, expected, found, bool(holds and finite), why=why)
 
 
-def hard_cases(_: Effort) -> BenchSection:
-    """All rows, as a section of the report."""
-    return BenchSection("Hard cases", [row for case in cases() for row in rows(case)], name="hard")
+def hard_cases() -> Section:
+    """Run all cases, and make them a section of the report."""
+    return Section("Hard cases", [row for case in cases() for row in rows(case)])

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sweep.bench.reference import Spins, comparisons, spin_errors, whole_steps
-from sweep.bench.section import PALETTE, BenchSection, Spread, curve, marker
-from sweep.bench.timing import Effort, Work, in_turn, spread_out
+from sweep.bench.timing import T_END, Effort, Spread, Work, in_turn, spread_out
 from sweep.kernels import methods
 from sweep.models import MODELS
 from sweep.report.direct import make_kernel
-from sweep.report.rows import Table
+from sweep.report.rows import Section, Table
 
 LOOSEST = 1e-3
 """The longest step tried is the automatic step for this tolerance."""
@@ -25,6 +24,9 @@ FLOOR = 1e-11
 
 BOUND = 1e-6
 """Error at which the methods are compared."""
+
+PALETTE = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#bbbbbb")
+MARKERS = "so^vDP*X"
 
 
 @dataclass(frozen=True)
@@ -39,26 +41,24 @@ class Point:
     work: Work
 
 
-def work_precision(effort: Effort) -> BenchSection:
-    """Time of whole runs against the largest error, for every method of every model."""
-    section = BenchSection("Work and precision", name="precision")
+@dataclass(frozen=True)
+class Measured:
+    """A point, and the time of its runs in ms per trajectory."""
+
+    point: Point
+    cost: Spread
+
+    @property
+    def nanoseconds(self) -> float:
+        """Time of a step of one trajectory."""
+        return 1e6 * self.cost.median * self.point.step / T_END
+
+
+def measure(effort: Effort) -> list[Measured]:
+    """Measure time against error for steps of every method of every model."""
     points = [point for group in _groups() for point in _ladder(*group, effort)]
     times = in_turn({i: point.work for i, point in enumerate(points)}, effort)
-    cost = [Spread(1e3 / len(point.work) * times[i].values) for i, point in enumerate(points)]
-    lines = [["model", "case", "method", "step", "largest error in spin", "ms per trajectory", "trajectories"]]
-    for point, spread in zip(points, cost, strict=True):
-        shown = (f"{point.step:.4g}", f"{point.error:.1e}", f"{spread:.3g}", str(len(point.work)))
-        lines.append([point.model, point.case, point.method, *shown])
-        where = (point.model, point.method, point.case, "step", point.step)
-        section.add(*where, spin_error=point.error, ms_per_trajectory=spread)
-    caption = (
-        "Whole runs to t = 400, start-up included, compilation excluded, with no measurement but the spin; median "
-        f"(smallest … largest) of up to {effort.repeats} runs, in turn. The error is the largest over "
-        "t = 25, 50, … 400. Steps at which a trajectory fails are left out."
-    )
-    section.tables += [(caption, lines), at_equal_error(points, [spread.median for spread in cost])]
-    section.panels += [partial(_draw, points=points, cost=cost, slip=slip) for slip in (True, False)]
-    return section
+    return [Measured(point, Spread(1e3 / len(point.work) * times[i].values)) for i, point in enumerate(points)]
 
 
 def _groups() -> Iterator[tuple[str, str, str, Spins]]:
@@ -68,8 +68,8 @@ def _groups() -> Iterator[tuple[str, str, str, Spins]]:
             yield model, method, f"{len(reference.spins)} bodies", reference
             continue
         for body, mu in enumerate(reference.columns["mu"]):
-            if mu >= 60 and reference.name(body) == f"μ = {mu:g}":
-                yield model, method, reference.name(body), reference.select(np.array([body]))
+            if mu >= 60 and reference.is_standard(body):
+                yield model, method, f"μ = {mu:g}", reference.select(np.array([body]))
 
 
 def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort) -> Iterator[Point]:
@@ -80,7 +80,7 @@ def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort
     best = np.inf
     for rung in range(effort.rungs):
         step = whole_steps(reference, longest / 2 ** (rung / 2))
-        error = float(spin_errors(kernel, reference, step)[0].max())
+        error = float(spin_errors(kernel, reference, step).max())
         if error < best:
             work = Work(kernel, many, np.resize(step, effort.trajectories)).affordable(effort)
             yield Point(model, method, case, float(np.median(step)), error, work)
@@ -89,33 +89,64 @@ def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort
         best = error
 
 
-def at_equal_error(points: list[Point], cost: list[float]) -> Table:
-    """The cheapest step of each method with an error up to `BOUND`, side by side."""
+def section(found: list[Measured], effort: Effort) -> Section:
+    """Make the section of the report: all points, the methods at equal error, and the picture."""
+    heads = ["step", "largest error in spin", "ms per trajectory", "ns per step", "trajectories"]
+    lines = [["model", "case", "method", *heads]]
+    for each in found:
+        point, size = each.point, str(len(each.point.work))
+        shown = (f"{point.step:.4g}", f"{point.error:.1e}", f"{each.cost:.3g}", f"{each.nanoseconds:.3g}", size)
+        lines.append([point.model, point.case, point.method, *shown])
+    caption = (
+        f"Whole runs to t = {T_END:g}, start-up included, compilation excluded, with no measurement but the spin; "
+        f"median (smallest … largest) of up to {effort.repeats} runs, in turn. The error is the largest over "
+        "t = 25, 50, … 400. Steps at which a trajectory fails are left out."
+    )
+    figures = [("speed against error", draw(found))]
+    return Section("Speed against error", figures=figures, tables=[(caption, lines), at_equal_error(found)])
+
+
+def at_equal_error(found: list[Measured]) -> Table:
+    """Compare the cheapest step of each method with an error up to `BOUND`."""
     best: dict[str, dict[str, float]] = {}
-    for point, milliseconds in zip(points, cost, strict=True):
+    for each in found:
+        point = each.point
         if point.model == "slip" and point.error <= BOUND:
             cheapest = best.setdefault(point.case, dict.fromkeys(methods.METHODS, np.inf))
-            cheapest[point.method] = min(cheapest[point.method], milliseconds)
+            cheapest[point.method] = min(cheapest[point.method], each.cost.median)
     faster = [method for method in methods.METHODS if method != methods.PLAIN]
     head = (f"{method}, ms per trajectory" for method in methods.METHODS)
     lines = [["slip", *head, *(f"{method}: times faster" for method in faster)]]
-    for case, found in best.items():
-        ratios = (found[methods.PLAIN] / found[method] for method in faster)
-        lines.append([case, *(f"{x:.3g}" if np.isfinite(x) else "—" for x in (*found.values(), *ratios))])
+    for case, costs in best.items():
+        ratios = (costs[methods.PLAIN] / costs[method] for method in faster)
+        lines.append([case, *(f"{x:.3g}" if np.isfinite(x) else "—" for x in (*costs.values(), *ratios))])
     return f"The slip model at equal error: the cheapest step with an error up to {BOUND:g}", lines
 
 
-def _draw(axes: Axes, points: list[Point], cost: list[Spread], slip: bool) -> None:
-    """A curve for each method (a marker), and each friction of the slip model or each other model (a colour)."""
-    curves: dict[tuple[str, str], list[tuple[float, Spread]]] = {}
-    for point, spread in zip(points, cost, strict=True):
-        if (point.model == "slip") == slip:
-            curves.setdefault((point.case if slip else point.model, point.method), []).append((point.error, spread))
+def draw(found: list[Measured]) -> Figure:
+    """Draw time against error: a panel for the slip model, by friction, and one for the others."""
+    figure = Figure(figsize=(12, 4.6), dpi=90, layout="constrained")
+    for axes, slip in zip(figure.subplots(1, 2), (True, False), strict=True):
+        _draw(axes, [each for each in found if (each.point.model == "slip") == slip], slip)
+    return figure
+
+
+def _draw(axes: Axes, found: list[Measured], slip: bool) -> None:
+    """Draw a curve for each method (a marker), and each friction of the slip model or each other model (a colour)."""
+    curves: dict[tuple[str, str], list[Measured]] = {}
+    for each in found:
+        curves.setdefault((each.point.case if slip else each.point.model, each.point.method), []).append(each)
     cases = list(dict.fromkeys(case for case, _ in curves))
-    for (case, method), found in curves.items():
+    for (case, method), points in curves.items():
         colour = PALETTE[cases.index(case) % len(PALETTE)]
-        face = "white" if method == methods.PLAIN else colour
-        curve(axes, *zip(*found, strict=True), fmt=f"{marker(method)}-", color=colour, markerfacecolor=face,
-              label=f"{case}, {method}")  # fmt: skip
-    axes.set(xlabel="largest error in spin", ylabel="ms per trajectory")
-    axes.set_title(f"Work and precision, {'slip' if slip else 'reduced models'}")
+        marker = MARKERS[list(methods.METHODS).index(method) % len(MARKERS)]
+        medians = np.array([each.cost.median for each in points])
+        bars = np.abs(np.array([each.cost.ends for each in points]).T - medians)
+        axes.errorbar([each.point.error for each in points], medians, bars, fmt=f"{marker}-", color=colour,
+                      markerfacecolor="white" if method == methods.PLAIN else colour, linewidth=1, elinewidth=0.6,
+                      markersize=4, label=f"{case}, {method}")  # fmt: skip
+    axes.set(xscale="log", yscale="log", xlabel="largest error in spin", ylabel="ms per trajectory")
+    axes.set_title(f"Speed against error, {'slip' if slip else 'reduced models'}")
+    axes.grid(which="major", alpha=0.3)
+    if curves:
+        axes.legend(fontsize=7)

@@ -8,14 +8,16 @@ from importlib import resources
 
 import numpy as np
 
-from sweep.bench.timing import runs_at
 from sweep.engine.executor import execute
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.methods import allowed
+from sweep.kernels.methods import METHODS, allowed
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
+
+STEEPEST = 1e4
+"""Largest friction at which a method is run whose stability limits the step: its time is proportional to μ."""
 
 SPINS = resources.files("sweep.bench") / "data" / "reference_spins.csv"
 
@@ -32,17 +34,13 @@ class Spins:
     """Shape (bodies, times)."""
 
     def select(self, which: Array) -> Spins:
-        """The bodies chosen by `which`, a mask or indices."""
+        """Take the bodies chosen by `which`, a mask or indices."""
         return Spins({n: v[which] for n, v in self.columns.items()}, self.times, self.spins[which])
 
-    def name(self, body: int) -> str:
-        """The friction, and what else differs from the standard case, in words."""
-        shown = [
-            f"{'μ' if name == 'mu' else name} = {column[body]:g}"
-            for name, column in self.columns.items()
-            if name == "mu" or column[body] != PARAMETERS[name].default
-        ]
-        return ", ".join(shown) or "standard"
+    def is_standard(self, body: int) -> bool:
+        """Tell whether a body and its start are those of the standard case, at whatever friction."""
+        others = (name for name in self.columns if name != "mu")
+        return all(self.columns[name][body] == PARAMETERS[name].default for name in others)
 
 
 def read_spins() -> dict[str, Spins]:
@@ -58,15 +56,15 @@ def read_spins() -> dict[str, Spins]:
 
 
 def comparisons() -> Iterator[tuple[str, str, Spins]]:
-    """Each model with each method that runs it, and those of its bodies that take the method a bearable time."""
+    """Pair each model with each method that runs it, and those of its bodies that take the method a bearable time."""
     for model, reference in read_spins().items():
         for method in allowed(MODELS[model]):
             mu = reference.columns.get("mu", np.zeros(len(reference.spins)))
-            yield model, method, reference.select(np.array([runs_at(method, x) for x in mu]))
+            yield model, method, reference.select((mu <= STEEPEST) | (METHODS[method].stable_step is None))
 
 
 def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
-    """Largest error in spin over the reference's times, and `energy_error` at the last, of shape (2, bodies).
+    """Find the largest error in spin over the reference's times, of shape (bodies,).
 
     Each time gets a trajectory of its own, because the steps of adams depend on where it is to end.  The error of a
     trajectory that fails is infinite.
@@ -75,13 +73,9 @@ def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
     execute(kernel, table, stop_when_settled=False)
     spin = kernel.model.energy(*kernel.unpack(table))[0]
     error = np.where(kernel.table(table)["status"] == TIME_LIMIT, np.abs(spin - reference.spins.T.ravel()), np.inf)
-    violation = np.full(len(step), np.nan)
-    if "energy_error" in kernel.measure:
-        last = table[-len(step) :]
-        violation = kernel.table(last)["violation"] / kernel.table(last)["energy_start"]
-    return np.stack([error.reshape(len(reference.times), -1).max(axis=0), violation])
+    return np.asarray(error.reshape(len(reference.times), -1).max(axis=0))
 
 
 def whole_steps(reference: Spins, step: Array) -> Array:
-    """The longest steps, at most `step`, of which all times of the reference are multiples."""
+    """Find the longest steps, at most `step`, of which all times of the reference are multiples."""
     return np.asarray(reference.times[0] / np.ceil(reference.times[0] / step * (1 - 1e-12)))

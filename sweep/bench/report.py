@@ -1,4 +1,4 @@
-"""The report: all sections in order, then raw figures, picture and page."""
+"""The report: speed against error and the hard cases, as a page, a picture and a table of raw figures."""
 
 from __future__ import annotations
 
@@ -10,65 +10,47 @@ from pathlib import Path
 
 import llvmlite.binding
 import numba
-from matplotlib.figure import Figure
 
-from sweep.bench.cost import cost, kernels, step_times
+from sweep.bench import precision
 from sweep.bench.hard import hard_cases
-from sweep.bench.precision import work_precision
-from sweep.bench.section import LINE, BenchSection
+from sweep.bench.precision import Measured
 from sweep.bench.timing import Effort
-from sweep.bench.tolerance import tolerance
-from sweep.bench.whole import whole
 from sweep.report import page
-from sweep.report.rows import Row, Section
+from sweep.report.rows import Row
 from sweep.results.writing import replacing
 
-SECTIONS: tuple[Callable[[Effort], BenchSection], ...] = (
-    work_precision, tolerance, step_times, cost, whole, hard_cases,
-)  # fmt: skip
-
-COLUMNS = 3
-"""Number of panels side by side."""
+HEAD = ("model", "method", "case", "step", "spin_error", "ms_median", "ms_smallest", "ms_largest", "repeats",
+        "trajectories")  # fmt: skip
+"""The columns of bench.csv; times are per trajectory."""
 
 
 def bench(output: Path, note: Callable[[str], None] = lambda _: None, effort: Effort | None = None) -> list[Row]:
     """Measure everything, write bench.csv, .png and .html to `output`, and return the hard cases that do not hold."""
-    began = time.perf_counter()
+    began, effort = time.perf_counter(), effort or Effort()
     output.mkdir(parents=True, exist_ok=True)
-    list(kernels())  # compiles
-    note(f"kernels compiled or loaded in {time.perf_counter() - began:.1f} s, which no time below includes")
-    sections = []
-    for measure in SECTIONS:
-        sections.append(measure(effort or Effort()))
-        note(page.text(sections[-1]))
-    with replacing(output / "bench.csv") as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        lines = csv.writer(stream, lineterminator="\n")
-        lines.writerow(LINE)
-        lines.writerows(line for section in sections for line in section.readings)
-    figure = draw(sections)
+    found = precision.measure(effort)
+    speed = precision.section(found, effort)
+    note(page.text(speed))
+    hard = hard_cases()
+    note(page.text(hard))
+    write_table(output / "bench.csv", found)
     with replacing(output / "bench.png") as temporary:
-        figure.savefig(temporary, format="png")
+        speed.figures[0][1].savefig(temporary, format="png")
     about = (
         f"Measured in {time.perf_counter() - began:.0f} s on {numba.get_num_threads()} threads of {os.cpu_count()} "
         f"({llvmlite.binding.get_host_cpu_name()}), load {os.getloadavg()[0]:.1f} at the end. Raw figures: bench.csv."
     )
-    overview = Section("Overview", figures=[("speed, error and cost", figure)])
     heads = ("method", "expected", "found")
-    page.write(output / "bench.html", "sweep: speed against error", about, [overview, *sections], heads)
-    return [row for section in sections for row in section.rows if not row.holds]
+    page.write(output / "bench.html", "sweep: speed against error", about, [speed, hard], heads)
+    return [row for row in hard.rows if not row.holds]
 
 
-def draw(sections: list[BenchSection]) -> Figure:
-    """All panels in one figure."""
-    panels = [panel for section in sections for panel in section.panels]
-    lines = -(-len(panels) // COLUMNS)
-    figure = Figure(figsize=(6 * COLUMNS, 4.6 * lines), dpi=90, layout="constrained")
-    grid = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
-    for axes, panel in zip(grid, panels, strict=False):
-        panel(axes)
-        axes.grid(which="major", alpha=0.3)
-        if axes.get_legend_handles_labels()[1]:
-            axes.legend(fontsize=7)
-    for axes in grid[len(panels) :]:
-        axes.set_axis_off()
-    return figure
+def write_table(path: Path, found: list[Measured]) -> None:
+    """Write a line for each step that was measured."""
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        lines = csv.writer(stream, lineterminator="\n")
+        lines.writerow(HEAD)
+        for each in found:
+            point, times = each.point, each.cost
+            figures = (f"{x:.6g}" for x in (point.step, point.error, times.median, *times.ends))
+            lines.writerow([point.model, point.method, point.case, *figures, len(times.values), len(point.work)])

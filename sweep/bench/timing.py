@@ -9,12 +9,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from sweep.bench.section import Spread
 from sweep.engine.executor import execute, nominal_seconds
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES
-from sweep.kernels.methods import METHODS
 from sweep.models.model import Columns
 
 Key = TypeVar("Key")
@@ -22,42 +20,41 @@ Key = TypeVar("Key")
 T_END = 400.0
 """The time for which `tolerance` bounds the error in spin, in sqrt(c/g)."""
 
-LONGEST = 30_000.0
-"""Time limit of runs to the end, in sqrt(c/g)."""
-
-STEEPEST = 1e4
-"""Largest friction at which a method is run whose stability limits the step: its time is proportional to μ."""
-
-
-def runs_at(method: str, mu: float) -> bool:
-    """Tell whether a method takes a bearable time at this friction."""
-    return METHODS[method].stable_step is None or mu <= STEEPEST
-
 
 @dataclass(frozen=True)
 class Effort:
-    """How much to measure; the defaults take about four minutes on two cores."""
+    """How much to measure; the defaults take about two minutes on two cores."""
 
     trajectories: int = 512
     repeats: int = 5
     patience: float = 3.0
     """Seconds after which a work that has run three times is not repeated again."""
-    tolerances: tuple[float, ...] = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
     rungs: int = 8
     """Number of steps to try, each shorter than the last by sqrt(2)."""
-    sizes: tuple[int, ...] = (16, 64, 256, 1024, 4096)
-    ends: tuple[float, ...] = (50, 100, 200, 400, 800, 1600, 3200)
-    frictions: tuple[float, ...] = (1, 10, 100, 1e3, 1e4, 1e5)
-    whole_sizes: tuple[int, ...] = (16, 256, 1024, 4096, 16384)
-    """Numbers of cells in whole runs, all squares."""
-    settled_sizes: tuple[int, ...] = (16, 256)
-    """The same in whole runs to the end."""
-    reference_frictions: int = 8
-    """Number of frictions of the reference sweep, of 132 cells each, in the run whose time is divided."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Repeated measurements of one quantity."""
+
+    values: Array
+
+    @property
+    def median(self) -> float:
+        return float(np.median(self.values))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The smallest and the largest value."""
+        return float(self.values.min()), float(self.values.max())
+
+    def __format__(self, form: str) -> str:
+        smallest, largest = self.ends
+        return f"{self.median:{form}} ({smallest:{form}} … {largest:{form}})"
 
 
 def in_turn(works: Mapping[Key, Callable[[], Any]], effort: Effort) -> dict[Key, Spread]:
-    """Seconds that each work takes.  They run in turn, so that a change in the machine's speed affects all alike."""
+    """Time each work, in seconds.  They run in turn, so that a change in the machine's speed affects all alike."""
     times: dict[Key, list[float]] = {name: [] for name in works}
     for _ in range(effort.repeats):
         for name, work in works.items():
@@ -71,30 +68,27 @@ def in_turn(works: Mapping[Key, Callable[[], Any]], effort: Effort) -> dict[Key,
 
 @dataclass(frozen=True)
 class Work:
-    """Trajectories run from their parameters to `t_end`, start-up included."""
+    """Trajectories run from their parameters to `T_END`, start-up included."""
 
     kernel: Kernel
     columns: Columns
     step: Array
-    t_end: float = T_END
 
-    def __call__(self) -> Array:
-        images = self.kernel.images(self.columns, self.step, self.t_end)
-        execute(self.kernel, images, stop_when_settled=False)
-        return images
+    def __call__(self) -> None:
+        execute(self.kernel, self.kernel.images(self.columns, self.step, T_END), stop_when_settled=False)
 
     def __len__(self) -> int:
         return len(self.step)
 
     def affordable(self, effort: Effort) -> Work:
-        """The first of the trajectories, as many as should run in a third of the patience."""
-        count, seconds = len(self), nominal_seconds(self.t_end / self.step)
+        """Take the first of the trajectories, as many as should run in a third of the patience."""
+        count, seconds = len(self), nominal_seconds(T_END / self.step)
         while count > 2 * LANES and seconds > effort.patience / 3:
             count, seconds = count // 2, seconds / 2
-        return Work(self.kernel, {n: v[:count] for n, v in self.columns.items()}, self.step[:count], self.t_end)
+        return Work(self.kernel, {n: v[:count] for n, v in self.columns.items()}, self.step[:count])
 
 
 def spread_out(columns: Columns, count: int) -> dict[str, Array]:
-    """`count` trajectories that repeat the bodies of `columns`, with spins up to a thousandth apart."""
+    """Repeat the bodies of `columns` in `count` trajectories, whose spins are up to a thousandth apart."""
     many = {name: np.resize(values, count) for name, values in columns.items()}
     return many | {"n0": many["n0"] * (1 + 1e-3 * np.arange(count) / count)}

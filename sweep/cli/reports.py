@@ -28,9 +28,9 @@ def reproduce(output: Path) -> None:
 @click.command()
 @report_folder("runs/bench")
 def bench(output: Path) -> None:
-    """Measure the speed and error of methods and models, and run hard cases.
+    """Measure speed against error for every method and model, and run hard cases.
 
-    Takes about four minutes on two cores; writes bench.html, bench.png and bench.csv.
+    Takes about two minutes on two cores; writes bench.html, bench.png and bench.csv.
 
     Exit code 1 if a hard case does not hold, else 0: speed and error are reported, not judged.
     """

@@ -55,7 +55,7 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
 """The compiled functions of each piece."""
 
 _SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, SAMPLES: 3.0, PATH: 4.0, APPROACH: 4.0}
-"""Time to compile a piece that is no kernel (`scripts/run_costs.py`)."""
+"""Time to compile a piece that is no kernel (`scripts/LOG.md`: `run_costs`)."""
 
 _POLL = 0.05
 """Time in seconds between two looks at the processes."""

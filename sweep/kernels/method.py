@@ -65,7 +65,7 @@ class Method:
     start_up_cost: float = 0.0
     """Time of the start-up of one trajectory, in steps of this method."""
     compile_seconds: float = 6.0
-    """Time to compile its kernel, for the estimate of a run (`scripts/run_costs.py`)."""
+    """Time to compile its kernel, for the estimate of a run (`scripts/LOG.md`: `run_costs`)."""
     companion: float = 1.5
     """Ratio of the steps of the run that tells a cell's error to its own (`sweep.engine.errors`)."""
     error_order: int = 5

@@ -52,12 +52,6 @@ def test_files_that_are_not_datasets(verb: str, tmp_path: Path) -> None:
         refused(invoke(verb, tmp_path / name), f"{name}: ", said)
 
 
-def test_help_tells_every_verb_and_exit_code() -> None:
-    text = invoke("--help").stdout
-    assert all(word in text for word in ("run", "plot", "info", "130", "interrupted"))
-    assert "PATH=VALUE" in invoke("run", "--help").stdout
-
-
 DRY_RUNS = {
     "run": ["cells:  12 (mu 2 × b 3 × n0 2)", "steps", "memory", "time"],
     "run --set method=auto --set mu=[1,1000]": ["cells:  12", "steps", "memory", "time"],

@@ -12,7 +12,7 @@ points:
 
 The Adams weights are exact for polynomials, and for cos and sin at the fastest rocking frequency ν and at 3 ν.  The
 third harmonic dominates the error of the plain weights, and fitting it costs nothing in the step.
-What else was tried, with figures: docs/explanation/tried.md.
+What else was tried, with figures: scripts/LOG.md.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ mode d α²/2 for as long as it is lifted; both are kept below `tolerance`.
 
 When a growing mode is read off the state, less than tolerance/n of it comes from the other mode: from its *products*,
 that is through the nonlinear terms, and from its round-off.  Products make up less than 1e-5 of a lifted mode.
-Figures, and what else was tried: docs/explanation/tried.md.
+Figures, and what else was tried: scripts/LOG.md.
 """
 
 from __future__ import annotations

@@ -142,7 +142,7 @@ class Measurement:
 
     @property
     def cost(self) -> float:
-        """Time of a run with it, relative to one without (measured by `scripts/run_costs.py`); 1 if it hardly shows."""
+        """Time of a run with it, relative to one without (`scripts/LOG.md`: `run_costs`); 1 if it hardly shows."""
         return 1.0
 
     @property

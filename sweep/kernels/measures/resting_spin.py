@@ -4,8 +4,7 @@ A trajectory settles, and is left, while its rattle can still change its spin by
 off by 4 to 6 % (median).  The slow equations (`sweep.models.stiff.final_spin`) give where it goes.  Of 79 settled cells
 of the wide domain they were off by 1e-5 (median), by more than 0.1 % in 9 %, by 1.4 % at most; 29 bodies, nearly round
 or hardly damped, have none.  In a coarse `configs/mu_b.yaml` the median was 3e-5; there a few spins beyond n_c1 that
-still hold at t = 1e5, because the rattle that will turn them back is below 1e-14, make up all errors beyond 4 %
-(scripts/resting_spins.py).
+still hold at t = 1e5, because the rattle that will turn them back is below 1e-14, make up all errors beyond 4 %.
 """
 
 from __future__ import annotations

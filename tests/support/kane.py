@@ -1,4 +1,4 @@
-"""The general equations derived a second way, by Kane's method with SymPy, beside those of `sweep.models.general`.
+"""The general equations derived a second way, by Kane's method with SymPy, to compare with `sweep.models.general`.
 
 The body is an ellipsoid on a plane with any inertia and with its centre of mass G below the ellipsoid's centre.  Its
 orientation is given by angles about z (down), then about x, then about y, as in Kane and Levinson (1982).  The
@@ -9,22 +9,14 @@ the normal force N into the equations
     F_r + F_r* = 0,   r = 1 … 6.
 
 They are linear in ω', s' and N.  Without slip s1 and s2 are zero as well, and only the equations of ω and of s3 are
-taken.  Friction is -N k s, by the laws of `tests/support/newton.py`, and the couple is -(σ + N κ) ω.
-
-    python scripts/derive_general.py
-
-has neither couples about the normal nor Contensou's law, and only the ellipsoid.  It prints the largest relative
-difference between the two derivations, for each law with each set of couples, at random
-states of random bodies.  It needs SymPy, of the extra `test`.
+taken.  Friction is -N k s, by the laws of `newton.py`, and the couple is -(σ + N κ) ω.  There are neither couples about
+the normal nor Contensou's law.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping
 from functools import cache
-from itertools import product
-from pathlib import Path
 
 import numpy as np
 import sympy as sp
@@ -33,17 +25,13 @@ from sweep.models import find
 from sweep.models.model import take
 from sweep.parameters import PARAMETERS
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
-from support.newton import LAWS
+from .newton import LAWS
 
 Array = np.ndarray
 
 BODY = ("a", "b", "c", "offset", "mass", "gravity", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 STATE = ("roll", "pitch", "omega1", "omega2", "omega3", "s1", "s2")
 FORCES = ("k", "sigma", "kappa")
-
-TRIALS = 40
-"""Random states and bodies for each variant."""
 
 
 def rounded(x: float, s: float) -> float:
@@ -140,8 +128,8 @@ def random_case(random: np.random.Generator) -> tuple[dict[str, float], Array]:
     return p, np.array([*random.uniform(-0.5, 0.5, 2), *random.uniform(-6, 6, 3), *random.uniform(-0.1, 0.1, 2)])
 
 
-def difference(law: str | None, couples: tuple[str, ...], trials: int = TRIALS) -> float:
-    """Largest relative difference of y', and of N."""
+def difference(law: str | None, couples: tuple[str, ...], trials: int) -> float:
+    """Find the largest relative difference of y', and of N, at random states of random bodies."""
     model = find("+".join(["slip", law, *couples] if law else ["noslip", "solid", *couples]))
     random, worst = np.random.default_rng(1), 0.0
     for _ in range(trials):
@@ -153,13 +141,3 @@ def difference(law: str | None, couples: tuple[str, ...], trials: int = TRIALS) 
         worst = max(worst, np.abs(np.array(found) - expected).max() / np.abs(expected).max())
         worst = max(worst, abs(force * p["mass"] / N - 1))
     return float(worst)
-
-
-def main() -> None:
-    for law, couples in product((*LAWS, None), ((), ("sigma",), ("rolling",), ("sigma", "rolling"))):
-        name = "+".join(["slip", law, *couples] if law else ["noslip", "solid", *couples])
-        print(f"{name:36} {difference(law, couples):.1e}")
-
-
-if __name__ == "__main__":
-    main()
