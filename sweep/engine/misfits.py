@@ -29,8 +29,8 @@ def misfits(job: Plan) -> dict[str, Array]:
         return {}
     found = np.full(sum(grid.size for grid in job.grids), np.nan)
     for part in job.parts:
-        sound = np.flatnonzero(~part.failed)
-        found[part.cells[sound]] = _of_part(part, sound, film)
+        if len(sound := np.flatnonzero(~part.failed)):
+            found[part.cells[sound]] = _of_part(part, sound, film)
     return {Misfit.name: found}
 
 
