@@ -64,7 +64,7 @@ def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int
     async def work() -> None:
         try:
             server = _server(source, setup, port)
-        except OSError as error:
+        except Exception as error:  # raised where the explorer was asked for
             began.set_exception(error)
             return
         server.start()

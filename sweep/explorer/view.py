@@ -30,6 +30,8 @@ class View:
     """Everything on one page.  Each change goes through `_change`, which draws what differs and writes the address."""
 
     _shown: figure.MapFigure
+    _curves: Sequence[Curve | None] = ()
+    """Those that are drawn."""
 
     def __init__(
         self, document: Document, source: Source, setup: Setup | None, runner: Runner | None,
@@ -150,7 +152,8 @@ class View:
     def _hear(self, job: Job) -> None:
         if not job.dropped:
             self._faults = [job.fault] if job.fault else self._faults
-            self._draw_curves()
+            if self._drawn.curves != self._curves:
+                self._draw_curves()
             self._draw_progress()
 
     def _draw_cells(self) -> None:
@@ -177,6 +180,7 @@ class View:
         curves = self._drawn.curves
         if not any(curves) and any(self._drawn.running()):
             return  # the last curves stay until the first is there: figures that went and came back took 0.3 s
+        self._curves = curves
         named = enumerate(zip(self._names(), curves, strict=True), 1)
         names = [f"{k}: {name}{_counted(curve)}" for k, (name, curve) in named]
         self._hint.visible = not any(curves)
