@@ -22,7 +22,8 @@ its tightest tolerance.
 A reversal in `sweep` is a change of sign of the ripple-free spin averaged over a period of the rattle.  heyoka's events
 see the spin itself, which may cross zero several times in one reversal: the table tells how many counts agree.
 
-    apt-get install gfortran && pip install -e .[peers]
+    pip install -e .[peers]
+    apt-get install gfortran && pip install -e .[peers-fortran]
     python scripts/peers.py [--mu 60 200 1000] [--bodies 1024] [--repeats 5] [--output FOLDER]
 
 writes peers.csv and peers.png.
