@@ -15,11 +15,11 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
-from sweep.plots.figure import zero_line
+from sweep.plots.figure import constants_in_lines, zero_line
 from sweep.plots.formats import suffix
-from sweep.plots.panels import in_lines
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
@@ -65,7 +65,7 @@ def animate(
 
     Raises
     ------
-    ValueError
+    ConfigError
         if the bodies have no attitude or are too many, the stretch is empty, the speed is not above zero, or there is
         no such format.
     StoreError
@@ -75,16 +75,16 @@ def animate(
     if path is not None:
         check(path)
     if speed is not None and not speed > 0:
-        raise ValueError(f"speed: {speed:g}; give a number above zero")
+        raise fault_of(f"{speed:g}; give a number above zero", "speed")
     found = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
     if "heading" not in found:
-        raise ValueError("its bodies have no attitude; animate trajectories of the models slip or noslip")
+        raise fault_of("its bodies have no attitude; animate trajectories of the models slip or noslip")
     if (bodies := found.sizes["trajectory"]) > MOST:
-        raise ValueError(f"{bodies} bodies are too many to stand side by side; choose at most {MOST}")
+        raise fault_of(f"{bodies} bodies are too many to stand side by side; choose at most {MOST}")
     last = float(found["time"][-1])
     end = min(_until(found) if end is None else end, last)
     if not begin < end:
-        raise ValueError(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
+        raise fault_of(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
     seconds = SECONDS if speed is None else (end - begin) / speed
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
     scene = _Scene(found, np.linspace(begin, end, count))
@@ -95,11 +95,11 @@ def animate(
 
 
 def check(path: Path) -> None:
-    """Raise a `ValueError` if no animation can be written to a file of this name."""
+    """Raise a `ConfigError` if no animation can be written to a file of this name."""
     if suffix(path) not in FORMATS:
-        raise ValueError(f"output: {path}: unknown format; write a gif, mp4 or html")
+        raise fault_of(f"{path}: unknown format; write a gif, mp4 or html", "output")
     if suffix(path) == "mp4" and not FFMpegWriter.isAvailable():
-        raise ValueError(f"output: {path}: needs ffmpeg, which is not installed; install it, or write a gif or html")
+        raise fault_of(f"{path}: needs ffmpeg, which is not installed; install it, or write a gif or html", "output")
 
 
 def _until(dataset: xr.Dataset) -> float:
@@ -115,7 +115,7 @@ class _Scene:
         bodies = dataset.sizes["trajectory"]
         self.figure = Figure((max(3.2 * bodies, 6.4), 4.8), dpi=80)
         constants = labels.constants(trajectories.constants_apart(dataset))
-        self.figure.suptitle(in_lines(constants, self.figure.get_figwidth()), y=0.99, fontsize=8)
+        self.figure.suptitle(constants_in_lines(constants, self.figure.get_figwidth()), y=0.99, fontsize=8)
         over_time = self.figure.add_axes((0.1, 0.12, 0.85, 0.26))
         across, up = (labels.label(dataset, name) for name in ("time", "spin"))
         over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)

@@ -731,29 +731,6 @@ def test_what_is_seen_is_saved(clicked: Page, opened: xr.Dataset, tmp_path: Path
     assert [0x21, 0x91, 0x8C] in legend.reshape(-1, 3).tolist()  # the ground of its patterns
 
 
-def test_a_map_is_one_file_that_needs_no_network(go: Open, opened: xr.Dataset, tmp_path: Path) -> None:
-    from sweep.explorer.page import save_html
-
-    save_html(opened, tmp_path / "map.html", "reversals", "mu", "b", at={"n0": 0.05})
-    page, asked = go("about:blank"), list[str]()
-    page.context.set_offline(True)
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto((tmp_path / "map.html").as_uri())
-    settle(page)
-    near = tip(page, 2, 0)
-    cell = opened.isel(mu=2, b=0, n0=N0)
-    assert labels.number(float(cell["spin_final"]))[:7] in near
-    assert "ended at the time limit" in near
-    assert "lower bound" in text(page, "legend")
-    assert len(np.unique(pixels(page, 2, 0), axis=0)) > 1
-    page.mouse.click(*place(page, 2, 0))
-    page.locator("#map").focus()
-    for key in ("ArrowUp", "Enter"):
-        page.keyboard.press(key)
-    wait(page, "cut along mu", "m.title.text === 'at b = 3'")
-    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
-
-
 # ---- who may come in
 
 
