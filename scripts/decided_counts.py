@@ -28,7 +28,7 @@ TOLERANCE, MOST_FRICTION = 1e-13, 100.0
 def near(random: np.random.Generator, cells: int) -> dict[str, Array]:
     """Cells beside boundaries."""
     mu, b = np.linspace(20, 200, 24), np.linspace(1.2, 9.8, 24)
-    found = sweep.boundaries(CONFIG, n0=0.05, width=1e-4, progress=False, mu=mu, b=b)
+    found = sweep.boundaries(CONFIG, n0=0.05, bracket=1e-4, progress=False, mu=mu, b=b)
     found = found.isel(point=(found.outcome == FOUND).values)
     at = random.integers(found.sizes["point"], size=cells)
     off = random.choice([-1, 1], cells) * 10 ** random.uniform(-4, -2, cells)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeGuard
 
 import matplotlib as mpl
 import numpy as np
@@ -50,27 +50,7 @@ def animate(
     dataset: xr.Dataset | str | Path, output: str | Path | None = None, *,
     begin: float = 0.0, end: float | None = None, speed: float | None = None,
 ) -> FuncAnimation:  # fmt: skip
-    """Show how the bodies of trajectories turn, side by side and in one clock.
-
-    Parameters
-    ----------
-    dataset : what `sweep.trajectory` gives, or the path of its file
-    output : file to write; its suffix names the format: gif, mp4 (which needs ffmpeg) or html (a page without network)
-    begin, end : the stretch of time shown; by default until a third beyond the last of the bodies' first reversals
-    speed : time shown in a second of the clip; by default such that the clip takes ten
-
-    Returns
-    -------
-    The animation, which a notebook shows by its `to_jshtml()`.
-
-    Raises
-    ------
-    ConfigError
-        if the bodies have no attitude or are too many, the stretch is empty, the speed is not above zero, or there is
-        no such format.
-    StoreError
-        if the file is not a dataset, or `output` cannot be written.
-    """
+    """Show how the bodies of trajectories turn; arguments, result and errors as of `sweep.animate`."""
     path = None if output is None else Path(output)
     if path is not None:
         check(path)
@@ -92,6 +72,11 @@ def animate(
     if path is not None:
         _save(animation, path)
     return animation
+
+
+def is_dataset(source: object) -> TypeGuard[xr.Dataset | str | Path]:
+    """Tell a dataset, or the path of its file, from a configuration."""
+    return isinstance(source, xr.Dataset) or (isinstance(source, str | Path) and suffix(Path(source)) == "nc")
 
 
 def check(path: Path) -> None:

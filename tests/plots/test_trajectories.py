@@ -14,6 +14,8 @@ from sweep.kernels.status import SETTLED
 from sweep.plots import picture
 from sweep.plots.figure import constants_in_lines
 from sweep.results.dataset import VARIABLES
+from sweep.results.kind import RUN, kind
+from sweep.results.netcdf import open_dataset
 
 SERIES = ("contact_x", "contact_y", "v0_rate_1", "slip_rate_1", "energy", "dissipated")
 CRITICAL = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
@@ -123,6 +125,11 @@ def told_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:
     file.with_suffix(".png").unlink()
     assert invoke("plot", file).exit_code == 0
     assert file.with_suffix(".png").read_bytes() == drawn
+    named = open_dataset(file)
+    plain = named.drop_attrs()
+    assert kind(named) == kind(plain)  # by its variables
+    assert kind(plain.assign_attrs(sweep_kind="run")) == RUN
+    assert named.attrs["sweep_kind"] == verb
     return file, invoke("info", file).stdout
 
 
@@ -134,7 +141,7 @@ def test_plot_and_info_know_the_file_of_a_trajectory(write: Write) -> None:
 
 
 def test_plot_and_info_know_the_file_of_critical_spins(write: Write) -> None:
-    settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--width", "0.1")
+    settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--bracket", "0.1")
     file, told = told_of("critical", write(), *settings)
     assert "critical spins of 2 bodies (mu 2)" in told
     assert "n_c1_plus: 1 no friction, 1 found; 0.0024" in told
