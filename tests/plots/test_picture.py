@@ -313,11 +313,6 @@ def test_the_suffix_names_the_format(suffix: str, tmp_path: Path) -> None:
     assert (tmp_path / f"one.{suffix}").read_bytes() == (tmp_path / f"two.{suffix}").read_bytes()
 
 
-def test_help_names_every_format() -> None:
-    said = " ".join(invoke("plot", "--help").output.split())
-    assert all(name in said for name in MAGIC)
-
-
 def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     write(tmp_path / "made.nc", made())
     for options, said in (
