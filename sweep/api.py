@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
     import xarray as xr
     from distributed import Client
+    from matplotlib.animation import FuncAnimation
 
     from sweep.config import Config, ConfigError, ConfigLike, load_config
     from sweep.config.film import Film
     from sweep.engine.reporter import Reporter
     from sweep.explorer.server import Beside
-    from sweep.plots.animation import animate
     from sweep.plots.picture import plot
     from sweep.results.store import StoreError
     from sweep.studies.predictions import predict
@@ -38,7 +38,6 @@ HOMES = {
     "Config": "sweep.config",
     "ConfigError": "sweep.config",
     "StoreError": "sweep.results.store",
-    "animate": "sweep.plots.animation",
     "load_config": "sweep.config",
     "plot": "sweep.plots.picture",
     "predict": "sweep.studies.predictions",
@@ -131,11 +130,11 @@ def run(
 
 def boundaries(
     config: ConfigLike,
-    x: str | None = None,
-    y: str | None = None,
-    width: float = BOUNDARY_WIDTH,
     output: str | Path | None = None,
     *,
+    x: str | None = None,
+    y: str | None = None,
+    bracket: float = BOUNDARY_WIDTH,
     deviation: float = BOUNDARY_DEVIATION,
     fresh: bool = False,
     progress: bool | None = None,
@@ -153,7 +152,7 @@ def boundaries(
     ----------
     config, output, fresh, progress, reporter, client, overrides : as for `run`
     x, y : axes over which the curves are drawn; by default the second and the first of more than one value
-    width : of the brackets, relative to the value of the parameter along which each lies
+    bracket : width of the brackets, relative to the value of the parameter along which each lies
     deviation : how far halfway between two points the boundary may be from the smooth curve through them, relative to
         the lengths of the axes
 
@@ -170,7 +169,7 @@ def boundaries(
 
     Examples
     --------
-    >>> curves = sweep.boundaries({"friction": {"mu": [60, 80]}}, n0=[0.02, 0.06], t_end=1000, width=0.1)
+    >>> curves = sweep.boundaries({"friction": {"mu": [60, 80]}}, n0=[0.02, 0.06], t_end=1000, bracket=0.1)
     >>> curves.attrs["x"], curves.attrs["y"]
     ('n0', 'mu')
     """
@@ -178,15 +177,15 @@ def boundaries(
     from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        task = boundaries(checked, x, y, width, deviation)
+        task = boundaries(checked, x, y, bracket, deviation)
         return kept(task, output, fresh=fresh, reporter=told, client=client)
 
 
 def critical(
     config: ConfigLike,
-    width: float = SPIN_WIDTH,
     output: str | Path | None = None,
     *,
+    bracket: float = SPIN_WIDTH,
     fresh: bool = False,
     progress: bool | None = None,
     reporter: Reporter | None = None,
@@ -202,7 +201,7 @@ def critical(
     Parameters
     ----------
     config, output, fresh, progress, reporter, client, overrides : as for `run`
-    width : of the brackets of n_c2, relative to the spin
+    bracket : width of the brackets of n_c2, relative to the spin
 
     Returns
     -------
@@ -217,7 +216,7 @@ def critical(
 
     Examples
     --------
-    >>> spins = sweep.critical({"friction": {"mu": 60}}, width=0.1)
+    >>> spins = sweep.critical({"friction": {"mu": 60}}, bracket=0.1)
     >>> f"{float(spins.n_c2_plus_simulated):.3f}"
     '0.005'
     """
@@ -225,7 +224,7 @@ def critical(
     from sweep.studies.kept import kept
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(critical(checked, width), output, fresh=fresh, reporter=told, client=client)
+        return kept(critical(checked, bracket), output, fresh=fresh, reporter=told, client=client)
 
 
 def trajectory(
@@ -250,7 +249,7 @@ def trajectory(
     stop_when_settled : end a trajectory when neither spin nor count can change any more, as a sweep does, and not at
         t_end, whatever the configuration says; with `t_end: .inf`, it always ends there
     samples : follow so many samples of the parameters that are distributions, those with which a run begins, and not
-        the medians alone; a picture then shows within which bands most of them are
+        the medians alone
     values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``, of which each combination is one trajectory;
         an axis of `config` that is not named takes its first value.  Anything else replaces a value of `config`, such
         as ``t_end=300``
@@ -282,6 +281,53 @@ def trajectory(
         return trajectory(
             checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
         )
+
+
+def animate(
+    source: ConfigLike | xr.Dataset,
+    output: str | Path | None = None,
+    *,
+    begin: float = 0.0,
+    end: float | None = None,
+    speed: float | None = None,
+    progress: bool | None = None,
+    reporter: Reporter | None = None,
+    **values: Any,
+) -> FuncAnimation:
+    """Show how single bodies turn, side by side and in one clock.
+
+    Parameters
+    ----------
+    source : a configuration, as for `run`, or a dataset of `trajectory` or the path of its file, which ends in .nc
+    output : file to write; its suffix names the format: gif, mp4 (which needs ffmpeg) or html (a page without network)
+    begin, end : the stretch of time shown; by default until a third beyond the last of the bodies' first reversals
+    speed : time shown in a second of the clip; by default such that the clip takes ten
+    progress, reporter : as for `run`
+    values : the cells and other values of a configuration, as for `trajectory`; a dataset takes none
+
+    Returns
+    -------
+    The animation, which a notebook shows by its `to_jshtml()`.
+
+    Raises
+    ------
+    ConfigError
+        as `trajectory`; also if the bodies have no attitude or are too many, the stretch is empty, the speed is not
+        above zero, or there is no such format.
+    StoreError
+        if the file is not a dataset, or `output` cannot be written.
+    """
+    from pathlib import Path
+    from typing import cast
+
+    from sweep.plots import animation
+
+    if output is not None:
+        animation.check(Path(output))
+    if animation.is_dataset(source):
+        return animation.animate(source, output, begin=begin, end=end, speed=speed, **values)
+    followed = trajectory(cast("ConfigLike", source), progress=progress, reporter=reporter, **values)
+    return animation.animate(followed, output, begin=begin, end=end, speed=speed)
 
 
 def fit(
@@ -328,7 +374,7 @@ def fit(
         return fitted(checked, film, free, laws, told)
 
 
-def explore(dataset: xr.Dataset | str | Path, height: int = 950) -> Beside:
+def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
     """Show the explorer of a dataset in a notebook: maps, and the trajectory of each cell that is clicked.
 
     It needs the extra `explore`, and a browser on the same machine as the notebook's kernel.

@@ -75,7 +75,7 @@ class Fault:
         return printable(": ".join(part for part in (place, spell(self.path), self.message) if part))
 
 
-class Refused(Exception):
+class Refused(ValueError):
     """What the user can mend, such as a configuration or a file that cannot be used; the text says how."""
 
 

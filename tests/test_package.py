@@ -97,7 +97,7 @@ VERBS = {
     "trajectory small.yaml --at mu=60 --at b=3": [
         "runs/small/small_trajectory.nc", "runs/small/small_trajectory.png",
     ],
-    "critical small.yaml --width 0.1": ["runs/small/small_critical.nc", "runs/small/small_critical.png"],
+    "critical small.yaml --bracket 0.1": ["runs/small/small_critical.nc", "runs/small/small_critical.png"],
     "plot runs/small/small.nc --var energy_error": ["runs/small/small_energy_error.png"],
     "info runs/small/small.nc": [],
     "body --mass 30g --length 12cm --width 3cm --height 15mm": [],
@@ -146,7 +146,7 @@ import sweep
 
 reveal_type(sweep.run({"friction": {"mu": 60}}, mu=np.array([1.0]), progress=False))
 reveal_type(sweep.trajectory("x.yaml", mu=60, t_end=300))
-reveal_type(sweep.critical(sweep.load_config("x.yaml"), width=0.1))
+reveal_type(sweep.critical(sweep.load_config("x.yaml"), bracket=0.1))
 reveal_type(sweep.predict("x.yaml"))
 reveal_type(sweep.open("x.nc"))
 reveal_type(sweep.load_config("x.yaml").axes)

@@ -66,9 +66,7 @@ def about(file: Path) -> Iterator[None]:
     except (Refused, OSError):
         raise
     except Exception as error:
-        spoken = isinstance(error, ValueError)  # by our plots, of what was asked of the dataset
-        reason = str(error) if spoken else f"not a dataset of sweep: {type(error).__name__}: {error}"
-        refuse(file, reason.partition("\n")[0])
+        refuse(file, f"not a dataset of sweep: {type(error).__name__}: {error}".partition("\n")[0])
 
 
 class Commands(click.Group):

@@ -29,7 +29,7 @@ def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> li
 
 
 FILE = click.argument("file", type=PATH)
-_SETTINGS = click.option(
+SETTINGS = click.option(
     "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=begun,
     help="Replace a value of the configuration, e.g. friction.mu=60, or friction.mu=20..60:41 for the range "
     "START..STOP:NUM (repeatable).",
@@ -50,7 +50,7 @@ def configured(command: Callable[..., None]) -> Callable[..., None]:
     def call(config: Path, settings: tuple[str, ...], **options: Any) -> None:
         command(config=loaded(config, settings), **options)
 
-    return click.argument("config", type=PATH)(_SETTINGS(call))
+    return click.argument("config", type=PATH)(SETTINGS(call))
 
 
 def loaded(config: Path, settings: tuple[str, ...]) -> Config:

@@ -19,57 +19,36 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
-@click.option("--var", "variable", help="Variable to draw [default: the first that was measured].")
+@FILE
+@click.option("--var", "variable", help="Variable to draw [default: the first picture that its configuration names, or "
+              "else the reversals, beside their prediction].")  # fmt: skip
 @click.option("--x", help="Parameter along the horizontal axis.")
 @click.option("--y", help="Parameter along the vertical axis.")
 @click.option("--sel", "cells", multiple=True, metavar="NAME=VALUE",
               help="Draw only the cells nearest to this value of a parameter, e.g. n0=0.05 (repeatable).")  # fmt: skip
 @click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
 @click.option("--cmap", metavar="NAME", help="A colour map of matplotlib, such as viridis.")
-@click.option("--contours", is_flag=True, help="Draw lines of equal value over maps of real numbers.")
-@click.option("--histogram", is_flag=True, help="Draw how many cells have each value.")
 @click.option("--width", metavar="LENGTH",
               help="Width of a figure for print, such as 85mm, with text of 6 points or more.")  # fmt: skip
 @click.option("--no-title", is_flag=True, help="Draw no title.")
-@click.option("--output", type=PATH, help=f"Picture to write; its suffix names the format: {formats.ANY} "
+@click.option("--output", type=PATH, help=f"Picture to write; its suffix names the format: {formats.A_PICTURE} "
               "[default: a PNG beside FILE].")  # fmt: skip
 def plot(
-    files: tuple[Path, ...], variable: str | None, cells: tuple[str, ...], limits: str | None, no_title: bool,
-    output: Path | None, **how: Any,
+    file: Path, variable: str | None, cells: tuple[str, ...], limits: str | None, no_title: bool, output: Path | None,
+    **how: Any,
 ) -> None:  # fmt: skip
-    """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries.
-
-    Of several runs, the maps of one variable are drawn side by side, with one scale.
-    """
+    """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries."""
     sel = dict(parse_pair(cell, "--sel") for cell in cells)
     span = parse_span(limits, "--limits") if limits is not None else None
     from sweep.plots import panels, picture
 
     interrupt.raise_again()
-    stem = "-".join(file.stem for file in files)
-    target = output or files[0].with_name(f"{stem}{f'_{variable}' if variable else ''}.png")
-    if formats.suffix(target) == formats.PAGE:
-        if len(files) > 1:
-            refuse(f"--output {target}", f"a page shows one dataset; write a {formats.A_PICTURE} of several")
-        for option, value in {"limits": limits, "no-title": no_title, **how}.items():
-            if value and option not in ("x", "y"):
-                refuse(f"--{option}", f"not for a page; write a {formats.A_PICTURE}")
-        with needs_bokeh("--output"):
-            from sweep.explorer.page import save_html
-        with about(files[0]):
-            save_html(opened(files[0]), target, variable, how["x"], how["y"], sel)
-        say(f"wrote {target}")
-        return
-    if formats.suffix(target) not in formats.PICTURES:
-        refuse(f"--output {target}", f"unknown format; write a {formats.ANY}")
-    datasets = [opened(file) for file in files]
-    for file, dataset in zip(files, datasets, strict=True):
-        with about(file):
-            for name, taken in panels.nearest(dataset, sel).items():
-                say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
-    with about(files[0]):
-        picture.plot(datasets, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
+    target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
+    dataset = opened(file)
+    with about(file):
+        for name, taken in panels.nearest(dataset, sel).items():
+            say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
+        picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
     say(f"wrote {target}")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
-from sweep.cli.options import OUTPUT, PATH, QUIET, begun, cells_of, configured
+from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured, loaded
 from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
@@ -98,7 +98,7 @@ def trajectory(
 
     Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip,
     normal force, energy and the work of friction.  Several trajectories are drawn over each other; of samples,
-    the bands in which most of the spins lie.
+    the spins alone.
     """
     if dry_run:
         at = cells_of(cells, config.table)
@@ -114,33 +114,40 @@ def trajectory(
 
 
 @click.command()
-@configured
+@click.argument("source", metavar="CONFIG|FILE", type=PATH)
+@SETTINGS
 @AT
 @click.option("--from", "begin", type=float, default=0.0, show_default=True, help="Time at which the clip begins.")
 @click.option("--to", "end", type=float, help="Time at which it ends [default: some time after the first reversal].")
 @click.option("--speed", type=click.FloatRange(0, min_open=True),
               help="Time shown in a second [default: such that the clip takes ten].")  # fmt: skip
-@click.option("--output", type=PATH, help="gif, mp4 or html to write [default: runs/NAME/NAME_trajectory.gif].")
+@click.option(
+    "--output",
+    type=PATH,
+    help="gif, mp4 or html to write [default: NAME_trajectory.gif in runs/NAME, or beside FILE].",
+)
 @QUIET
 def animate(
-    config: Config, cells: tuple[str, ...], begin: float, end: float | None, speed: float | None, output: Path | None,
-    quiet: bool,
+    source: Path, settings: tuple[str, ...], cells: tuple[str, ...], begin: float, end: float | None,
+    speed: float | None, output: Path | None, quiet: bool,
 ) -> None:  # fmt: skip
-    """Show how single bodies of CONFIG turn, and their contact points' paths on the table.
+    """Show how single bodies turn, and their contact points' paths on the table.
 
-    Several stand side by side, in one clock, above their spins.  A page (html) opens without network; an mp4 needs
-    ffmpeg.
+    The bodies are those of CONFIG, or of FILE, which `sweep trajectory` wrote (NAME_trajectory.nc).  They are shown
+    side by side on a common clock, above their spin curves.  A page (html) opens without network; an mp4 needs ffmpeg.
     """
     from sweep.plots import animation
 
-    target = output or Path("runs") / config.name / f"{config.name}_trajectory.gif"
-    try:
-        animation.check(target)
-        result = _followed(config, cells, quiet)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        animation.animate(result, target, begin=begin, end=end, speed=speed)
-    except ValueError as error:
-        refuse("animate", str(error))
+    of_file = animation.is_dataset(source)
+    if of_file and (settings or cells):
+        refuse("--set" if settings else "--at", "not for a dataset; give the configuration in its place")
+    config = None if of_file else loaded(source, settings)
+    usual = Path("runs") / config.name / f"{config.name}_trajectory.gif" if config else source.with_suffix(".gif")
+    target = output or usual
+    animation.check(target)
+    result = _followed(config, cells, quiet) if config else source
+    target.parent.mkdir(parents=True, exist_ok=True)
+    animation.animate(result, target, begin=begin, end=end, speed=speed)
     if not quiet:
         say(f"wrote {target}")
 
@@ -149,12 +156,12 @@ def animate(
 @configured
 @click.option("--x", help="Parameter along the horizontal axis.")
 @click.option("--y", help="Parameter along the vertical axis.")
-@click.option("--width", type=click.FloatRange(1e-12, 0.5), default=BOUNDARY_WIDTH, show_default=True,
+@click.option("--bracket", type=click.FloatRange(1e-12, 0.5), default=BOUNDARY_WIDTH, show_default=True,
               help="Relative distance of the two simulated cells between which a count changes.")  # fmt: skip
 @click.option("--deviation", type=click.FloatRange(1e-9), default=BOUNDARY_DEVIATION, show_default=True,
               help="Distance of a curve from its boundary between two points, in lengths of the axes.")  # fmt: skip
 @_resumed
-def boundaries(config: Config, x: str | None, y: str | None, width: float, deviation: float, **how: Any) -> None:
+def boundaries(config: Config, x: str | None, y: str | None, bracket: float, deviation: float, **how: Any) -> None:
     """Find the curves over two axes of CONFIG on which the number of reversals changes.
 
     The cells of the grid tell where the curves pass, and further simulations how exactly: each point lies between
@@ -163,15 +170,15 @@ def boundaries(config: Config, x: str | None, y: str | None, width: float, devia
     """
     from sweep.studies.boundaries import boundaries as search
 
-    _studied(search(config, x, y, width, deviation), **how)
+    _studied(search(config, x, y, bracket, deviation), **how)
 
 
 @click.command()
 @configured
-@click.option("--width", type=click.FloatRange(1e-12, 0.5), default=SPIN_WIDTH, show_default=True,
+@click.option("--bracket", type=click.FloatRange(1e-12, 0.5), default=SPIN_WIDTH, show_default=True,
               help="Relative width of the brackets of n_c2.")  # fmt: skip
 @_resumed
-def critical(config: Config, width: float, **how: Any) -> None:
+def critical(config: Config, bracket: float, **how: Any) -> None:
     """Find the critical spins over all axes of CONFIG but n0.
 
     They come from the paper's formulas, n_c1 also from the model's eigenvalues, and n_c2 from simulation.
@@ -180,7 +187,7 @@ def critical(config: Config, width: float, **how: Any) -> None:
     """
     from sweep.studies.critical import critical as search
 
-    _studied(search(config, width), **how)
+    _studied(search(config, bracket), **how)
 
 
 @click.command()

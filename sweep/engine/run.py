@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigLike, load_config
+from sweep.config import Config, ConfigError, ConfigLike, load_config
 from sweep.engine import local
 from sweep.engine.cluster import connected, run_tiles
 from sweep.engine.enlarged import RERUN, Earlier, Enlarged, is_whole, reason_against, taken_over
@@ -187,5 +187,5 @@ def _draw(variables: Sequence[str], result: xr.Dataset, files: RunFiles, reporte
         if others or not path.exists():
             try:
                 picture.plot(result, variable, output=path)
-            except ValueError as error:
+            except ConfigError as error:
                 reporter.note(f"no picture{f' of {variable}' if variable else ''}: {error}")

@@ -16,7 +16,7 @@ from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, marks, quantities
 from sweep.plots.description import Map, along, describe
-from sweep.results.kind import BOUNDARIES, FIT, INDICES, TRAJECTORY, kind
+from sweep.results.kind import kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
 
@@ -57,8 +57,9 @@ class Source:
     def __init__(self, dataset: xr.Dataset, name: str = "dataset") -> None:
         cells = dataset["status"] if "status" in dataset else next(iter(dataset.data_vars.values()), None)
         dims = () if cells is None else tuple(str(d) for d in cells.dims)
-        what = "no axis" if not dims else TRAJECTORY if "trajectory" in dims else kind(dataset)
-        if what in ("no axis", TRAJECTORY, BOUNDARIES, FIT, INDICES):
+        found = kind(dataset)
+        what = "no axis" if not dims else found.words if found and not found.explored else ""
+        if what:
             raise StoreError(f"{name} has {what}; open a dataset of run or critical that has an axis or more")
         if taken := ADDRESS.intersection(dims):
             raise StoreError(f"{name}: the axis {min(taken)} has the name of a key of the explorer's address")

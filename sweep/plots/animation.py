@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeGuard
 
 import matplotlib as mpl
 import numpy as np
@@ -15,11 +15,11 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
-from sweep.plots.figure import zero_line
+from sweep.plots.figure import constants_in_lines, zero_line
 from sweep.plots.formats import suffix
-from sweep.plots.panels import in_lines
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
@@ -50,41 +50,21 @@ def animate(
     dataset: xr.Dataset | str | Path, output: str | Path | None = None, *,
     begin: float = 0.0, end: float | None = None, speed: float | None = None,
 ) -> FuncAnimation:  # fmt: skip
-    """Show how the bodies of trajectories turn, side by side and in one clock.
-
-    Parameters
-    ----------
-    dataset : what `sweep.trajectory` gives, or the path of its file
-    output : file to write; its suffix names the format: gif, mp4 (which needs ffmpeg) or html (a page without network)
-    begin, end : the stretch of time shown; by default until a third beyond the last of the bodies' first reversals
-    speed : time shown in a second of the clip; by default such that the clip takes ten
-
-    Returns
-    -------
-    The animation, which a notebook shows by its `to_jshtml()`.
-
-    Raises
-    ------
-    ValueError
-        if the bodies have no attitude or are too many, the stretch is empty, the speed is not above zero, or there is
-        no such format.
-    StoreError
-        if the file is not a dataset, or `output` cannot be written.
-    """
+    """Show how the bodies of trajectories turn; arguments, result and errors as of `sweep.animate`."""
     path = None if output is None else Path(output)
     if path is not None:
         check(path)
     if speed is not None and not speed > 0:
-        raise ValueError(f"speed: {speed:g}; give a number above zero")
+        raise fault_of(f"{speed:g}; give a number above zero", "speed")
     found = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
     if "heading" not in found:
-        raise ValueError("its bodies have no attitude; animate trajectories of the models slip or noslip")
+        raise fault_of("its bodies have no attitude; animate trajectories of the models slip or noslip")
     if (bodies := found.sizes["trajectory"]) > MOST:
-        raise ValueError(f"{bodies} bodies are too many to stand side by side; choose at most {MOST}")
+        raise fault_of(f"{bodies} bodies are too many to stand side by side; choose at most {MOST}")
     last = float(found["time"][-1])
     end = min(_until(found) if end is None else end, last)
     if not begin < end:
-        raise ValueError(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
+        raise fault_of(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
     seconds = SECONDS if speed is None else (end - begin) / speed
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
     scene = _Scene(found, np.linspace(begin, end, count))
@@ -94,12 +74,17 @@ def animate(
     return animation
 
 
+def is_dataset(source: object) -> TypeGuard[xr.Dataset | str | Path]:
+    """Tell a dataset, or the path of its file, from a configuration."""
+    return isinstance(source, xr.Dataset) or (isinstance(source, str | Path) and suffix(Path(source)) == "nc")
+
+
 def check(path: Path) -> None:
-    """Raise a `ValueError` if no animation can be written to a file of this name."""
+    """Raise a `ConfigError` if no animation can be written to a file of this name."""
     if suffix(path) not in FORMATS:
-        raise ValueError(f"output: {path}: unknown format; write a gif, mp4 or html")
+        raise fault_of(f"{path}: unknown format; write a gif, mp4 or html", "output")
     if suffix(path) == "mp4" and not FFMpegWriter.isAvailable():
-        raise ValueError(f"output: {path}: needs ffmpeg, which is not installed; install it, or write a gif or html")
+        raise fault_of(f"{path}: needs ffmpeg, which is not installed; install it, or write a gif or html", "output")
 
 
 def _until(dataset: xr.Dataset) -> float:
@@ -115,7 +100,7 @@ class _Scene:
         bodies = dataset.sizes["trajectory"]
         self.figure = Figure((max(3.2 * bodies, 6.4), 4.8), dpi=80)
         constants = labels.constants(trajectories.constants_apart(dataset))
-        self.figure.suptitle(in_lines(constants, self.figure.get_figwidth()), y=0.99, fontsize=8)
+        self.figure.suptitle(constants_in_lines(constants, self.figure.get_figwidth()), y=0.99, fontsize=8)
         over_time = self.figure.add_axes((0.1, 0.12, 0.85, 0.26))
         across, up = (labels.label(dataset, name) for name in ("time", "spin"))
         over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from sweep.axis import Axis
 from sweep.grid import Array
-from sweep.plots import labels, lines, scales
+from sweep.plots import labels, lines, places, scales
 from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
 from sweep.plots.panels import MAX_PANELS
 from sweep.plots.theory import Line
@@ -38,7 +38,7 @@ def draw(dataset: xr.Dataset) -> Picture:
         for level, xs, ys in drawn:
             axes.plot(xs, ys, color=scale.rgba(np.array(level)).tolist(), linewidth=1.4, gid=f"level{level}")
         each = [Line("boundary", "", [(xs, ys)], f"{level}") for level, xs, ys in drawn]
-        lines.number(axes, each, _axis(dataset, x), _axis(dataset, y))
+        lines.write(axes, places.numbers(each, _axis(dataset, x), _axis(dataset, y)))
         open_ = part.isel(point=(part["outcome"] == OPEN).values)
         axes.plot(open_[x], open_[y], markersize=3, **_OPEN)
         axes.set(xlabel=labels.label(dataset, x), ylabel=labels.label(dataset, y))

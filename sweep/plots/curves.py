@@ -17,11 +17,11 @@ from sweep.plots.description import describe
 from sweep.plots.figure import BESIDE, Frames, set_scale
 from sweep.plots.marks import BLANK, legend
 from sweep.plots.panels import Panels
-from sweep.plots.quantities import PREDICTIONS
+from sweep.plots.quantities import COMPARISONS
 from sweep.plots.scales import Limits
 
 _STYLES: dict[str, dict[str, Any]] = {
-    **{predicted: {"marker": "s", "fillstyle": "none", "color": "C1"} for predicted, _ in PREDICTIONS.values()},
+    **{predicted: {"marker": "s", "fillstyle": "none", "color": "C1"} for _, predicted in COMPARISONS.values()},
     "failed": {"marker": "v", "color": "crimson"},
     "not_run": {"marker": "v", "color": "0.6", "fillstyle": "none"},
     "impossible": {"marker": "_", "color": "0.6"},

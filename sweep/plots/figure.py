@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Sequence
 from io import BytesIO
 from math import log
 from string import ascii_lowercase
@@ -12,21 +11,17 @@ from textwrap import fill
 from typing import Any, Literal
 
 import matplotlib as mpl
-import numpy as np
 import xarray as xr
-from matplotlib import _mathtext
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
-from matplotlib.text import Text
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels
-from sweep.plots.panels import Panel, in_lines, title
+from sweep.plots.panels import Panel, title
 
 TEXT = 9.0
 """Points of the text beside which the inches here are told: with smaller text all of a figure is smaller."""
@@ -51,9 +46,6 @@ _STYLE: dict[Any, Any] = {
 _PRINT: dict[Any, Any] = {"font.size": 7.5, "figure.dpi": 300}
 """What figures for print have in their place, so that no text is too small."""
 
-_SMALLEST = 6.0
-"""Points of the smallest text in a figure for print, and of the subscripts in a legend of any figure."""
-
 _LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.75, 0.17, 4
 """Inches that a letter, the rest of an entry and a line take in a legend, and lines for which figures have room."""
 
@@ -62,6 +54,12 @@ _OF_TITLE = 0.09
 
 _OF_LABEL = 0.085
 """Inches of a letter of a label of an axis, with some room, since axes are laid out later."""
+
+_OF_CONSTANTS, _LONGEST = 1 / 13, 90
+"""Inches of a letter of the constant parameters, and most letters in a line of them."""
+
+_UNIT, _PARAMETER = r"(?<= )\(.*\)$", "[^, ][^,]*"
+"""What stays on one line: brackets at the end of a label, such as its unit; a parameter with its value."""
 
 _LEAST = 2.1
 """Inches of a map across, at least."""
@@ -96,28 +94,16 @@ class Picture(Figure):
         scale = mpl.rcParams["font.size"] / TEXT
         super().__init__((width * scale, height * scale), layout="constrained")
         self._constants, self._width, self._height = "", width, height
-        self._legend_size = FontProperties(size=mpl.rcParams["legend.fontsize"]).get_size_in_points()
         self._style: dict[Any, Any] = {name: mpl.rcParams[name] for name in _STYLE}
 
     def draw(self, renderer: RendererBase) -> None:
-        with self.drawing():
+        with mpl.rc_context(self._style):
             super().draw(renderer)
 
     def savefig(self, *args: Any, **kwargs: Any) -> None:
         """Save it as any figure of matplotlib, in the style in which it was drawn."""
-        with self.drawing():
+        with mpl.rc_context(self._style):
             super().savefig(*args, **kwargs)
-
-    @contextmanager
-    def drawing(self) -> Iterator[None]:
-        """The style of the figure, while it is drawn."""
-        usual = _mathtext.SHRINK_FACTOR  # of subscripts, for which matplotlib has no setting
-        _mathtext.SHRINK_FACTOR = max(usual, min(_SMALLEST / self._legend_size, 1.0))
-        try:
-            with mpl.rc_context(self._style):
-                yield
-        finally:
-            _mathtext.SHRINK_FACTOR = usual
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()
@@ -126,7 +112,7 @@ class Picture(Figure):
 
     def head(self, title: str, constants: str) -> None:
         """A title, and the constant parameters, which stand over the legend."""
-        self._constants = in_lines(constants, self._width)
+        self._constants = constants_in_lines(constants, self._width)
         if title:
             self.suptitle(fill(title, int(self._width / _OF_TITLE)))
 
@@ -161,7 +147,7 @@ class Picture(Figure):
             letter = _OF_LABEL * self.dpi * self.get_figwidth() / self._width
             across, up = axes.bbox.size
             for text, length in ((axes.title, across), (axes.xaxis.label, across), (axes.yaxis.label, up)):
-                text.set_text(_wrapped(text.get_text(), int(length / letter)))
+                text.set_text(_wrapped(text.get_text(), int(length / letter), _UNIT))
 
     def letter(self) -> None:
         """Letters a, b, c at the panels, if there are several."""
@@ -171,23 +157,21 @@ class Picture(Figure):
                           ha="right", va="bottom", weight="bold")  # fmt: skip
 
 
-def _wrapped(words: str, room: int) -> str:
-    """Words in lines of so many letters, if these are not broken within the brackets at the end, such as a unit."""
+def constants_in_lines(constants: str, width: float) -> str:
+    """The constant parameters in lines, for a figure of so many inches."""
+    return _wrapped(constants, min(_LONGEST, int(width / _OF_CONSTANTS)), _PARAMETER)
+
+
+def _wrapped(words: str, room: int, whole: str) -> str:
+    """Words in lines of so many letters, which break nowhere within what the pattern `whole` matches."""
     space = "\N{NO-BREAK SPACE}"
-    whole = re.sub(r"(?<= )\(.*\)$", lambda brackets: brackets[0].replace(" ", space), words)
-    return fill(whole, max(room, 1), break_long_words=False).replace(space, " ")
+    joined = re.sub(whole, lambda found: found[0].replace(" ", space), words)
+    return fill(joined, max(room, 1), break_long_words=False, break_on_hyphens=False).replace(space, " ")
 
 
 def zero_line(axes: Axes) -> None:
     """Draw where the spin, or what else goes up, is zero."""
     axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
-
-
-def extent(text: Text) -> Array:
-    """Width and height of a text in pixels, as it will be drawn."""
-    figure = text.get_figure(root=True)
-    with figure.drawing() if isinstance(figure, Picture) else nullcontext():
-        return np.asarray(text.get_window_extent().size)
 
 
 def page() -> float:

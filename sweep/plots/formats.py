@@ -5,10 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 PICTURES = ("png", "pdf", "svg", "eps")
-PAGE = "html"
-"""A map as a page of its own, from the command alone; the explorer writes it."""
-
-A_PICTURE, ANY = "png, pdf, svg or eps", "png, pdf, svg, eps or html"
+A_PICTURE = "png, pdf, svg or eps"
 """The same in words."""
 
 

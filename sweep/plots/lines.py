@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import AbstractPathEffect, withStroke
-from matplotlib.ticker import LogLocator
 
-from sweep.axis import Axis
-from sweep.grid import Array
 from sweep.plots import labels, places
 from sweep.plots.description import Map
-from sweep.plots.figure import RATIO, extent
-from sweep.plots.scales import Scale
 from sweep.plots.theory import STYLES, Line
 
 _DASHES = {"dotted": (0, (1.5, 1.5)), "solid": "-", "dashed": (0, (6, 3))}
@@ -25,9 +19,7 @@ _STYLES: dict[str, dict[str, Any]] = {
     name: {"linestyle": _DASHES[dash], "linewidth": width} for name, (dash, width) in STYLES.items()
 }
 
-_LAID_OUT = 0.9
-"""The least size of a map, relative to that which it has before the figure is laid out; its height is then told by
-its width."""
+_BOX = {"boxstyle": "round,pad=0.08", "facecolor": "white", "edgecolor": "none"}
 
 
 def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
@@ -35,7 +27,7 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
 
     Parameters
     ----------
-    labelled : whether there is room for symbols at the lines
+    labelled : whether there is room for words on the lines
     """
     box = axes.axis()
     for line in shown.lines:
@@ -44,29 +36,15 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
             axes.plot(*part, color="black", path_effects=_halo(2 * style["linewidth"]), gid=line.name, **style)
     axes.axis(box)
     if labelled:
-        _symbols(axes, shown, number(axes, shown.lines, shown.x, shown.y))
+        first = sorted((line for line in shown.lines if line.symbol), key=lambda line: line.name != "boundary")
+        write(axes, places.words(first, shown.lines, shown.x, shown.y))
     return {line.words: entry(line.name, line.words) for line in shown.lines}
 
 
-def number(axes: Axes, drawn: list[Line], x: Axis, y: Axis) -> list[places.Number]:
-    """Write the counts that begin on boundaries into the lines themselves; returns where."""
-    written = list(places.numbers(drawn, x, y))
-    for at_x, at_y, count in written:
-        axes.annotate(count, (at_x, at_y), size="small", color="black", ha="center", va="center", path_effects=_halo(2))
-    return written
-
-
-def draw_contours(axes: Axes, shown: Map, scale: Scale) -> None:
-    """Lines of equal value, with the values in them, on a map of real numbers; counts have their boundaries instead."""
-    if shown.values.dtype.kind == "f" and min(shown.values.shape) > 1:
-        values = np.ma.masked_where(shown.blank, shown.values)
-        locator = LogLocator(subs=(1, 2, 5)) if isinstance(scale.norm, LogNorm) else None
-        levels = list(scale.ticks) if scale.ticks else None
-        how: dict[str, Any] = {"norm": scale.norm, "locator": locator, "colors": "black", "linewidths": 0.6}
-        found = axes.contour(shown.x.values, shown.y.values, values, levels, **how)
-        found.set_path_effects(_halo(1.2))
-        for number in axes.clabel(found, fmt=scale.ticks or labels.number, fontsize="small"):
-            number.set_path_effects(_halo(2))
+def write(axes: Axes, words: Iterable[places.Number]) -> None:
+    """Write words on lines."""
+    for x, y, word in words:
+        axes.text(x, y, labels.in_maths(word), size="small", color="black", ha="center", va="center", bbox=_BOX)
 
 
 def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
@@ -85,19 +63,3 @@ def entry(name: str, words: str) -> Line2D:
 
 def _halo(width: float) -> list[AbstractPathEffect]:
     return [withStroke(linewidth=width, foreground="white")]
-
-
-def _symbols(axes: Axes, shown: Map, written: list[places.Number]) -> None:
-    """Write the symbols of critical spins beside their lines, where there is room."""
-    words = {line.symbol: labels.in_maths(line.symbol) for line in shown.lines if line.name != "boundary"}
-    size = _LAID_OUT * axes.bbox.width * np.array([1, RATIO])
-    halves: dict[str, Array] = {}
-    for symbol, of in words.items():
-        text = axes.text(0, 0, of)
-        halves[symbol] = extent(text) / size / 2
-        text.remove()
-    in_points = size * 72 / axes.get_figure(root=True).dpi  # type: ignore[union-attr]
-    for symbol, at, middle in places.symbols(shown.lines, shown.x, shown.y, written, halves):
-        axes.annotate(words[symbol], tuple(at), xycoords="axes fraction", xytext=tuple((middle - at) * in_points),
-                      textcoords="offset points", color="black", ha="center", va="center",
-                      path_effects=_halo(2))  # fmt: skip

@@ -82,21 +82,10 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     }
 
 
-def legend(dataset: xr.Dataset, name: str, *others: xr.Dataset) -> dict[str, str]:
-    """Word a legend for each kind that occurs: its words, and how many cells are of it.
-
-    Parameters
-    ----------
-    others : datasets drawn beside it, whose cells are counted for themselves
-    """
-    datasets = (dataset, *others)
-    found, entries = [marks(each, name) for each in datasets], {}
-    for kind in WORDS:
-        counts = [int(kinds[kind].sum()) for kinds in found]
-        if any(counts):
-            there = [each for each, count in zip(datasets, counts, strict=True) if count]
-            entries[kind] = f"{_meaning(there, name, kind)} ({of_all(counts, [kinds[kind].size for kinds in found])})"
-    return entries
+def legend(dataset: xr.Dataset, name: str) -> dict[str, str]:
+    """Word a legend for each kind that occurs: its words, and how many cells are of it."""
+    counts = {kind: (int(where.sum()), where.size) for kind, where in marks(dataset, name).items()}
+    return {k: f"{_meaning(dataset, name, k)} ({count} of {size})" for k, (count, size) in counts.items() if count}
 
 
 def with_results(dataset: xr.Dataset, name: str) -> tuple[Array, int]:
@@ -106,19 +95,13 @@ def with_results(dataset: xr.Dataset, name: str) -> tuple[Array, int]:
     return found.values[~blank], found.size
 
 
-def of_all(counts: list[int], sizes: list[int]) -> str:
-    """Numbers of cells in one dataset after the other: "3 of 80 and 5 of 80"."""
-    return " and ".join(f"{count} of {size}" for count, size in zip(counts, sizes, strict=True))
-
-
-def _meaning(datasets: list[xr.Dataset], name: str, kind: str) -> str:
-    """Say what a kind of cell, which all these datasets have, means for a variable, in words."""
+def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
+    """Say what a kind of cell means for a variable, in words."""
     if kind == "failed":
-        each = [dataset["status"].values.ravel() for dataset in datasets]
-        codes, counts = np.unique(np.concatenate(each), return_counts=True)
+        codes, counts = np.unique(dataset["status"].values, return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]
         return f"failed: {', '.join(ends)}"
-    if kind == "inferred" and field(datasets[0], name).dtype.kind == "f":
+    if kind == "inferred" and field(dataset, name).dtype.kind == "f":
         return "not simulated: only counts are inferred"
     return _PER_VARIABLE.get((name, kind), WORDS[kind])
 

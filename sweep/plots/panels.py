@@ -9,19 +9,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from textwrap import fill
 
 import numpy as np
 import xarray as xr
 
+from sweep.faults import fault_of
 from sweep.plots import labels
-from sweep.plots.quantities import PREDICTIONS, field, pictured, subject
+from sweep.plots.quantities import COMPARISONS, derivable, field, first_picture, subject
 
 MAX_PANELS = 8
 """Panels that a figure may have."""
-
-_HEADING, _LETTERS = 90, 13.0
-"""Most letters in a line of the constant parameters above a figure, and letters that an inch of the figure holds."""
 
 _TELLING = 3
 """Maps of probabilities, each of another count, that one figure shows unasked."""
@@ -43,9 +40,9 @@ class Panels:
     whole: xr.Dataset
     """Of all cells."""
     names: list[str]
-    """The variable, and beside it its prediction if there is one: what shares a scale."""
+    """The variable, or the two that it compares: what shares a scale."""
     compared: list[str]
-    """How these two compare, for maps alone: `difference` or `ratio`."""
+    """How the two compare, for maps alone: `difference` or `ratio`."""
     across: list[str]
     """Dimensions drawn as axes, the vertical one first: up to two."""
     each: list[Panel]
@@ -59,26 +56,28 @@ def choose(
     y: str | None = None,
     sel: Mapping[str, float] | None = None,
     most: int | None = None,
+    alone: bool = False,
 ) -> Panels:
     """Choose what to draw of a dataset; other parameters as of `sweep.plots.picture.plot`.
 
     Parameters
     ----------
     most : values of an axis that a map has at most, taken evenly; by default all.  The others are not read
+    alone : whether a comparison is shown without what it compares
 
     Raises
     ------
-    ValueError
+    ConfigError
         if there is no such variable or axis, or there would be too many panels.
     """
     dataset = dataset.isel(_nearest(dataset, sel or {}))
-    names, compared = _variables(dataset, variable)
+    names, compared = _variables(dataset, variable, alone=alone)
     dims = [str(d) for d in field(dataset, names[0]).dims]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in dims:
-            raise ValueError(f"{option}: {names[0]} has no axis {name}; its axes are {', '.join(dims) or 'none'}")
+            raise fault_of(f"{names[0]} has no axis {name}; its axes are {', '.join(dims) or 'none'}", option)
     if x is not None and x == y:
-        raise ValueError(f"x and y are both {x}; choose two axes")
+        raise fault_of(f"{x} is the other axis already; choose two axes", "y")
     across = _across(dataset, dims, x, y)
     rest = [d for d in dims if d not in across]
     if names == ["probability"] and len(across) < 2:
@@ -87,7 +86,7 @@ def choose(
         dataset = dataset.isel(count=_telling(dataset))
     if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
         shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
-        raise ValueError(f"{count} panels ({shown}) are more than {MAX_PANELS}; select one value of an axis")
+        raise fault_of(f"{count} panels ({shown}) are more than {MAX_PANELS}; select one value of an axis")
     whole = dataset
     if most and len(across) == 2:
         dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // most)) for d in across})
@@ -97,7 +96,7 @@ def choose(
 
 
 def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:
-    """For each axis of `sel`, its value nearest to the one asked for; `ValueError` where there is no such axis."""
+    """For each axis of `sel`, its value nearest to the one asked for; `ConfigError` where there is no such axis."""
     return {name: float(dataset[name][i]) for name, i in _nearest(dataset, sel).items()}
 
 
@@ -107,9 +106,9 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
     for name, wanted in sel.items():
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
-            raise ValueError(f"sel: there is no axis {name}; the axes are {axes or 'none'}")
+            raise fault_of(f"there is no axis {name}; the axes are {axes or 'none'}", "sel")
         if not math.isfinite(wanted):
-            raise ValueError(f"sel: {name} = {wanted}; give a finite number")
+            raise fault_of(f"{name} = {wanted}; give a finite number", "sel")
         found[name] = int(np.abs(dataset[name].values - wanted).argmin())
     return found
 
@@ -124,21 +123,11 @@ def title(dataset: xr.Dataset, panel: Panel) -> str:
     return ", ".join(labels.measured(dataset, d, float(dataset[d][i])) for d, i in panel.items())
 
 
-def in_lines(constants: str, width: float) -> str:
-    """Constants in lines that break between them, for a figure of so many inches."""
-    space = "\N{NO-BREAK SPACE}"
-    breakable = constants.replace(" ", space).replace(f",{space}", ", ")
-    return fill(breakable, min(_HEADING, int(_LETTERS * width)), break_on_hyphens=False).replace(space, " ")
-
-
-def _variables(dataset: xr.Dataset, variable: str | None) -> tuple[list[str], list[str]]:
-    """The variables to draw: by default what the dataset is about; a prediction beside it, and how the two compare."""
-    chosen = variable or subject(dataset)
-    field(dataset, chosen)  # raises if there is none
-    predicted, comparison = PREDICTIONS.get(chosen, ("", ""))
-    named = variable or next(iter(pictured(dataset)), "")
-    alone = predicted not in dataset or named == "reversals"
-    return ([chosen], []) if alone else ([chosen, predicted], [comparison])
+def _variables(dataset: xr.Dataset, variable: str | None, *, alone: bool) -> tuple[list[str], list[str]]:
+    """The variables to draw, and how they compare."""
+    chosen = variable or (subject if alone else first_picture)(dataset)
+    beside = [] if alone or chosen not in derivable(dataset) else [*COMPARISONS.get(chosen, ())]
+    return (beside, [chosen]) if beside else ([chosen], [])
 
 
 def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,12 +13,12 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sweep.faults import fault_of
 from sweep.plots import (
     boundaries,
     critical,
     curves,
     fit,
-    histograms,
     indices,
     labels,
     maps,
@@ -29,10 +29,10 @@ from sweep.plots import (
 )
 from sweep.plots.figure import Frames, Picture, framed, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
-from sweep.plots.quantities import DERIVED, subject
+from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
 from sweep.results.dataset import VARIABLES
-from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, kind
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, Kind, kind
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 from sweep.units import LENGTH, quantity
@@ -42,18 +42,15 @@ _NO_DATE: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"D
 _NARROWEST, _WIDEST = 0.05, 1.0
 """Metres of a figure across."""
 
-_OWN: dict[str | None, Callable[[xr.Dataset], Picture]] = {
+_OWN: dict[Kind, Callable[[xr.Dataset], Picture]] = {
     TRAJECTORY: trajectories.draw, CRITICAL: critical.draw, BOUNDARIES: boundaries.draw, FIT: fit.draw,
     INDICES: indices.draw,
 }  # fmt: skip
-"""Kinds of dataset that have a picture of their own."""
-
-Source = xr.Dataset | xr.DataArray | str | Path
-"""A dataset, the path of its file, or a variable of it."""
+"""How the kinds of dataset are drawn that are not drawn as maps or curves."""
 
 
 def plot(
-    dataset: Source | Sequence[Source],
+    dataset: xr.Dataset | xr.DataArray | str | Path,
     variable: str | None = None,
     *,
     x: str | None = None,
@@ -61,8 +58,6 @@ def plot(
     sel: Mapping[str, float] | None = None,
     limits: Limits | None = None,
     cmap: str | None = None,
-    contours: bool = False,
-    histogram: bool = False,
     width: str | None = None,
     figsize: tuple[float, float] | None = None,
     title: bool = True,
@@ -73,23 +68,21 @@ def plot(
 
     Parameters
     ----------
-    dataset : a dataset, the path of its file, or one of its variables, whose cells have no marks, since the dataset
-        knows of them.  Of several, maps of one variable are drawn side by side, with one scale
-    variable : of the dataset, or one of `sweep.plots.quantities.DERIVED`; by default what the run's `measure` names
-        first, or else the reversals.  Beside these and beside `t_first_reversal` stand their prediction and how the
-        two compare: the `difference` or the `ratio`
+    dataset : a dataset, the path of its file, or one of its variables, whose cells then have no marks
+    variable : of the dataset, or one of `sweep.plots.quantities.DERIVED`.  The maps of `difference` and `ratio` stand
+        beside the maps of the two variables that they compare.  By default the first that the configuration names
+        under `picture`, or else the reversals, by their difference from the prediction if there is one
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
         the values of the other axes gets a panel, up to eight
     sel : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
     limits : lowest and highest value of the scale
     cmap : name of a colour map of matplotlib
-    contours : whether maps of real numbers have lines of equal value
-    histogram : whether to draw, in place of maps or curves, how many of their cells have each value
-    width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, and panels have
-        letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if that was changed
+    width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, except subscripts,
+        and panels have letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if
+        that was changed
     figsize : width and height in inches, by default as high as the panels need
     title : whether the figure has one
-    ax : axes to draw one map or curve into, without title and legend.  A map is of `variable` alone, with a bar
+    ax : axes to draw one map or curve into, without title and legend.  Only `variable` is drawn, a map with a bar
     output : file to write; its suffix names the format: png, pdf, svg or eps
 
     Returns
@@ -99,7 +92,7 @@ def plot(
 
     Raises
     ------
-    ValueError
+    ConfigError
         if the dataset has no such variable or axis, would need too many panels, or there is no such format or width.
         With `ax`, if there are several panels.
     StoreError
@@ -112,22 +105,22 @@ def plot(
     np.float64(85.0)
     """
     if output is not None and suffix(Path(output)) not in PICTURES:
-        raise ValueError(f"output: {output}: unknown format; write a {A_PICTURE}")
+        raise fault_of(f"{output}: unknown format; write a {A_PICTURE}", "output")
     if limits is not None and not limits[0] < limits[1]:
-        raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; give a lower and a higher number")
+        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give a lower and a higher number", "limits")
     if cmap is not None:
         scales.colour_map(cmap)  # raises if there is none
-    opened = [_opened(each) for each in ([dataset] if isinstance(dataset, Source) else dataset)]
     if variable is None and isinstance(dataset, xr.DataArray):
         variable = str(dataset.name)
-    axes, how = {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap, "contours": contours}
+    opened = _opened(dataset)
+    axes, how = {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap}
     if ax is not None:
-        _draw_in(ax, opened, variable, axes, how, histogram=histogram)
+        _draw_in(ax, opened, variable, axes, how)
         figure = cast(Figure, ax.get_figure(root=True))
     else:
         across = inches(width) if width is not None else None
         with mpl.rc_context(style(figsize[0] if figsize else across, printed=across is not None)):
-            figure = _drawn(opened, variable, axes, how, histogram=histogram)
+            figure = _drawn(opened, variable, axes, how)
             if across:
                 figure.letter()
         if figsize:
@@ -139,79 +132,57 @@ def plot(
     return figure
 
 
-def _opened(source: Source) -> xr.Dataset:
+def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
     """A dataset, wherever it is.  A variable of one brings its coordinates along."""
     if isinstance(source, xr.DataArray):
         if source.name not in {*VARIABLES, *DERIVED}:
-            raise ValueError(f"{source.name or 'an array without a name'} is no variable of a run; give the dataset")
+            raise fault_of(f"{source.name or 'an array without a name'} is no variable of a run; give the dataset")
         return source.to_dataset()
     return source if isinstance(source, xr.Dataset) else open_dataset(Path(source))
 
 
-def _drawn(
-    datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], how: dict[str, Any], *, histogram: bool
-) -> Picture:
-    """The figure of datasets, of whatever kind they are."""
-    kinds = {kind(each) for each in datasets}
-    if len(datasets) != 1:
-        if kinds != {RUN} or histogram:
-            raise ValueError("several datasets can be drawn side by side only if each is of a run, and as maps")
-        common = variable or subject(datasets[0])
-        return maps.draw_beside([panels.choose(each, common, **axes, most=maps.MAX_VALUES) for each in datasets], **how)
-    (dataset,), (found,) = datasets, kinds
-    if found in _OWN and (found != CRITICAL or variable is None):
-        if found != TRAJECTORY and variable is not None:
-            raise ValueError(f"variable: not for a figure of {found}, which draws what it is; leave it out")
-        if given := [name for name, value in {**axes, **how, "histogram": histogram}.items() if value]:
-            raise ValueError(f"{given[0]}: not for a figure of {found}; name it for the maps of a run alone")
+def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:
+    """The figure of a dataset, of whatever kind it is."""
+    found = kind(dataset)
+    if found and found in _OWN and (found != CRITICAL or variable is None):
+        options = {"variable": variable if found != TRAJECTORY else None, **axes, **how}
+        if given := [name for name, value in options.items() if value]:
+            raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
         return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
-    chosen = panels.choose(dataset, variable, **axes, most=None if histogram else maps.MAX_VALUES)
-    if len(chosen.across) == 2 and not histogram:
+    chosen = panels.choose(dataset, variable, **axes, most=maps.MAX_VALUES)
+    if len(chosen.across) == 2:
         return maps.draw(chosen, **how)
-    figure, frames = framed(chosen.dataset, chosen.each, _over(chosen, histogram=histogram))
-    figure.explain(_fill(chosen, frames, how["limits"], histogram=histogram))
+    figure, frames = framed(chosen.dataset, chosen.each, next(iter(chosen.across), ""))
+    figure.explain(_fill(chosen, frames, how["limits"]))
     return figure
 
 
-def _draw_in(
-    ax: Axes, datasets: list[xr.Dataset], variable: str | None, axes: dict[str, Any], how: dict[str, Any], *,
-    histogram: bool,
-) -> None:  # fmt: skip
+def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> None:
     """Draw one map or curve into axes of the user."""
-    if {kind(each) for each in datasets} != {RUN} or len(datasets) > 1:
-        raise ValueError("ax: only a map or a curve of one run is drawn into given axes")
-    chosen = panels.choose(datasets[0], variable, **axes, most=None if histogram else maps.MAX_VALUES)
+    if kind(dataset) != RUN:
+        raise fault_of("only a map or a curve of a run is drawn into given axes", "ax")
+    chosen = panels.choose(dataset, variable, **axes, most=maps.MAX_VALUES, alone=True)
     if len(chosen.each) > 1 or (chosen.names == ["probability"] and "count" in chosen.dataset.dims):
-        raise ValueError(f"ax: {chosen.names[0]} needs more than one panel; select a value of each other axis")
-    if len(chosen.across) == 2 and not histogram:
+        raise fault_of(f"{chosen.names[0]} needs more than one panel; select a value of each other axis", "ax")
+    if len(chosen.across) == 2:
         maps.draw_in(ax, chosen, **how)
         return
-    over = _over(chosen, histogram=histogram)
-    ax.set_xlabel(labels.label(chosen.dataset, over) if over else "")
-    _fill(chosen, [(ax, chosen.dataset.isel(chosen.each[0]))], how["limits"], histogram=histogram)
+    ax.set_xlabel(labels.label(chosen.dataset, chosen.across[0]) if chosen.across else "")
+    _fill(chosen, [(ax, chosen.dataset.isel(chosen.each[0]))], how["limits"])
 
 
-def _over(chosen: panels.Panels, *, histogram: bool) -> str:
-    """What the axis across shows in a figure without maps."""
-    return chosen.names[0] if histogram else next(iter(chosen.across), "")
-
-
-def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None, *, histogram: bool) -> list[Artist]:
+def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None) -> list[Artist]:
     """Draw the panels of a run that are no maps; returns the entries for their legend."""
-    bars = chosen.names == ["probability"] and len(chosen.across) < 2
-    if histogram and bars:
-        raise ValueError("histogram: a probability is a share already; name another variable, such as reversals")
-    if histogram:
-        return histograms.draw(chosen, frames, limits)
-    return probabilities.draw(chosen, frames, limits) if bars else curves.draw(chosen, frames, limits)
+    draw = probabilities.draw if chosen.names == ["probability"] else curves.draw
+    return draw(chosen, frames, limits)
 
 
 def inches(width: str) -> float:
-    """A length such as "85mm" in inches; `ValueError` if it is none, or none for a figure."""
+    """Return a length such as "85mm" in inches; `ConfigError` if it is none, or none for a figure."""
     length, error = quantity(width, LENGTH) or (0.0, 0.0)
     if error or not _NARROWEST <= length <= _WIDEST:
         span = f"between {_NARROWEST * 1e3:g} and {_WIDEST * 1e3:g} mm"
-        raise ValueError(f"width: {width}; give a length {span} with its unit, such as 85mm, 8.5cm or 3.3in")
+        raise fault_of(f"{width}; give a length {span} with its unit, such as 85mm, 8.5cm or 3.3in", "width")
     return length / 0.0254
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import xarray as xr
 
 from sweep.config import Config, ConfigError
-from sweep.faults import either, refusal
+from sweep.faults import either, fault_of, refusal
 from sweep.kernels.measures import MEASURES
 from sweep.plots import labels, regimes
 from sweep.results.dataset import VARIABLES
@@ -38,12 +38,6 @@ def _ratio(dataset: xr.Dataset) -> xr.DataArray:
     return found.rename("ratio").assign_attrs(long_name="first reversal, simulated / predicted", units="1")
 
 
-PREDICTIONS = {
-    "reversals": ("reversals_predicted", "difference"),
-    "t_first_reversal": ("t_first_reversal_predicted", "ratio"),
-}
-"""What is drawn beside a simulated variable: the predicted one, and how the two compare."""
-
 DERIVED = {
     "difference": Derived(("reversals", "reversals_predicted"), _difference),
     "ratio": Derived(("t_first_reversal", "t_first_reversal_predicted"), _ratio),
@@ -52,8 +46,13 @@ DERIVED = {
 """`difference`: how many more reversals are simulated than predicted; `ratio`: how many times as late the first
 reversal is simulated as predicted; `regime`: see `sweep.plots.regimes`."""
 
-_SERVE = {"cycles": "regime", "lyapunov": "regime"}
-"""The derived quantity that a measurement serves."""
+COMPARISONS = {"difference": DERIVED["difference"].needs, "ratio": DERIVED["ratio"].needs}
+"""What these compare, a simulated variable and its prediction, which their figures show as well."""
+
+_SUBJECTS = (
+    "misfit", "probability", "reversals", "reversals_predicted", "t_first_reversal", "lyapunov", "spin_final",
+)  # fmt: skip
+"""What a dataset may be about; it is about the first that it has."""
 
 
 def derivable(dataset: xr.Dataset) -> list[str]:
@@ -68,13 +67,14 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
     Raises
     ------
-    ValueError
+    ConfigError
         if the dataset has no such variable, nor those from which it is derived.
     """
     if name in (possible := derivable(dataset)):
         return DERIVED[name].derive(dataset)
     if name not in dataset.data_vars:
-        raise ValueError(f"there is no variable {name}; choose {', '.join([*map(str, dataset.data_vars), *possible])}")
+        choices = ", ".join([*map(str, dataset.data_vars), *possible])
+        raise fault_of(f"there is no variable {name}; choose {choices}", "variable")
     return dataset[name]
 
 
@@ -104,16 +104,16 @@ def check_pictures(config: Config) -> None:
 
 
 def subject(dataset: xr.Dataset) -> str:
-    """The variable that a dataset is about, which is shown where none is named.
-
-    It is the first picture that the configuration names.  If it names none, it is the probability of counts, or else
-    the first variable of the measurement that it names first, or the quantity that this serves.  Where it is lacking,
-    it is the reversals.
-    """
+    """The variable that a dataset is about: the first picture that its configuration names, or else of `_SUBJECTS`."""
     there = {*map(str, dataset.data_vars), *derivable(dataset)}
-    measurement = str(dataset.attrs.get("measured", "")).partition(" ")[0].partition("=")[0]
-    served = [_SERVE[measurement]] if measurement in _SERVE else []
-    variables = MEASURES[measurement].variables if measurement in MEASURES else {}
-    own = [name for name, spec in variables.items() if not spec.along]
-    wanted = (*pictured(dataset)[:1], "probability", *served, *own[:1], "reversals", "reversals_predicted")
-    return next((name for name in wanted if name in there), "spin_final")
+    return next((name for name in (*pictured(dataset)[:1], *_SUBJECTS) if name in there), _SUBJECTS[-1])
+
+
+def first_picture(dataset: xr.Dataset) -> str:
+    """What is drawn of a dataset where no variable is named: its `subject`, compared with a prediction if there is one.
+
+    A picture that the configuration names is drawn as it is.
+    """
+    about = subject(dataset)
+    compared = (name for name in COMPARISONS if name in derivable(dataset) and about == COMPARISONS[name][0])
+    return about if about in pictured(dataset) else next(compared, about)

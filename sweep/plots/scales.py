@@ -14,6 +14,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize
 
+from sweep.faults import fault_of
 from sweep.grid import Array
 
 Limits = tuple[float, float]
@@ -53,9 +54,9 @@ class Scale:
 
 
 def colour_map(name: str) -> Colormap:
-    """A colour map of matplotlib; `ValueError` if there is none of that name."""
+    """A colour map of matplotlib; `ConfigError` if there is none of that name."""
     if name not in mpl.colormaps:
-        raise ValueError(f"there is no colour map {name}; choose one of matplotlib's, such as viridis or gray")
+        raise fault_of(f"there is no colour map {name}; choose one of matplotlib's, such as viridis or gray", "cmap")
     return mpl.colormaps[name]
 
 
@@ -96,11 +97,11 @@ def ratios(values: Array, limits: Limits | None = None, name: str | None = None)
 
     Raises
     ------
-    ValueError
+    ConfigError
         if a limit is not positive.
     """
     if limits and not limits[0] > 0:
-        raise ValueError(f"limits: {limits[0]:g}..{limits[1]:g}; give numbers above zero for a ratio")
+        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers above zero for a ratio", "limits")
     finite = values[np.isfinite(values) & (values > 0)]
     most = float(np.abs(np.log(finite)).max(initial=0.01))
     top = max(np.abs(np.log(limits))) if limits else min(most, log(_MAX_RATIO))

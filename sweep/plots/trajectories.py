@@ -1,4 +1,4 @@
-"""Pictures of dense trajectories; many samples of one scene are drawn as the bands in which most of them lie."""
+"""Pictures of dense trajectories."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
+from sweep.faults import fault_of
 from sweep.grid import SAMPLE, Array
-from sweep.kernels.status import FAILURES
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, theory
@@ -46,9 +45,6 @@ _STILL = 0.01
 _ENDLESS = ("heading", "table_x", "table_y")
 """Series that go on where a body spins steadily."""
 
-_BANDS = {0.95: 0.18, 0.68: 0.35}
-"""Shares of the samples that the bands hold, the widest first, and the opacities of these."""
-
 _NARROW = 6.0
 """Inches of a page up to which panels stand below each other."""
 
@@ -64,12 +60,12 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
 
     Raises
     ------
-    ValueError
+    ConfigError
         if there is no such series.
     """
     series = [str(name) for name, v in dataset.data_vars.items() if "time" in v.dims]
     if variable is not None and variable not in series:
-        raise ValueError(f"there is no series {variable}; choose {', '.join(series)}")
+        raise fault_of(f"there is no series {variable}; choose {', '.join(series)}", "variable")
     alone = variable is not None or SAMPLE in dataset.coords
     panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and not alone]
     if is_of_own_body(dataset) and not alone:
@@ -108,24 +104,20 @@ def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
 
 def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist]:
     """Draw the spins; returns the entries for the legend."""
-    if SAMPLE in dataset.coords:
-        zero_line(axes)
-        return _series(axes, dataset, {"spin": "spin n"})
     for i in range(dataset.sizes["trajectory"]):
         times = reversal_times(dataset.isel(trajectory=i))
         axes.plot(times, np.zeros(len(times)), "o", color=f"C{i}", markersize=4)
     entries = _series(axes, dataset, {"spin": "spin n"})
     zero_line(axes)
     entries.append(Line2D([], [], linestyle="none", marker="o", color="0.4", markersize=4, label="reversal"))
-    return entries + (_critical_spins(axes, dataset) if critical else [])
+    # Of samples, each may be another body.
+    return entries + (_critical_spins(axes, dataset) if critical and SAMPLE not in dataset.coords else [])
 
 
 def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Artist]:
     """Draw series of all trajectories, in their colours; returns the entries of the trajectories for the legend."""
     first = next(iter(names))
     axes.set_ylabel(labels.with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
-    if SAMPLE in dataset.coords:
-        return _bands(axes, dataset, first)
     entries: list[Artist] = []
     # Oscillations are so dense that an opaque curve would hide those below it.
     alone = dataset.sizes["trajectory"] == 1 or "spin" in names
@@ -147,40 +139,6 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
             borderaxespad=0.2,
         )  # fmt: skip
     return entries
-
-
-def _bands(axes: Axes, dataset: xr.Dataset, name: str) -> list[Artist]:
-    """Draw a series of sampled trajectories that do not fail, until the first ends; returns the legend's entries."""
-    time = dataset["time"]
-    entries: list[Artist] = []
-    tails = [(1 - share) / 2 for share in _BANDS]
-    for i, each in enumerate(_cells(dataset)):
-        one = each.isel(trajectory=~np.isin(each["status"], FAILURES))
-        if not one.sizes["trajectory"]:
-            continue
-        median, *ends = np.quantile(one[name], [0.5, *tails, *(1 - tail for tail in tails)], axis=0)
-        axes.plot(time, median, color=f"C{i}", linewidth=0.9, gid=name)
-        for low, high, opacity in zip(ends[:2], ends[2:], _BANDS.values(), strict=True):
-            axes.fill_between(time, low, high, color=f"C{i}", alpha=opacity, linewidth=0, rasterized=time.size > 5000)
-        entries.append(Line2D([], [], color=f"C{i}", label=_of_samples(dataset, one)))
-    held = [Patch(color="0.4", alpha=opacity, label=f"{share:.0%} of them") for share, opacity in _BANDS.items()]
-    return entries + held
-
-
-def _cells(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """The samples of each cell, of which some may be left out: as their numbers rise, so do those of trajectories."""
-    numbers, samples = dataset["trajectory"].values, dataset[SAMPLE].values
-    goes_on = (np.diff(samples) > 0) & (np.diff(samples) == np.diff(numbers))
-    places = np.split(np.arange(len(numbers)), np.flatnonzero(~goes_on) + 1)
-    return [dataset.isel(trajectory=each) for each in places]
-
-
-def _of_samples(dataset: xr.Dataset, one: xr.Dataset) -> str:
-    """What the samples of one cell have in common and not with all others, and how many there are."""
-    here = _varying(one)
-    own = [name for name in _varying(dataset) if name not in here]
-    told = [labels.measured(dataset, name, float(one[name][0])) for name in own]
-    return ", ".join([*told, f"median of {one.sizes['trajectory']} samples"])
 
 
 def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:

@@ -1,18 +1,54 @@
-"""Says what a dataset is of: a run, single trajectories, critical spins, boundaries, a fit, or Sobol indices."""
+"""The kinds of dataset: what each is of, and how it is told from the others."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import xarray as xr
 
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 
-RUN, TRAJECTORY, CRITICAL, BOUNDARIES = "a run", "single trajectories", "critical spins", "boundaries"
-FIT, INDICES = "a fit", "Sobol indices"
-
+ATTRIBUTE = "sweep_kind"
+"""The attribute of a dataset that names its kind."""
 
 OWN_BODY = "a model"
 """What `model_brings` says of the model of a user that need not be of a rattleback."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of dataset."""
+
+    name: str
+    """The command that makes it."""
+    words: str
+    """What it is of."""
+    marks: frozenset[str]
+    """Variables and dimensions by which a dataset that does not name its kind is known."""
+    explored: bool = False
+    """Whether the explorer shows it."""
+
+
+TRAJECTORY = Kind("trajectory", "single trajectories", frozenset({"trajectory"}))
+CRITICAL = Kind("critical", "critical spins", frozenset({"critical_reason"}), explored=True)
+BOUNDARIES = Kind("boundaries", "boundaries", frozenset({"level", "curve", "end_more"}))
+FIT = Kind("fit", "a fit", frozenset({"seen", "fitted"}))
+INDICES = Kind("indices", "Sobol indices", frozenset({"first_order", "total_order"}))
+RUN = Kind("run", "a run", frozenset(), explored=True)
+"""Its variables depend on what was measured.  Predictions count as a run, and so does a part of one."""
+
+_KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, RUN)}
+
+
+def kind(dataset: xr.Dataset) -> Kind | None:
+    """Return the kind that a dataset names, or else that of its variables; None if another program wrote it."""
+    if named := _KINDS.get(str(dataset.attrs.get(ATTRIBUTE))):
+        return named
+    there = {*dataset.variables, *dataset.dims}
+    if found := [each for each in _KINDS.values() if each.marks and each.marks <= there]:
+        return found[0]
+    return RUN if set(VARIABLES) & set(dataset.data_vars) else None
 
 
 def is_of_own_body(dataset: xr.Dataset) -> bool:
@@ -23,24 +59,3 @@ def is_of_own_body(dataset: xr.Dataset) -> bool:
 def parameters(dataset: xr.Dataset) -> list[str]:
     """Names of the physical parameters that a dataset tells."""
     return [name for name in str(dataset.attrs.get("model_parameters", "")).split() or PARAMETERS if name in dataset]
-
-
-_MARKS = {
-    TRAJECTORY: {"trajectory", "spin", "time", "t_stop"},
-    CRITICAL: {"critical_reason"},
-    BOUNDARIES: {"level", "curve", "end_more"},
-    FIT: {"seen", "fitted"},
-    INDICES: {"first_order", "total_order"},
-}
-"""Variables by which each is known."""
-
-
-def kind(dataset: xr.Dataset) -> str | None:
-    """Which of the six, told by the variables alone; None if it is of another program.
-
-    Predictions count as a run, and so does a part of one.
-    """
-    there = {*dataset.variables, *dataset.dims}
-    if found := [kind for kind, marks in _MARKS.items() if marks <= there]:
-        return found[0]
-    return RUN if set(VARIABLES) & set(dataset.data_vars) else None

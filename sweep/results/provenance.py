@@ -18,8 +18,8 @@ import numba
 from sweep.config import Config
 from sweep.jit import vector_bits
 from sweep.kernels.methods import AUTO, METHODS
+from sweep.results import kind
 from sweep.results.identity import Identity
-from sweep.results.kind import OWN_BODY
 from sweep.sources import hashed, versions
 
 _PACKAGE = Path(__file__).parent.parent
@@ -73,9 +73,12 @@ def this_cpu() -> str:
     return str(llvmlite.binding.get_host_cpu_name())
 
 
-def provenance(config: Config, seconds: float, cells: int, cpus: Iterable[str] = ()) -> dict[str, Any]:
-    """Attributes of a dataset: configuration, versions, types of CPU (by default this one's) and cost."""
+def provenance(
+    config: Config, seconds: float, cells: int, cpus: Iterable[str] = (), *, of: kind.Kind = kind.RUN
+) -> dict[str, Any]:
+    """Attributes of a dataset: its kind, configuration, versions, types of CPU (by default this one's) and cost."""
     return {
+        kind.ATTRIBUTE: of.name,
         **vars(identify(config)),
         "measured": " ".join(config.measure),
         **({"pictured": " ".join(config.picture)} if config.picture else {}),
@@ -100,7 +103,7 @@ def _brought(config: Config) -> dict[str, str]:
     if not (origin := config.origin):
         return {}
     return {
-        "model_brings": "a law of friction" if config.of_rattlebacks else OWN_BODY,
+        "model_brings": "a law of friction" if config.of_rattlebacks else kind.OWN_BODY,
         "model_place": origin.place,
         "model_sha256": origin.digest,
         "model_parameters": " ".join(config.tier.parameters),

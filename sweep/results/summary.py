@@ -10,7 +10,7 @@ import xarray as xr
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import REASONS, STATUSES, Reason
-from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, TRAJECTORY, kind, parameters
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
 
@@ -184,7 +184,7 @@ def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:
     return f"{line}; as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
 
 
-_LINES: dict[str | None, Callable[[xr.Dataset], Iterator[str]]] = {
+_LINES: dict[Kind | None, Callable[[xr.Dataset], Iterator[str]]] = {
     TRAJECTORY: _trajectories,
     CRITICAL: _critical,
     BOUNDARIES: _boundaries,

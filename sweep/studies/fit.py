@@ -29,6 +29,7 @@ from sweep.interrupt import deferred
 from sweep.kernels.measures.misfit import Misfit
 from sweep.models.user.blame import blamed
 from sweep.results import dataset
+from sweep.results.kind import FIT
 from sweep.results.provenance import provenance
 from sweep.studies.misfit import UNKNOWNS, Ask, Minimum, Problem, minimise
 from sweep.studies.search import require_certain
@@ -284,7 +285,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
     values = dict(zip(names, problem.values(best.place).tolist(), strict=True))
     return found.assign_attrs(
         title=f"{problem.config.name}: fitted to a film ({problem.config.model} model)",
-        **provenance(_with(problem.config, values), seconds, problem.trajectories),
+        **provenance(_with(problem.config, values), seconds, problem.trajectories, of=FIT),
         root_mean_square=float(np.sqrt(np.mean((fitted - film.value) ** 2))), akaike=float(criterion + 2 * len(names)),
         undetermined="; ".join(words), trajectories=problem.trajectories,
     )  # fmt: skip

@@ -19,6 +19,7 @@ from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.identity import require_same
+from sweep.results.kind import ATTRIBUTE
 from sweep.results.provenance import identify
 from sweep.results.store import Store
 from sweep.studies.search import Study
@@ -51,7 +52,7 @@ def kept(
         with blamed(config.origin):
             found = make(config, store)
         carry_out(found, store, reporter, there)
-        return found.labelled().assign_attrs(vars(identity))
+        return found.labelled().assign_attrs({ATTRIBUTE: verb, **vars(identity)})
 
     if output is None:
         with connected(client) as there:

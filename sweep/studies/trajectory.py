@@ -36,6 +36,7 @@ from sweep.models.model import Columns, Model, take
 from sweep.models.theory.linear import fastest_motion
 from sweep.models.user.blame import blamed
 from sweep.results import dataset
+from sweep.results.kind import TRAJECTORY
 from sweep.results.provenance import provenance
 from sweep.studies.search import require_simulated
 from sweep.units import Unit, named
@@ -176,7 +177,8 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     times = _times(kernel, images, every or _intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
     (found,) = job.by_grid(results(job, errors))
-    labelled = dataset.label(chosen, grid, found, provenance(chosen, time.perf_counter() - began, grid.size))
+    made = provenance(chosen, time.perf_counter() - began, grid.size, of=TRAJECTORY)
+    labelled = dataset.label(chosen, grid, found, made)
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(grid.size), {"long_name": "trajectory"})
     return flat.assign_coords(trajectory=index).assign(_described(times, series, kernel.model, chosen.units))

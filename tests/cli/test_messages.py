@@ -137,7 +137,7 @@ def test_a_command_tells_what_it_wrote(write: Write, tmp_path: Path) -> None:
 
 
 def test_a_search_tells_what_it_wrote(write: Write, tmp_path: Path) -> None:
-    command = ("critical", write(TEXT), "--set", "mu=60", "--width", "0.5", "--output", tmp_path)
+    command = ("critical", write(TEXT), "--set", "mu=60", "--bracket", "0.5", "--output", tmp_path)
     assert invoke(*command).stdout.endswith(f"wrote {tmp_path / 'quick_critical'}.nc and .png\n")
     assert invoke(*command).stdout.endswith("nothing was written\n")
 

@@ -141,7 +141,7 @@ def test_an_estimate_of_cells_none_of_which_can_be() -> None:
 
 
 def test_critical_spins_of_the_others(write: Write) -> None:
-    found = sweep.critical(write(TEXT.replace("[0.02, 0.05]", "0.05")), width=1e-2, b=[0.9, 3.0], offset=[0.0, 0.3])
+    found = sweep.critical(write(TEXT.replace("[0.02, 0.05]", "0.05")), bracket=1e-2, b=[0.9, 3.0], offset=[0.0, 0.3])
     gone = np.array([[True, False], [False, False]])
     reason = found["n_c1_plus_reason"].transpose("b", "offset").values
     np.testing.assert_array_equal(reason == 8, gone)

@@ -83,7 +83,7 @@ def test_a_probability_is_the_share_of_the_range_beyond_a_boundary(write: Write)
     low, high, samples = 0.01, 0.07, 128
     config = write(scene % (f"{{uniform: [{low}, {high}]}}", 60) + f"samples: {samples}\n")
     found = sweep.run(config)
-    curves = sweep.boundaries(write(scene % (f"{{start: {low}, stop: {high}, num: 9}}", "[60, 61]")), width=1e-3)
+    curves = sweep.boundaries(write(scene % (f"{{start: {low}, stop: {high}, num: 9}}", "[60, 61]")), bracket=1e-3)
     at = curves.isel(point=np.isclose(curves["mu"], 60, rtol=1e-4))
     for count in found["count"].values:
         places = at["n0"].values[at["level"].values == count]

@@ -9,11 +9,12 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.animation import FFMpegWriter
 from PIL import Image
-from support import ROOT
+from support import ROOT, Write
 from support.cli import invoke, refused
 
+import sweep
+from sweep.config import ConfigError
 from sweep.plots import animation, body
 
 
@@ -109,19 +110,29 @@ def test_a_page_asks_nothing_of_the_network(tmp_path: Path) -> None:
     assert not re.search(r"https?://|fa-", page.split("data:image")[0])
 
 
-def test_what_cannot_be_shown_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ValueError, match="no attitude"):
+def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path) -> None:
+    config, setting, clips = write(), {"mu": 60, "b": 3, "n0": 0.05, "t_end": 20}, []
+    sweep.trajectory(config, **setting).to_netcdf(tmp_path / "one.nc")
+    for source, values in ((config, setting), (tmp_path / "one.nc", {}), (sweep.open(tmp_path / "one.nc"), {})):
+        sweep.animate(source, tmp_path / "clip.gif", begin=2, end=4, speed=10, **values)
+        clips.append((tmp_path / "clip.gif").read_bytes())
+    stretch = ("--from", "2", "--to", "4", "--speed", "10")
+    assert invoke("animate", tmp_path / "one.nc", *stretch).exit_code == 0
+    assert {*clips} == {(tmp_path / "one.gif").read_bytes()}
+    refused(invoke("animate", tmp_path / "one.nc", "--at", "mu=60"), "--at: not for a dataset; give the configuration")
+
+
+def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no attitude"):
         animation.animate(turning().drop_vars("heading"))
-    with pytest.raises(ValueError, match="at most 6"):
+    with pytest.raises(ConfigError, match="at most 6"):
         animation.animate(turning(7))
-    with pytest.raises(ValueError, match="nothing lies between"):
+    with pytest.raises(ConfigError, match="nothing lies between"):
         animation.animate(turning(), begin=11)
     for speed in (0, -5, np.nan):
-        with pytest.raises(ValueError, match=f"speed: {speed:g}; give a number above zero"):
+        with pytest.raises(ConfigError, match=f"speed: {speed:g}; give a number above zero"):
             animation.animate(turning(), speed=speed)
-    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    with pytest.raises(ValueError, match="ffmpeg, which is not installed"):
+    without = mpl.rc_context({"animation.ffmpeg_path": "no-such-program"})
+    with without, pytest.raises(ConfigError, match="ffmpeg, which is not installed"):
         animation.animate(turning(), tmp_path / "clip.mp4")
-    with pytest.raises(ValueError, match="unknown format"):
-        animation.animate(turning(), tmp_path / "clip.avi")
     refused(invoke("animate", ROOT / "configs" / "mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")

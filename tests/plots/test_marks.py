@@ -65,8 +65,6 @@ def test_a_legend_says_how_trajectories_failed(cells: xr.Dataset) -> None:
     assert words["failed"] == "failed: 1 lifted off the table, 1 diverged (2 of 6)"
     assert words["time_limit"].startswith("lower bound")
     assert "inferred" not in words
-    beside = legend(cells.isel(mu=[0, 2]), "reversals", cells.isel(mu=[0]), cells.isel(mu=[2, 3]))
-    assert beside["failed"] == "failed: 2 lifted off the table, 1 diverged (1 of 2 and 0 of 1 and 2 of 2)"
 
 
 def test_inferred_cells(cells: xr.Dataset) -> None:

@@ -72,5 +72,5 @@ def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_drawn(tmp_pat
     file = write(f"{FORMULA}picture: [probability, status]\n", "map.yaml")
     result = invoke("run", file, "--output", tmp_path / "out")
     assert result.exit_code == 0
-    assert "no picture of probability: there is no variable probability" in result.stderr
+    assert "no picture of probability: variable: there is no variable probability" in result.stderr
     assert list(drawn(tmp_path / "out")) == ["map_status.png"]

@@ -10,10 +10,12 @@ from support import Write
 from support.cli import invoke, refused
 from support.figures import constants, entries
 
-from sweep.kernels.status import LIFT_OFF, SETTLED
+from sweep.kernels.status import SETTLED
 from sweep.plots import picture
-from sweep.plots.panels import in_lines
+from sweep.plots.figure import constants_in_lines
 from sweep.results.dataset import VARIABLES
+from sweep.results.kind import RUN, kind
+from sweep.results.netcdf import open_dataset
 
 SERIES = ("contact_x", "contact_y", "v0_rate_1", "slip_rate_1", "energy", "dissipated")
 CRITICAL = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
@@ -91,7 +93,7 @@ def test_critical_spins_have_their_unit_and_sources() -> None:
 def test_constants_break_between_them_alone() -> None:
     constants = "a = 0.2 m, Ixy = −2×10⁻⁵ kg m², gravity = 9.81 m/s²"
     for width in np.linspace(1.8, 4, 40):
-        lines = in_lines(constants, width).split("\n")
+        lines = constants_in_lines(constants, width).split("\n")
         assert all(line.endswith(",") for line in lines[:-1])
         assert " ".join(lines) == constants
 
@@ -103,43 +105,12 @@ def test_one_series_is_drawn_alone() -> None:
         picture.plot(made([60]), "reversals")
 
 
-@pytest.mark.parametrize(
-    ("part", "cells"),
-    [
-        (slice(None), {"μ = 60": slice(0, 4), "μ = 100": slice(4, 8)}),
-        (slice(2, 4), {"": slice(2, 4)}),
-        (slice(2, 6), {"μ = 60": slice(2, 4), "μ = 100": slice(4, 6)}),
-        ([0, 3, 5, 6], {"μ = 60": [0, 3], "μ = 100": [5, 6]}),
-        ([1, 5], {"μ = 60": [1], "μ = 100": [5]}),
-    ],
-    ids=str,
-)
-def test_bands_are_of_the_samples_that_are_there(part: Any, cells: dict[str, Any]) -> None:
-    whole = made([60] * 4 + [100] * 4, n0=np.tile([0.01, 0.02, 0.04, 0.08], 2))
-    whole = whole.assign_coords(trajectory=np.arange(8), sample=("trajectory", np.tile(np.arange(4), 2)))
-    whole["spin"] = whole["spin"] * xr.DataArray(np.random.default_rng(1).random(8), dims="trajectory")
-    figure = picture.plot(whole.isel(trajectory=part))
-    curves = [line for line in figure.axes[0].lines if line.get_gid() == "spin"]
-    assert [text.partition("median")[0].rstrip(", ") for text in entries(figure)[: len(cells)]] == list(cells)
-    for curve, here in zip(curves, cells.values(), strict=True):
-        np.testing.assert_allclose(curve.get_ydata(), np.median(whole["spin"][here], axis=0), atol=1e-15)
-
-
-def test_bands_are_of_all_samples_that_do_not_fail_while_they_last() -> None:
-    """A median of those that are left would jump when one ends."""
-    samples = made([60] * 4, n0=[0.01, 0.02, 0.04, 0.08]).assign_coords(sample=("trajectory", np.arange(4)))
-    samples["spin"] = samples["spin"] * xr.DataArray([1.0, 2.0, 4.0, 8.0], dims="trajectory")
-    samples["spin"][1, 150:] = np.nan
-    samples["spin"][2, 20:] = np.nan
-    samples["status"][2] = LIFT_OFF
+def test_samples_are_lines_of_the_spin_alone() -> None:
+    samples = made([60] * 20, n0=np.linspace(0.01, 0.08, 20)).assign_coords(sample=("trajectory", np.arange(20)))
     figure = picture.plot(samples)
-    (curve,) = (line for line in figure.axes[0].lines if line.get_gid() == "spin")
-    expected = np.median(samples["spin"][[0, 1, 3]], axis=0)
-    np.testing.assert_array_equal(curve.get_ydata(), expected)
-    assert np.isnan(expected).sum() == 51
-    assert entries(figure)[0] == "median of 3 samples"
-    samples["status"][:] = LIFT_OFF
-    assert entries(picture.plot(samples)) == ["95% of them", "68% of them"]
+    (axes,) = figure.axes
+    assert sum(line.get_gid() == "spin" for line in axes.lines) == 20
+    assert entries(figure)[12] == "and 8 more"
 
 
 def test_a_page_of_all_series_fits_a_screen() -> None:
@@ -154,6 +125,11 @@ def told_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:
     file.with_suffix(".png").unlink()
     assert invoke("plot", file).exit_code == 0
     assert file.with_suffix(".png").read_bytes() == drawn
+    named = open_dataset(file)
+    plain = named.drop_attrs()
+    assert kind(named) == kind(plain)  # by its variables
+    assert kind(plain.assign_attrs(sweep_kind="run")) == RUN
+    assert named.attrs["sweep_kind"] == verb
     return file, invoke("info", file).stdout
 
 
@@ -165,7 +141,7 @@ def test_plot_and_info_know_the_file_of_a_trajectory(write: Write) -> None:
 
 
 def test_plot_and_info_know_the_file_of_critical_spins(write: Write) -> None:
-    settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--width", "0.1")
+    settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--bracket", "0.1")
     file, told = told_of("critical", write(), *settings)
     assert "critical spins of 2 bodies (mu 2)" in told
     assert "n_c1_plus: 1 no friction, 1 found; 0.0024" in told

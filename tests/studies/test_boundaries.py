@@ -98,7 +98,7 @@ def test_a_cell_on_the_boundary_itself_is_on_one_of_its_sides() -> None:
     """A body at rest has no margin at all."""
     found = sweep.boundaries(
         {"body": {"a": 10.0, "delta": 0.03}, "start": {"n0": 0.05, "y0": 0.0}, "friction": {"mu": 75.0}},
-        x="x0", x0=[0.0, 0.01, 0.3], n0=[0.0, 0.02, 0.05], width=0.1, deviation=0.1,
+        x="x0", x0=[0.0, 0.01, 0.3], n0=[0.0, 0.02, 0.05], bracket=0.1, deviation=0.1,
     )  # fmt: skip
     assert found.sizes["point"] > 0
 

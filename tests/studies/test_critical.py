@@ -81,7 +81,7 @@ def test_n_c2_lies_beyond_n_c1(parameters: dict[str, Any], write: Write) -> None
 
 @pytest.mark.parametrize("mu", [60.0, 75.0])
 def test_brackets_are_as_narrow_as_asked_and_another_method_says_the_same(mu: float, write: Write) -> None:
-    spins = sweep.critical(write(STANDARD), mu=mu, width=1e-6)
+    spins = sweep.critical(write(STANDARD), mu=mu, bracket=1e-6)
     assert "n0" not in spins.coords
     assert spins.critical_reason == 0
     for side in ("plus", "minus"):
@@ -94,8 +94,8 @@ def test_brackets_are_as_narrow_as_asked_and_another_method_says_the_same(mu: fl
 
 def test_n_c2_is_the_first_boundary_along_n0(write: Write) -> None:
     """The two searches begin elsewhere, one at a multiple of n_c1 and one at the cells of a grid."""
-    spins = sweep.critical(write(STANDARD), mu=[60.0, 75.0], width=1e-5)
-    curves = sweep.boundaries(write(STANDARD), x="n0", mu=[60.0, 75.0], n0=[0.003, 0.0045, 0.006], width=1e-5)
+    spins = sweep.critical(write(STANDARD), mu=[60.0, 75.0], bracket=1e-5)
+    curves = sweep.boundaries(write(STANDARD), x="n0", mu=[60.0, 75.0], n0=[0.003, 0.0045, 0.006], bracket=1e-5)
     first = curves.where((curves.level == 1) & (curves.bracket == "n0"), drop=True).sortby("mu")
     np.testing.assert_allclose(first.n0, spins.n_c2_plus_simulated, rtol=2e-5)
 
@@ -118,7 +118,7 @@ def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
 
 def test_friction_alone_makes_a_rattle_grow_at_a_fast_spin(write: Write) -> None:
     """Without the angle δ nothing tells right from left, and nothing reverses, but upright spin is not stable."""
-    spins = sweep.critical(write(STANDARD), delta=0.0, t_end=100.0, width=0.01)
+    spins = sweep.critical(write(STANDARD), delta=0.0, t_end=100.0, bracket=0.01)
     assert float(spins.n_c1_plus_linear) == pytest.approx(0.0798, rel=0.01)
     assert float(spins.n_c1_minus_linear) == pytest.approx(-0.0798, rel=0.01)
     assert "exists" not in reasons(spins, "n_c2_plus")
@@ -130,7 +130,7 @@ def test_friction_alone_makes_a_rattle_grow_at_a_fast_spin(write: Write) -> None
 )
 def test_n_c2_that_is_not_known_has_a_reason(settings: dict[str, float], reason: str, write: Write) -> None:
     """A large rattle turns a slow spin by itself; trajectories are too short; their steps are far too long."""
-    spins = sweep.critical(write(STANDARD), **settings, width=0.01)
+    spins = sweep.critical(write(STANDARD), **settings, bracket=0.01)
     assert reasons(spins, "n_c1_plus") == ["exists"]
     assert reasons(spins, "n_c2_plus") == [reason]
     assert np.isnan(spins.n_c2_plus_simulated)
@@ -139,7 +139,7 @@ def test_n_c2_that_is_not_known_has_a_reason(settings: dict[str, float], reason:
 
 def test_where_n_c2_is_undecided_its_upper_bound_is_told(write: Write) -> None:
     """With this t_end only trajectories from well above n_c2 have reversed in time, and the others have not settled."""
-    short, long = (sweep.critical(write(STANDARD), t_end=t_end, width=0.01) for t_end in (2000.0, 12_000.0))
+    short, long = (sweep.critical(write(STANDARD), t_end=t_end, bracket=0.01) for t_end in (2000.0, 12_000.0))
     assert (reasons(short, "n_c2_plus"), reasons(long, "n_c2_plus")) == (["undecided"], ["exists"])
     assert np.isnan(short.n_c2_plus_simulated)
     assert np.isnan(short.n_c2_plus_simulated_inner)

@@ -17,7 +17,7 @@ integrator: {t_end: 100}
 
 
 def test_critical_spins_of_a_real_body(write: Write) -> None:
-    result = sweep.critical(write(STONE), width=1e-2)
+    result = sweep.critical(write(STONE), bracket=1e-2)
     for side in ("plus", "minus"):
         assert (result[f"n_c1_{side}_reason"] == 0).all()
         assert np.abs(result[f"n_c2_{side}_simulated"] / result[f"n_c1_{side}_linear"])[1] > 1  # t_end decides
@@ -53,8 +53,8 @@ def test_a_small_body_reverses_as_a_large_one_does(write: Write) -> None:
         " Izz: 1.0625e-8, Ixy: -1.25e-10}\n"
         "friction: {mu: 2000}\nstart: {n0: 1, x0: 2.5e-6, y0: 2.5e-6}\nintegrator: {t_end: 5}\n"
     )
-    large = sweep.critical(write(STONE.replace("[30, 100]", "100")), width=1e-2)
-    found = sweep.critical(write(small), width=1e-2)
+    large = sweep.critical(write(STONE.replace("[30, 100]", "100")), bracket=1e-2)
+    found = sweep.critical(write(small), bracket=1e-2)
     for side in ("plus", "minus"):
         there, here = (each[f"n_c2_{side}_simulated"] for each in (large, found))
         assert (found[f"n_c2_{side}_reason"] == large[f"n_c2_{side}_reason"]).all()

@@ -89,12 +89,12 @@ def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_
     command = ["critical", config, "--set", "mu=60", "--set", "b=3", "--set", "model=averaged", "--output", tmp_path]
     assert invoke(*command).exit_code == 0
     assert "already complete, nothing to compute" in invoke(*command).stderr
-    wider = invoke(*command, "--width", "0.01")
+    wider = invoke(*command, "--bracket", "0.01")
     assert wider.exit_code == 2
     assert "- # width of the brackets: 0.001" in wider.stderr
-    assert invoke(*command, "--width", "0.01", "--fresh").exit_code == 0
+    assert invoke(*command, "--bracket", "0.01", "--fresh").exit_code == 0
     assert xr.load_dataset(tmp_path / "standard_critical.nc").relative_width == 0.01
-    assert invoke(*command, "--set", "n0=0.3", "--width", "0.01").exit_code == 0  # no critical spin depends on it
+    assert invoke(*command, "--set", "n0=0.3", "--bracket", "0.01").exit_code == 0  # no critical spin depends on it
 
 
 def test_progress_is_told(config: Path) -> None:
