@@ -28,14 +28,9 @@ def test_numba_still_has_it(name: str) -> None:
     resolve_name(name)
 
 
-@pytest.mark.parametrize("name", ["_cache", "py_func", "signatures"])
-def test_dispatchers_still_have_it(name: str) -> None:
-    assert hasattr(njit(resolve_name), name)
-
-
-@pytest.mark.parametrize("name", ["_cache_file", "_impl.filename_base"])
-def test_caches_still_have_it(name: str) -> None:
-    operator.attrgetter(name)(FunctionCache(resolve_name))
+def test_dispatchers_and_caches_still_have_it() -> None:
+    operator.attrgetter("_cache", "py_func", "signatures")(njit(resolve_name))
+    operator.attrgetter("_cache_file", "_impl.filename_base")(FunctionCache(resolve_name))
 
 
 def test_one_module_alone_looks_inside_numba() -> None:
