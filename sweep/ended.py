@@ -8,6 +8,14 @@ ENDED: dict[str, str] = {
     "verify": "leave it out; to compare a few cells with dopri5 at half its step, see how-to/check",
     "until": "give a number of samples instead",
     "sensitivity": "leave it out; sensitive shows which counts depend on the step",
+    "film_lean_x": "lay the sensor so that its z axis is upright at rest, or correct the film first",
+    "film_lean_y": "lay the sensor so that its z axis is upright at rest, or correct the film first",
+    "cluster": "give client, a distributed.Client or the address of a scheduler",
+    "--workers": "a run uses all cores of this machine; for more machines start a dask cluster and give --scheduler",
+    "boundaries --width": "the width of brackets is --bracket",
+    "critical --width": "the width of brackets is --bracket",
+    "plot --histogram": "use xarray: dataset.reversals.plot.hist()",
+    "plot --contours": "use xarray: dataset.spin_final.plot.contour()",
 }
 """What to do instead of keys of a configuration ("verify", "integrator.step"), measurements, free parameters of `fit`
 and options of all commands ("--workers") or of one ("plot --histogram")."""

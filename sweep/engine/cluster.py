@@ -139,15 +139,13 @@ def connected(client: Client | str | None) -> Iterator[Client | None]:
     Raises
     ------
     StoreError
-        if dask.distributed is not installed, or no scheduler answers.
+        if no scheduler answers.
     """
     if not isinstance(client, str):
         yield client
         return
-    try:
-        import distributed
-    except ModuleNotFoundError:
-        raise StoreError("a cluster needs dask.distributed: pip install 'rattleback-sweep[cluster]'") from None
+    import distributed
+
     for logger in ("distributed", "distributed.client"):  # what a user has to know is raised as an error
         logging.getLogger(logger).setLevel("CRITICAL")
     try:
