@@ -96,6 +96,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (small("name: small", "name: 2024"), 1, "name", "in quotes if a number, not 2024"),
     (small("{mu: [40, 60]}", "40"), 3, "friction", "must be a section with law, regularisation, mu, speed"),
     (SMALL + "cases: nowhere.csv\n", 6, "cases", "nowhere.csv: no such file"),
+    (SMALL + "cases: cells.parquet\n", 6, "cases", "cells.parquet: Parquet files have ended; read it with pandas"),
     (SMALL + "cases: .\n", 6, "cases", "cannot be read: Is a directory"),
     (mu("[40, 60"), 3, "", "not YAML"),
     (small("10.0", "!!python/name:os.system 1"), 2, "body.a", "a YAML tag or anchor; write the plain value"),
