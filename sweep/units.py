@@ -49,7 +49,7 @@ ACCELERATION, ENERGY_PER_MASS = Unit(length=1, time=-2), Unit(length=2, time=-2)
 MASS_DENSITY, INERTIA, DRAG = Unit(mass=1, length=-3), Unit(mass=1, length=2), Unit(mass=1, length=2, time=-1)
 
 _DEGREE = pi / 180
-_WRITTEN: dict[Unit, dict[str, float]] = {
+WRITTEN: dict[Unit, dict[str, float]] = {
     LENGTH: {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
     MASS: {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "oz": 0.028349523125, "lb": 0.45359237},
     MASS_DENSITY: {"kg/m3": 1.0, "g/cm3": 1e3},
@@ -63,14 +63,9 @@ _NUMBER = r"[-+]?(?:\.\d+|\d+(?:\.\d*)?)(?:[eE][-+]?\d+)?"
 _QUANTITY = re.compile(rf"({_NUMBER}) *(?:(?:±|\+/?-) *({_NUMBER}))? *(\D.*)")
 
 
-def known(unit: Unit) -> list[str]:
-    """The units that users may write for quantities of a unit."""
-    return list(_WRITTEN[unit])
-
-
 def factor(written: str, unit: Unit) -> float | None:
     """How many units of SI a unit is, such as 1000 for "g/cm3"; None if it is none, or one of something else."""
-    return _WRITTEN[unit].get(written.replace("^", "").replace("³", "3"))
+    return WRITTEN[unit].get(written.replace("^", "").replace("³", "3"))
 
 
 def quantity(text: str, unit: Unit) -> tuple[float, float] | None:

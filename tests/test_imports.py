@@ -15,23 +15,18 @@ FOREIGN = {
     "IPython": {"progress"},
     "jinja2": {"explorer", "report"},
     "llvmlite": {"bench", "jit", "results"},
-    "matplotlib": {"bench", "explorer", "plots", "report", "reproduce"},
+    "matplotlib": {"api", "bench", "explorer", "plots", "report", "reproduce"},
     "mpl_toolkits": {"explorer"},
     "netCDF4": {"results"},
     "numba": {"bench", "engine", "jit", "kernels", "results"},
-    "pandas": {"config", "explorer"},
-    "PIL": {"explorer"},
-    "pint": {"config", "plots"},
+    "pandas": {"config"},
     "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "rich": {"progress"},
     "ruamel": {"config"},
     "scipy": {"config", "engine", "plots", "reproduce", "results", "studies"},
-    "tornado": {"explorer"},
-    "xarray": {
-        "api", "bench", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies",
-    },
-}  # fmt: skip
+    "xarray": {"api", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies"},
+}
 """The rooms that import each package; NumPy is for all."""
 
 

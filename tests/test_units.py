@@ -13,7 +13,7 @@ from sweep.results.margins import POINTS
 from sweep.results.probabilities import PROBABILITIES
 from sweep.studies import indices
 from sweep.studies.trajectory import SERIES
-from sweep.units import PAPER_UNITS, SI, Unit, factor, known, named, pretty, quantity
+from sweep.units import PAPER_UNITS, SI, WRITTEN, Unit, factor, named, pretty, quantity
 from sweep.variables import Variable
 
 PINT: pint.UnitRegistry[float] = pint.UnitRegistry()
@@ -48,9 +48,9 @@ def test_a_unit_has_its_dimension_in_both_systems(name: str) -> None:
     assert paper.to_base_units().magnitude == pytest.approx(scale, rel=1e-12)
 
 
-@pytest.mark.parametrize("unit", units._WRITTEN, ids=lambda unit: unit.si)
+@pytest.mark.parametrize("unit", WRITTEN, ids=lambda unit: unit.si)
 def test_units_that_users_write_are_as_large_as_for_pint(unit: Unit) -> None:
-    for written in known(unit):
+    for written in WRITTEN[unit]:
         size = PINT.Quantity(1.0, written.replace("3", "**3")).to_base_units()
         assert size.dimensionality == as_pint(unit.si).dimensionality
         assert factor(written, unit) == pytest.approx(size.magnitude, rel=1e-15)
@@ -64,14 +64,14 @@ def test_a_quantity_is_a_number_with_its_error_and_its_unit() -> None:
         assert quantity(wrong, units.LENGTH) is None
 
 
-WRITTEN = {
+PRINTED = {
     "kg m2 s-1": "kg m²/s", "radian s-1": "rad/s", "s m-1": "s/m", "m s-2": "m/s²", "s-1": "1/s", "m/s": "m/s", "": "",
     "W m-2 K-1": "W/(m² K)", "sqrt(g/c)": "√(g/c)", "m c2": "m c²", "m c sqrt(g c)": "m c √(g c)",
 }  # fmt: skip
 
 
 def test_figures_print_units_as_fractions_and_roots() -> None:
-    assert {each: pretty(each) for each in WRITTEN} == WRITTEN
+    assert {each: pretty(each) for each in PRINTED} == PRINTED
 
 
 def test_a_users_own_unit_is_the_same_in_every_system() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from sweep.faults import ConfigError, Fault, brief, either
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
-from sweep.units import ANGLE, SPIN, TIME, Unit, factor, known
+from sweep.units import ANGLE, SPIN, TIME, WRITTEN, Unit, factor
 
 MOST_ROWS = 20_000
 """Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
@@ -83,7 +83,7 @@ def read(path: str | Path) -> Film:
         place, written = found[name]
         written = written or (found[what][1] if name == "error" else "")
         if (scale := factor(written, unit) if written else 1.0) is None:
-            raise _fault(path, 1, f"{name} is in '{brief(written, 20)}'; its unit must be {either(known(unit))}")
+            raise _fault(path, 1, f"{name} is in '{brief(written, 20)}'; its unit must be {either(WRITTEN[unit])}")
         return np.asarray(rows[:, place] * scale)
 
     unit = ANGLE if what == "heading" else SPIN

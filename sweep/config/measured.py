@@ -9,7 +9,7 @@ from pathlib import Path
 from sweep.faults import either, fault_of, printable, refusal
 from sweep.models.general import meshes, solids
 from sweep.parameters import PARAMETERS, Parameter
-from sweep.units import SI, Unit, known, named, quantity
+from sweep.units import SI, WRITTEN, Unit, named, quantity
 
 _MILLIMETRE = 1e-3
 _MASS = ("mass", "density")
@@ -69,8 +69,7 @@ def measured(name: str, text: str, parameter: Parameter) -> Measured:
     option, unit = _option(name), parameter.units
     assert isinstance(unit, Unit)
     if not (found := quantity(text, unit)):
-        wanted = f"a number with its unit ({either(known(unit))}), such as 12.0+-0.1{known(unit)[1]}"
-        raise fault_of(refusal(text, wanted), file=option)
+        raise fault_of(refusal(text, f"a number with its unit ({either(WRITTEN[unit])})"), file=option)
     value, error = found
     if not (parameter.allows(value) and 0 <= error < float("inf")):
         raise fault_of(refusal(text, f"{parameter.allowed}, in {unit.si}, with an error >= 0"), file=option)

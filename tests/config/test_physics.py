@@ -37,7 +37,7 @@ def test_what_the_numbers_of_a_paraboloid_mean(read: Read) -> None:
     assert config.equations.name == "slip+coulomb-tanh+sigma+paraboloid"
     assert config.described("a") == {
         "long_name": "coefficient a of the paraboloid",
-        "description": "Coefficient a of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2).",
+        "description": "The paraboloid is z = c (1 - a (x/c)^2 - b (y/c)^2).",
     }
     assert config.described("c")["units"] == config.described("offset")["units"] == "m"
     # A paraboloid has no outline: every contact point lies on it.

@@ -158,7 +158,7 @@ def test_a_picture_in_given_axes(selection: dict[str, int], variable: str | None
     left, right = figure.subplots(1, 2)
     one = made().assign(form_factor=made().b / 10).isel(selection)
     assert picture.plot(one, variable, ax=right) is figure
-    assert right.get_xlabel() == "short semi-axis b (c)"
+    assert right.get_xlabel() == "short semi-axis b"
     assert right.get_ylabel()
     assert right.findobj(lambda artist: artist.get_gid() == (variable or "reversals"))
     assert right.has_data()

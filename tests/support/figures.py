@@ -8,10 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sweep.kernels.status import SETTLED, TIME_LIMIT
-from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES, described
-from sweep.units import PAPER_UNITS
-from sweep.variables import attributes
 
 
 def entries(figure: Figure) -> list[str]:
@@ -56,8 +53,5 @@ def made(**axes: Any) -> xr.Dataset:
         name: xr.Variable(dims[: v.ndim], v.astype(VARIABLES[name].dtype), described(VARIABLES[name]))
         for name, v in values.items()
     }
-    coordinates = {
-        name: xr.Variable(np.shape(v) and name, v, attributes(PARAMETERS[name], PAPER_UNITS))
-        for name, v in {"mu": mu, "b": b, "n0": n0, "a": 10.0, "c": 1.0, "delta": 0.03}.items()
-    }
-    return xr.Dataset(variables, coordinates, {"title": "made"})
+    constants = {"a": 10.0, "c": 1.0, "delta": 0.03}
+    return xr.Dataset(variables, {"mu": mu, "b": b, "n0": n0, **constants}, {"title": "made"})

@@ -163,6 +163,8 @@ ELLIPSOID = Surface(
     outline="(x/a)² + (y/b)² < 1 in the body's axes",
 )
 
+_SHAPE = "The paraboloid is z = c (1 - a (x/c)^2 - b (y/c)^2)."
+
 PARABOLOID = Surface(
     name="paraboloid",
     constants=("radius1", "radius2", "h"),
@@ -177,18 +179,9 @@ PARABOLOID = Surface(
     bounds="offset > c - c/(2 a) and offset > c - c/(2 b)",
     required=frozenset({"a", "b"}),
     meanings={
-        **{
-            each: {
-                "units": NUMBER,
-                "long_name": f"coefficient {each} of the paraboloid",
-                "description": f"Coefficient {each} of the paraboloid z = c (1 - a (x/c)^2 - b (y/c)^2).",
-            }
-            for each in ("a", "b")
-        },
-        "c": {
-            "long_name": "height c of the paraboloid's origin",
-            "description": "Height of the paraboloid's origin above its lowest point.",
-        },
+        "a": {"units": NUMBER, "long_name": "coefficient a of the paraboloid", "description": _SHAPE},
+        "b": {"units": NUMBER, "long_name": "coefficient b of the paraboloid", "description": _SHAPE},
+        "c": {"long_name": "height c of the paraboloid's origin", "description": "Its height above the lowest point."},
         "offset": {"description": "Depth of the centre of mass below the paraboloid's origin."},
     },
 )
