@@ -12,7 +12,6 @@ FOREIGN = {
     "click": {"cli"},
     "contourpy": {"axis"},
     "distributed": {"api", "engine", "studies"},
-    "IPython": {"progress"},
     "jinja2": {"explorer", "report"},
     "llvmlite": {"bench", "jit", "results"},
     "matplotlib": {"api", "bench", "explorer", "plots", "report", "reproduce"},
