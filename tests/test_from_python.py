@@ -276,10 +276,3 @@ def test_a_configuration_can_be_read() -> None:
     assert "<caption>quick: averaged</caption>" in shown
     assert "<th>b<td>2 … 4<td>3 values<td>short semi-axis b<td>c" in shown
     assert "<th>n0<td>" in shown
-
-
-def test_labels_of_xarray_name_no_unit_of_a_plain_number() -> None:
-    maps = sweep.run(SAID)
-    axes = maps.spin_final.isel(b=0, drop=True).plot()[0].axes  # type: ignore[operator]
-    assert axes.get_ylabel() == "final spin n [sqrt(g/c)]"
-    assert axes.get_xlabel() == "friction μ [1/sqrt(g c)]"

@@ -140,16 +140,5 @@ def test_a_copied_example_loads_measures_what_it_draws_and_is_not_overwritten(na
     assert (folder / f"{name}.yaml").read_text(encoding="utf-8") == "mine"
 
 
-def test_a_table_of_cases_is_copied_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shipped = tmp_path / "shipped"
-    shipped.mkdir()
-    (shipped / "tabled.yaml").write_text("# A table.\ncases: table.csv\n", encoding="utf-8")
-    (shipped / "table.csv").write_text("mu\n60\n", encoding="utf-8")
-    monkeypatch.setattr("sweep.cli.configurations._EXAMPLES", shipped)
-    monkeypatch.chdir(tmp_path)
-    assert invoke("examples", "tabled").stdout == "wrote tabled.yaml\nwrote table.csv\n"
-    assert (tmp_path / "table.csv").read_text(encoding="utf-8") == "mu\n60\n"
-
-
 def test_an_unknown_example_is_one_line() -> None:
     refused(invoke("examples", "woden"), "examples woden: no such example (did you mean wooden?)")

@@ -128,12 +128,6 @@ def test_a_command_tells_what_it_wrote(write: Write, tmp_path: Path) -> None:
     assert invoke(*command, "--fresh").stdout.endswith(f"\nwrote {out}.nc and .png\n")
 
 
-def test_a_search_tells_what_it_wrote(write: Write, tmp_path: Path) -> None:
-    command = ("critical", write(TEXT), "--set", "mu=60", "--bracket", "0.5", "--output", tmp_path)
-    assert invoke(*command).stdout.endswith(f"wrote {tmp_path / 'quick_critical'}.nc and .png\n")
-    assert invoke(*command).stdout.endswith("nothing was written\n")
-
-
 @pytest.mark.usefixtures("short_chunks")
 def test_a_resumed_run_tells_how_many_cells_are_kept(write: Write, tmp_path: Path) -> None:
     stopped = Stop(3)
