@@ -464,15 +464,10 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
     """
     from pathlib import Path
 
-    from sweep.results.netcdf import open_dataset
-    from sweep.results.store import StoreError
+    from sweep.results.kind import opened
 
     register()
-    dataset = open_dataset(Path(path), load=load)
-    if "sweep_version" not in dataset.attrs:
-        dataset.close()
-        raise StoreError(f"{path}: not a dataset of sweep: no attribute sweep_version")
-    return dataset
+    return opened(Path(path), load=load)
 
 
 class Accessor:

@@ -158,17 +158,6 @@ def test_what_a_page_shows_runs(
             exec(compile(code, str(block), "exec"), names)
 
 
-def test_console_blocks_hold_commands_and_no_output() -> None:
-    """Output is shown by ```{console}, whose commands are run when the pages are built."""
-    wrong = [
-        str(block)
-        for page in PAGES
-        for block in blocks(page)
-        if block.kind in ("console", "{console}") and not all(line[:2] == "$ " for line in block.text.splitlines())
-    ]
-    assert not wrong
-
-
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "data" / "README.md", ROOT / "scripts" / "LOG.md"], ids=_name)
 def test_links_paths_and_names_lead_somewhere(page: Path) -> None:
     text = page.read_text(encoding="utf-8")

@@ -68,7 +68,7 @@ def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
 def examples(name: str | None, output: Path) -> None:
     """List the configurations that come with the package, or copy the one called NAME.
 
-    The model and the table of cases that it names, and a film of its body, are copied as well.  No file is overwritten.
+    Its model and a film of its body are copied as well, where it has them.  No file is overwritten.
     """
     shipped = {path.stem: path for path in sorted(_EXAMPLES.glob("*.yaml"))}
     if name is None:
@@ -79,20 +79,11 @@ def examples(name: str | None, output: Path) -> None:
         return
     if name not in shipped:
         refuse(f"examples {brief(name)}", f"no such example{suggestion(name, shipped)}; `sweep examples` lists them")
-    for path in (copied := _with_companions(shipped[name])):
+    companions = [path for path in _EXAMPLES.glob(f"{name}*") if path.suffix != ".yaml"]
+    for path in (copied := [shipped[name], *companions]):
         if (output / path.name).exists():
             refuse(str(output / path.name), "exists already; choose another folder by --output")
     output.mkdir(parents=True, exist_ok=True)
     for path in copied:
         shutil.copyfile(path, output / path.name)
         say(f"wrote {output / path.name}")
-
-
-def _with_companions(path: Path) -> list[Path]:
-    """Return a configuration, the files beside it that it names, and the film of its body."""
-    from sweep.config.document import read
-
-    values = read(path).values
-    named = [path.parent / values[key] for key in ("model", "cases") if key in values]
-    named.append(path.with_name(f"{path.stem}_film.csv"))
-    return [path, *(each for each in named if each.is_file())]

@@ -5,17 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from sweep import interrupt
-from sweep.cli.faults import DONE, about, needs_bokeh, refuse, say
+from sweep.cli.faults import DONE, about, needs_bokeh, say
 from sweep.cli.options import FILE, PATH, announce, parse_pair, parse_span
 from sweep.plots import formats
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @click.command()
@@ -41,6 +38,7 @@ def plot(
     sel = dict(parse_pair(cell, "--sel") for cell in cells)
     span = parse_span(limits, "--limits") if limits is not None else None
     from sweep.plots import panels, picture
+    from sweep.results.kind import opened
 
     interrupt.raise_again()
     target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
@@ -56,6 +54,7 @@ def plot(
 @FILE
 def info(file: Path) -> None:
     """Show what is in a dataset: axes, counts, agreement with the prediction, provenance."""
+    from sweep.results.kind import opened
     from sweep.results.summary import contents, describe
 
     dataset = opened(file)
@@ -85,14 +84,3 @@ def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -
     say("stopped")
     sys.stdout.flush()
     os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it
-
-
-def opened(file: Path) -> xr.Dataset:
-    """The dataset of a command, of whatever kind."""
-    from sweep.results.kind import kind
-    from sweep.results.netcdf import open_dataset
-
-    dataset = open_dataset(file)
-    if kind(dataset) is None:
-        refuse(file, "not a dataset of sweep: no variable of it, such as status")
-    return dataset

@@ -118,7 +118,6 @@ def _body(formula: Callable[[solids.Numbers], solids.Numbers], given: Given) -> 
     """Return the lines of a configuration whose body `formula` makes of what was measured."""
     values, errors = ({name: getattr(each, part) for name, each in given.items()} for part in ("value", "error"))
     found, spread = formula(values), solids.propagated(formula, values, errors)
-    _check_stands(found)
     units = {name: named(PARAMETERS[name].units, SI) for name in found}
     entries = (
         f"  {name}: {value + 0.0:.6g}  #{f' ± {spread[name]:.2g}' if spread[name] else ''} {units[name]}"
@@ -144,15 +143,3 @@ def _check_names(given: Given, needed: Sequence[Sequence[str]]) -> None:
         if {*twice} <= given.keys():
             one, other = map(_option, twice)
             raise fault_of(f"cannot be combined with {other}; leave out one of the two", file=one)
-
-
-def _check_stands(body: Mapping[str, float]) -> None:
-    """Refuse a body whose centre of mass is above a centre of curvature."""
-    height = body["c"] - body["offset"]
-    for axis, radius in solids.RADII.items():
-        if (found := body[axis] ** 2 / body["c"]) <= height:
-            raise fault_of(
-                f"it falls over, since {_option(radius)} is {found:.3g} m and its centre of mass {height:.3g} m high; "
-                "measure this radius, or check the sizes",
-                file="body",
-            )

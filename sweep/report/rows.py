@@ -43,9 +43,9 @@ def against(what: str, source: str, expected: float, found: float, tolerance: fl
     return Row(what, source, *numbers, why, abs(found - expected) <= tolerance, remark)
 
 
-def below(what: str, source: str, found: float, bound: float, why: str, remark: str = "") -> Row:
+def below(what: str, source: str, found: float, bound: float, why: str) -> Row:
     """A number that must stay below a bound."""
-    return Row(what, source, f"< {bound:g}", f"{found:.3g}", "", f"{bound:g}", why, found < bound, remark)
+    return Row(what, source, f"< {bound:g}", f"{found:.3g}", "", f"{bound:g}", why, found < bound)
 
 
 def states(

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import xarray as xr
 
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
+from sweep.results.netcdf import open_dataset
+from sweep.results.store import StoreError
 
 ATTRIBUTE = "sweep_kind"
 """The attribute of a dataset that names its kind."""
@@ -49,6 +52,15 @@ def kind(dataset: xr.Dataset) -> Kind | None:
     if found := [each for each in _KINDS.values() if each.marks and each.marks <= there]:
         return found[0]
     return RUN if set(VARIABLES) & set(dataset.data_vars) else None
+
+
+def opened(path: Path, *, load: bool = True) -> xr.Dataset:
+    """Open a dataset as `open_dataset` does; `StoreError` also if it is of no kind."""
+    dataset = open_dataset(path, load=load)
+    if kind(dataset) is None:
+        dataset.close()
+        raise StoreError(f"{path}: not a dataset of sweep: no variable of it, such as status")
+    return dataset
 
 
 def is_of_own_body(dataset: xr.Dataset) -> bool:

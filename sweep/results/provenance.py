@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import platform
-import re
 import subprocess
 from collections.abc import Iterable
 from functools import cache
@@ -24,48 +23,24 @@ from sweep.sources import hashed, versions
 
 _PACKAGE = Path(__file__).parent.parent
 
-RUN, _PICTURES = "sweep.engine.run", "sweep.plots"
-"""The module that makes the datasets of runs, and the room that only draws what was made."""
-
-# To look for imports in the text of all files takes 15 ms; their syntax trees would take 0.2 s.
-_IMPORT = re.compile(r"^ *(?:from (sweep\.[\w.]+) import (\([^)]*\)|.*)|import (sweep\.[\w.]+))", re.MULTILINE)
+_SHOWING = {"plots", "explorer", "cli", "report", "reproduce", "bench"}
+"""The rooms that only ask for numbers, or show them."""
 
 
-def decisive_sources(maker: str = RUN) -> list[Path]:
-    """The files on which the numbers of a dataset depend: those that the module `maker` imports, in any function."""
-    files = {module_of(path): path for path in _PACKAGE.rglob("*.py")}
-    found, waiting = set[Path](), [maker]
-    while waiting:
-        module = waiting.pop()
-        path = files.pop(module, None)
-        if path is None or module.startswith(_PICTURES):
-            continue
-        found.add(path)
-        for source, names, plain in _IMPORT.findall(path.read_text(encoding="utf-8")):
-            waiting += [source or plain, *(f"{source}.{name}" for name in re.findall(r"\w+", names))]
-        waiting += [module.rpartition(".")[0]] if module.count(".") > 1 else []  # the package that it is in
-    return sorted(found)
+def decisive_sources() -> list[Path]:
+    """The files on which the numbers of a dataset depend: all but those of the rooms that show them."""
+    return [path for path in _PACKAGE.rglob("*.py") if path.relative_to(_PACKAGE).parts[0] not in _SHOWING]
 
 
-def module_of(path: Path) -> str:
-    """The name of the module in a file of the package."""
-    return ".".join(("sweep", *path.relative_to(_PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
-
-
-def identify(config: Config, maker: str = RUN) -> Identity:
-    """The identity of what this program, by its module `maker`, makes of `config`."""
-    return Identity(config.to_yaml(), config.fingerprint(), *sources(maker))
+def identify(config: Config) -> Identity:
+    """The identity of what this program makes of `config`."""
+    return Identity(config.to_yaml(), config.fingerprint(), *sources())
 
 
 @cache
-def sources(maker: str = RUN) -> tuple[str, str]:
+def sources() -> tuple[str, str]:
     """Hash of the decisive source files, and the versions of what compiles and runs them."""
-    return hashed(decisive_sources(maker))[:16], f"sweep {_version('rattleback-sweep')}, {versions()}"
-
-
-@cache
-def _version(package: str) -> str:
-    return metadata.version(package)
+    return hashed(decisive_sources())[:16], f"sweep {metadata.version('rattleback-sweep')}, {versions()}"
 
 
 def this_cpu() -> str:
@@ -85,9 +60,9 @@ def provenance(
         **({"film_sha256": film.sha256, "film_instants": len(film.time)} if (film := config.film) else {}),
         **_brought(config),
         "integrator": _integrator_words(config),
-        "sweep_version": _version("rattleback-sweep"),
+        "sweep_version": metadata.version("rattleback-sweep"),
         "git_commit": _git_commit(),
-        **{f"{name}_version": _version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
+        **{f"{name}_version": metadata.version(name) for name in ("numba", "numpy", "xarray", "netCDF4")},
         "python_version": platform.python_version(),
         "cpu": ", ".join(sorted(set(cpus) or {this_cpu()})),
         "vector_bits": vector_bits(),

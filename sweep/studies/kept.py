@@ -45,7 +45,7 @@ def kept(
 ) -> xr.Dataset:
     """The dataset that a study finds, or what an earlier one of the same identity has left in the folder `output`."""
     config, verb, settings, make = task
-    run = identify(config, f"sweep.studies.{verb}")
+    run = identify(config)
     identity = replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
 
     def search(store: Store, there: Client | None) -> xr.Dataset:

@@ -15,13 +15,6 @@ from sweep.studies.trajectory import trajectory
 TEXT = "name: odd\nfriction: {mu: 60}\nintegrator: {t_end: 30}\n"
 
 
-def test_a_model_that_never_settles_is_summed_up(write: Write, tmp_path: Path) -> None:
-    settings = ("--set", "model=noslip", "--set", "t_end=300")
-    result = invoke("run", write(TEXT), "--output", tmp_path / "o", *settings)
-    assert (result.exit_code, "reversals: 1 to 1\n" in result.stdout) == (0, True)
-    assert invoke("info", tmp_path / "o" / "odd.nc").exit_code == 0
-
-
 def test_an_axis_of_any_parameter_is_drawn(write: Write, tmp_path: Path) -> None:
     for axis in ("c=[1,2]", "a=[9,10]", "b=[2,3,4,5,6]", "delta=[0.01,0.03]"):
         result = invoke("run", write(TEXT), "--output", tmp_path / axis[0], "--set", axis, "--set", "n0=[0.04,0.05]")

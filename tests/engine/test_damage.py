@@ -12,7 +12,6 @@ from importlib import metadata
 from pathlib import Path
 from zipfile import ZipFile, is_zipfile
 
-import numba
 import numpy as np
 import pytest
 from click.testing import Result
@@ -27,6 +26,7 @@ from sweep.results import provenance
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.identity import Identity
 from sweep.results.store import StoreError
+from sweep.sources import versions
 
 TILE = 3
 """Cells a tile at the most; of twelve cells there are then six tiles in two groups."""
@@ -192,14 +192,14 @@ def refuses(result: Result, *words: str) -> None:
 @pytest.fixture
 def forgets() -> Iterator[None]:
     """A process reads versions and sources once, as if they never changed while it runs."""
-
-    def forget() -> None:
-        provenance.sources.cache_clear()
-        provenance._version.cache_clear()
-
     forget()
     yield
     forget()
+
+
+def forget() -> None:
+    provenance.sources.cache_clear()
+    versions.cache_clear()
 
 
 @pytest.mark.usefixtures("forgets")
@@ -214,10 +214,7 @@ def test_another_version_is_refused(
     true = metadata.version
     with monkeypatch.context() as patch:
         patch.setattr(metadata, "version", lambda name: "9.9" if name == package else true(name))
-        if package == "numba":
-            patch.setattr(numba, "__version__", "9.9")
-        provenance.sources.cache_clear()
-        provenance._version.cache_clear()
+        forget()
         result = invoke("run", config, "--output", out)
     refuses(result, "not resumed, it comes from other versions: sweep")
     assert f"{package.removeprefix('rattleback-')} 9.9" in result.stderr.partition(", now")[2]
@@ -226,7 +223,7 @@ def test_another_version_is_refused(
 
 @pytest.mark.usefixtures("forgets")
 def test_other_sources_are_refused(config: Path, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.results.provenance.decisive_sources", lambda _maker: [])
+    monkeypatch.setattr("sweep.results.provenance.decisive_sources", list)
     refuses(invoke("run", config, "--output", out), "other sources of the model or kernel")
 
 

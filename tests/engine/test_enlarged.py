@@ -197,7 +197,7 @@ def test_a_part_of_a_dataset_is_no_complete_run(write: Write, tmp_path: Path) ->
 
 def test_nothing_is_taken_from_other_sources(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     grown(write, tmp_path / "out", ONE)
-    monkeypatch.setattr("sweep.results.provenance.sources", lambda _maker: ("other", "versions"))
+    monkeypatch.setattr("sweep.results.provenance.sources", lambda: ("other", "versions"))
     with pytest.raises(StoreError, match="not resumed"):
         grown(write, tmp_path / "out", MORE)
 

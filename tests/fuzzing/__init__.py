@@ -8,7 +8,6 @@ of each kind with hypothesis, and among the campaigns many.
 import os
 import warnings
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -18,13 +17,11 @@ import xarray as xr
 from click.testing import CliRunner
 
 from sweep.cli import main
-from sweep.cli.faults import of_option
-from sweep.cli.options import cells_of, loaded
+from sweep.cli.options import loaded
 from sweep.config import ConfigError, load_config
 from sweep.config.schema import PATHS
 from sweep.parameters import PARAMETERS
 from sweep.results.store import StoreError
-from sweep.studies.trajectory import choose
 
 from .text import KEYS, ODD, block, damage, near_valid, tree
 
@@ -133,27 +130,6 @@ def mapping(random: Random, folder: Path) -> bool:  # noqa: ARG001
     return _refused(lambda: load_config(said, given), "") is not None
 
 
-@cache
-def _config_at(path: Path) -> Any:
-    return load_config(path)
-
-
-def at(random: Random, folder: Path) -> bool:
-    """`--at NAME=VALUE`."""
-    texts = [
-        f"{random.choice((*PARAMETERS, *PARAMETERS, *KEYS))}={random.choice((*ODD, '0.01', '0.02'))}"
-        for _ in range(random.choice((1, 2, 3, 40)))
-    ]
-    if random.random() < 0.3:
-        texts.append(damage(random, texts.pop().encode()).decode("utf-8", "surrogateescape"))
-
-    def pick() -> Any:
-        with of_option("--at", PARAMETERS):
-            return choose(_config_at(folder / "base.yaml"), cells_of(tuple(texts), PARAMETERS))
-
-    return _refused(pick, "--at") is not None
-
-
 CELLS = (
     "1", "2.5", "0.01", "", " ", "nan", "inf", "-inf", "1_000", "1,000", "1.000,5", '"1,5"', "٣", "²", "1e400", "0x1",
     "-1", "'1'", '"', '""', '"1\n2"', "1;2", "1\t2", "é", "\0", "\x1b[2J", "x" * 500, "1e-3", "=1+1", "\ufeff1",
@@ -211,13 +187,6 @@ def _invoke(folder: Path, *arguments: str) -> bool:
     return result.exit_code == 0
 
 
-def dry_run(random: Random, folder: Path) -> bool:
-    """A configuration through the command line."""
-    file = folder / "fuzzed.yaml"
-    file.write_bytes(near_valid(random))
-    return _invoke(folder, "run", str(file), "--dry-run", "--output", str(folder / "out"))
-
-
 def foreign(random: Random, folder: Path) -> bool:
     """A dataset of another program, whose variables may have the same names as ours."""
     names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step",
@@ -260,5 +229,5 @@ def foreign(random: Random, folder: Path) -> bool:
 
 
 KINDS: dict[str, Callable[[Random, Path], bool]] = {
-    kind.__name__: kind for kind in (yaml_tree, yaml_bytes, setting, mapping, at, table, dry_run, foreign)
+    kind.__name__: kind for kind in (yaml_tree, yaml_bytes, setting, mapping, table, foreign)
 }
