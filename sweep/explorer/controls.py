@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -44,8 +45,7 @@ class MapControls:
             self._widgets[name].value = k if choice.axis else choice.options[k]
             self._widgets[name].visible = not choice.axis or name in along - {state.x, state.y}
         for name, field in self._limits.items():
-            limit = getattr(state, name)
-            field.value = "" if limit is None else f"{limit:.6g}"
+            field.value = f"{state.limits[name]:.6g}" if name in state.limits else ""
 
     def _widget(self, choice: Choice) -> Slider | Select:
         """A slider over the indices of an axis, which shows the value there, or else a list."""
@@ -70,9 +70,9 @@ class MapControls:
         field = TextInput(title=words, placeholder="least" if name == "low" else "most", width=80, name=name,
                           stylesheets=[BARE])  # fmt: skip
 
-        def put(text: str) -> None:
-            limit = number(text)
-            self._change(lambda state: state.limited(name, limit if math.isfinite(limit) else None))
+        def put(state: State, limit: float) -> State:
+            limits = {**state.limits, name: limit}
+            return replace(state, limits={end: at for end, at in limits.items() if math.isfinite(at)})
 
-        on(field, "value", put)
+        on(field, "value", lambda text: self._change(partial(put, limit=number(text))))
         return field

@@ -93,7 +93,8 @@ class MapFigure:
         for name, source in self._lines.items():
             parts = [points for line in part.lines if line.name == name for points in line.parts]
             source.data = {"xs": [self._x.place(x) for x, _ in parts], "ys": [self._y.place(y) for _, y in parts]}
-        numbers = list(places.numbers(part.lines, part.x, part.y))
+        boundaries = [line for line in part.lines if line.name == "boundary"]
+        numbers = list(places.words(boundaries, part.x, part.y))
         self._numbers.data = {
             "x": [self._x.place(x) for x, _, _ in numbers],
             "y": [self._y.place(y) for _, y, _ in numbers],

@@ -1,10 +1,10 @@
-"""Runs the trajectories of single cells in a thread of their own, while the page stays responsive."""
+"""Runs the trajectories of the cells that are drawn in a thread of their own, while the page stays responsive."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -16,7 +16,7 @@ from sweep.config import ConfigError, Values
 from sweep.config.schema import FOREVER
 from sweep.engine.reporter import Progress, Reporter
 from sweep.explorer.setup import Setup
-from sweep.explorer.state import Cell
+from sweep.explorer.state import MAX_CELLS, Cell
 from sweep.faults import printable
 from sweep.grid import Array
 from sweep.jit import load_numba, showing
@@ -175,3 +175,55 @@ class Runner:
             yield
         finally:
             self._compiles = False
+
+
+class Drawn:
+    """At most `MAX_CELLS` cells in the order in which they were chosen, one of which is active."""
+
+    def __init__(self, cells: Iterable[Cell], runner: Runner | None, tell: Callable[[Job], None]) -> None:
+        """`tell` is called with each job that has news, on the thread of the runner."""
+        self._runner, self._tell = runner, tell
+        self._jobs: list[Job] = []
+        self.active = 0
+        for cell in cells:
+            self.add(cell, keep=True)
+
+    @property
+    def cells(self) -> list[Cell]:
+        return [job.cell for job in self._jobs]
+
+    @property
+    def curves(self) -> list[Curve | None]:
+        """As far as they have been run."""
+        return [job.curve for job in self._jobs]
+
+    def add(self, cell: Cell, *, keep: bool) -> None:
+        """Choose another cell, and run it; it replaces those chosen before, unless these are to be kept."""
+        while self._jobs and (not keep or len(self._jobs) == MAX_CELLS):
+            self.remove(0)
+        self._jobs.append(self._begun(cell))
+        self.active = len(self._jobs) - 1
+
+    def change(self, cell: Cell) -> None:
+        """Run the active cell with other parameters; its old curve stays until then."""
+        old = self._jobs[self.active]
+        old.dropped = True
+        self._jobs[self.active] = self._begun(cell, old.curve)
+
+    def remove(self, k: int) -> None:
+        self._jobs.pop(k).dropped = True
+        self.active = max(min(self.active, len(self._jobs) - 1), 0)
+
+    def running(self) -> Iterator[tuple[int, Job]]:
+        """The places of the cells that are run, and their runs."""
+        return ((k, job) for k, job in enumerate(self._jobs) if not job.over)
+
+    def leave(self) -> None:
+        """Give up all runs."""
+        for job in self._jobs:
+            job.dropped = True
+
+    def _begun(self, cell: Cell, curve: Curve | None = None) -> Job:
+        assert self._runner
+        self._runner.submit(job := Job(cell, self._tell, curve=curve))
+        return job

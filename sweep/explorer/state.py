@@ -47,13 +47,8 @@ class State:
     """The index on each axis that is not drawn."""
     cells: tuple[Cell, ...] = ()
     palette: str = ""
-    low: float | None = None
-    high: float | None = None
-    """What the visitor has chosen of the colour scale; the rest is as in pictures."""
-
-    def limited(self, end: str, limit: float | None) -> State:
-        """The same with another of the `LIMITS`."""
-        return replace(self, low=limit) if end == "low" else replace(self, high=limit)
+    limits: Mapping[str, float] = field(default_factory=dict)
+    """Those of the `LIMITS` that the visitor has chosen; the rest is as in pictures."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +83,7 @@ class Choice:
             return replace(state, at={**state.at, self.name: k})
         change: dict[str, Any] = {self.name: self.options[k]}
         if self.name == "show" and self.options[k] != state.show:
-            change |= {"low": None, "high": None}
+            change["limits"] = {}
         other = {"x": "y", "y": "x"}.get(self.name, "")
         if other and getattr(state, other) == self.options[k]:
             change[other] = getattr(state, self.name)
@@ -125,8 +120,7 @@ def write(state: State, source: Source, base: Cell) -> str:
     """The query of the address that opens `state`; of a cell it names what lies on an axis or differs from `base`."""
     told = {name: c.options[c.of(state)] for name, c in choices(source).items() if name not in (state.x, state.y)}
     pairs = [(name, option) for name, option in told.items() if option]
-    limits = {name: getattr(state, name) for name in LIMITS}
-    pairs += [(name, f"{limit:.12g}") for name, limit in limits.items() if limit is not None]
+    pairs += [(name, f"{state.limits[name]:.12g}") for name in LIMITS if name in state.limits]
     for cell in state.cells:
         named = {n: v for n, v in cell.items() if n in source.dims or v != base.get(n)}
         pairs.append(("cell", ",".join(f"{n}:{v:.12g}" for n, v in named.items())))
@@ -154,7 +148,7 @@ def read(
             among = f"from {choice.options[0]} to {choice.options[-1]}" if choice.axis else ", ".join(choice.options)
             faults.append(f"{key}={brief(values[-1])} is not there; choose {among}")
         elif key in LIMITS and math.isfinite(limit := number(values[-1])):
-            state = state.limited(key, limit)
+            state = replace(state, limits={**state.limits, key: limit})
         elif key in LIMITS:
             faults.append(f"{key}={brief(values[-1])} is no number")
         elif key not in ("cell", *_ENDED):

@@ -94,10 +94,9 @@ def scale_of(part: Map, state: State) -> Scale:
     if part.flags:
         return scales.flags(part.flags, palette)
     shown = part.shown[np.isfinite(part.shown)].astype(float)
-    if (state.low, state.high) == (None, None) or not shown.size:
+    if not state.limits or not shown.size:
         return common_scale([part], cmap=palette)
-    low = shown.min() if state.low is None else state.low
-    high = shown.max() if state.high is None else state.high
+    low, high = state.limits.get("low", shown.min()), state.limits.get("high", shown.max())
     possible = low < high and (low > 0 or part.name != "ratio")
     return common_scale([part], (low, high) if possible else None, palette)
 

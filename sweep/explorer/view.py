@@ -14,9 +14,8 @@ from sweep.explorer import controls, export, figure, page
 from sweep.explorer import state as states
 from sweep.explorer.chosen import CellControls
 from sweep.explorer.curves import Curves
-from sweep.explorer.drawn import Drawn
 from sweep.explorer.page import PARTS
-from sweep.explorer.runner import Curve, Job, Runner
+from sweep.explorer.runner import Curve, Drawn, Job, Runner
 from sweep.explorer.setup import Setup, why_still
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State

@@ -38,7 +38,7 @@ def draw(dataset: xr.Dataset) -> Picture:
         for level, xs, ys in drawn:
             axes.plot(xs, ys, color=scale.rgba(np.array(level)).tolist(), linewidth=1.4, gid=f"level{level}")
         each = [Line("boundary", "", [(xs, ys)], f"{level}") for level, xs, ys in drawn]
-        lines.write(axes, places.numbers(each, _axis(dataset, x), _axis(dataset, y)))
+        lines.write(axes, places.words(each, _axis(dataset, x), _axis(dataset, y)))
         open_ = part.isel(point=(part["outcome"] == OPEN).values)
         axes.plot(open_[x], open_[y], markersize=3, **_OPEN)
         axes.set(xlabel=labels.label(dataset, x), ylabel=labels.label(dataset, y))

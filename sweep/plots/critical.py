@@ -29,7 +29,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     """Critical spins by formula, eigenvalues and simulation, over the longest axis."""
     dims = sorted(map(str, dataset["critical_reason"].dims), key=lambda d: -dataset.sizes[d])
     x = dims[0] if dims else ""
-    figure, frames = framed(dataset, indices(dataset, dims[1:])[:MAX_PANELS], x, (8.0, 3.2, 2.0))
+    figure, frames = framed(dataset, indices(dataset, dims[1:])[:MAX_PANELS], x)
     styles = {
         f"{name}_{side}{suffix}": {"color": colour, "linewidth": 1, **style}
         for (name, colour), side, (suffix, (_, style)) in product(_COLOURS.items(), ("plus", "minus"), _SOURCES.items())

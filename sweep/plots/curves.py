@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from sweep.grid import Array
 from sweep.plots import labels, lines, theory
 from sweep.plots.description import describe
-from sweep.plots.figure import BESIDE, Frames, set_scale
+from sweep.plots.figure import Frames, set_scale
 from sweep.plots.marks import BLANK, legend
 from sweep.plots.panels import Panels
 from sweep.plots.quantities import COMPARISONS
@@ -92,7 +92,7 @@ def _points(axes: Axes, at: Array, values: Array, style: dict[str, Any], label: 
 
 def _form_factor(axes: Axes, chosen: xr.Dataset) -> Line2D:
     twin = axes.twinx()
-    twin.set_label(BESIDE)
+    twin.set_label("form factor")
     (line,) = twin.plot(chosen["b"], chosen["form_factor"], color="0.5", linewidth=1)
     line.set_label("form factor L(f), right axis")
     twin.set_ylabel("L(f)", color="0.4")

@@ -11,12 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from sweep.axis import Axis
+from sweep.axis import Axis, contours
 from sweep.grid import Array
-from sweep.plots import labels, levels, scales, theory
+from sweep.plots import labels, scales, theory
 from sweep.plots.marks import BLANK, legend, marks
 from sweep.plots.quantities import field
 from sweep.plots.scales import Limits, Scale
+from sweep.plots.theory import Line
+from sweep.results.margins import Counts
+
+MARGINS = ("reversals", "margin_more", "margin_fewer", "status")
+"""The variables from which boundaries are drawn."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,7 @@ class Map:
     """What a legend says of the kinds that occur."""
     flags: dict[int, str]
     """The meaning of each value; empty if they are numbers."""
-    lines: list[theory.Line]
+    lines: list[Line]
 
     @property
     def blank(self) -> Array:
@@ -61,11 +66,21 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
     found, kinds = field(dataset, name), marks(dataset, name)
     across, up = Axis(x, along(dataset, x)), Axis(y, along(dataset, y))
     lines = theory.lines(dataset, across, up) if y and name in theory.REVERSALS else []
-    lines += levels.lines(dataset, across, up) if y and name == "reversals" else []
+    lines += boundaries(dataset, across, up) if y and name == "reversals" else []
     return Map(
         name, across, up, table(found, across, up), {kind: table(where, across, up) for kind, where in kinds.items()},
         legend(dataset, name), labels.flag_words(dataset.assign({name: found}), name), lines,
     )  # fmt: skip
+
+
+def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
+    """Where counts change between the cells of a map, by their margins: a line for each count, none without margins."""
+    if not set(MARGINS) <= set(dataset.data_vars):
+        return []
+    counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in MARGINS})
+    words = "from here on so many reversals, by the margins of the cells"
+    curves = {level: list(contours(counts.distance(level), x, y, corners=True)) for level in counts.levels()}
+    return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]
 
 
 def along(dataset: xr.Dataset, dim: str) -> Array:

@@ -32,9 +32,6 @@ RATIO = 0.78
 _WIDE, _HIGH = 15.2, 7.6
 """Inches of a page that no user has asked for, across and upwards."""
 
-BESIDE = "beside"
-"""Label of axes that are no panel: bars, and second axes of a panel."""
-
 _STYLE: dict[Any, Any] = {
     "font.size": TEXT, "axes.titlesize": "medium", "xtick.labelsize": "small", "ytick.labelsize": "small",
     "legend.fontsize": "small", "legend.title_fontsize": "small", "hatch.linewidth": 0.7,
@@ -58,8 +55,8 @@ _OF_LABEL = 0.085
 _OF_CONSTANTS, _LONGEST = 1 / 13, 90
 """Inches of a letter of the constant parameters, and most letters in a line of them."""
 
-_UNIT, _PARAMETER = r"(?<= )\(.*\)$", "[^, ][^,]*"
-"""What stays on one line: brackets at the end of a label, such as its unit; a parameter with its value."""
+_UNIT, _PARAMETER = r"(?<= )\(.*\)$|\S+ = \S+", "[^, ][^,]*"
+"""What stays on one line: in a label, brackets at its end, such as its unit, and a value; a constant with its unit."""
 
 _LEAST = 2.1
 """Inches of a map across, at least."""
@@ -123,6 +120,11 @@ class Picture(Figure):
             axes.remove()
         return list(grid[:count])
 
+    @property
+    def _panels(self) -> list[Axes]:
+        """All axes but bars and second axes, which have labels."""
+        return [axes for axes in self.axes if not axes.get_label()]
+
     def explain(self, handles: Sequence[Artist]) -> None:
         """A legend below the figure, never over its data, in as many columns as fit; over it the constants."""
         self._wrap_labels()
@@ -143,7 +145,7 @@ class Picture(Figure):
 
     def _wrap_labels(self) -> None:
         """Break the titles and labels of panels that are longer than their axes."""
-        for axes in (each for each in self.axes if each.get_label() != BESIDE):
+        for axes in self._panels:
             letter = _OF_LABEL * self.dpi * self.get_figwidth() / self._width
             across, up = axes.bbox.size
             for text, length in ((axes.title, across), (axes.xaxis.label, across), (axes.yaxis.label, up)):
@@ -151,8 +153,7 @@ class Picture(Figure):
 
     def letter(self) -> None:
         """Letters a, b, c at the panels, if there are several."""
-        panels = [axes for axes in self.axes if axes.get_label() != BESIDE]
-        for letter, axes in zip(ascii_lowercase, panels if len(panels) > 1 else [], strict=False):
+        for letter, axes in zip(ascii_lowercase, self._panels if len(self._panels) > 1 else [], strict=False):
             axes.annotate(letter, (0, 1), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points",
                           ha="right", va="bottom", weight="bold")  # fmt: skip
 
@@ -203,17 +204,10 @@ Frames = list[tuple[Axes, xr.Dataset]]
 """Axes, and the part of a dataset to draw there."""
 
 
-def framed(
-    dataset: xr.Dataset, panels: list[Panel], x: str, size: tuple[float, float, float] = (7.0, 2.6, 1.9)
-) -> tuple[Picture, Frames]:
-    """A figure with axes over `x` for each panel of a dataset, and the part of the dataset to draw there.
-
-    Parameters
-    ----------
-    size : inches of one panel across and upwards, and for what stands around the panels
-    """
-    (width, height, above), (rows, columns) = size, arrangement(len(panels), 2)
-    figure = Picture(panel_width(columns, width, 0) * columns, above + height * rows)
+def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, Frames]:
+    """A figure with axes over `x` for each panel of a dataset, and the part of the dataset to draw there."""
+    rows, columns = arrangement(len(panels), 2)
+    figure = Picture(panel_width(columns, 7.0, 0) * columns, 1.9 + 2.8 * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     frames = list(zip(figure.panels(rows, columns, len(panels), sharex=True), panels, strict=True))
     for k, (axes, panel) in enumerate(frames):

@@ -37,11 +37,11 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
     axes.axis(box)
     if labelled:
         first = sorted((line for line in shown.lines if line.symbol), key=lambda line: line.name != "boundary")
-        write(axes, places.words(first, shown.lines, shown.x, shown.y))
+        write(axes, places.words(first, shown.x, shown.y))
     return {line.words: entry(line.name, line.words) for line in shown.lines}
 
 
-def write(axes: Axes, words: Iterable[places.Number]) -> None:
+def write(axes: Axes, words: Iterable[places.Word]) -> None:
     """Write words on lines."""
     for x, y, word in words:
         axes.text(x, y, labels.in_maths(word), size="small", color="black", ha="center", va="center", bbox=_BOX)

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colorbar import Colorbar, make_axes
 from matplotlib.patches import Patch
 
 from sweep.plots import hatches, labels, lines
 from sweep.plots.description import Map, common_scale, describe
-from sweep.plots.figure import BESIDE, RATIO, Picture, arrangement, fits, panel_width, set_scale
+from sweep.plots.figure import RATIO, Picture, arrangement, fits, panel_width, set_scale
 from sweep.plots.marks import legend, with_results
 from sweep.plots.panels import Panel, Panels, title
 from sweep.plots.scales import Limits, Scale
 
-MAX_VALUES = 1000
-"""Values drawn of an axis, taken evenly: more would be less than a pixel each."""
-
 _WIDEST = 4.4
 """Inches of a map across, at most."""
-
-_BAR = 0.05
-"""Width of a bar relative to a map."""
 
 _SMALL = 2.5
 """Inches of a map across below which it is too small for symbols at lines."""
@@ -43,34 +34,27 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) 
     dataset, names = panels.dataset, panels.names + panels.compared
     maps = _maps(panels, names)
     together = len(names) if fits(len(names)) else 1
-    bar = [] if maps[0][names[0]].flags else [""]  # flags are told in the legend
-    groups = [[name, *bar] for name in names] if together == 1 else [[*panels.names, *bar, *panels.compared, *bar]]
-    count = len(groups) * len(maps)
-    rows, across = arrangement(count, together)
+    # Maps side by side share the bar of their scale, beside the last of them; flags are told in the legend.
+    shared = [[name] for name in names] if together == 1 else [*filter(None, [panels.names, panels.compared])]
+    count = len(names) * len(maps)
+    rows, across = arrangement(count // together, together)
     columns = across * together
     width = panel_width(columns, _WIDEST, _AROUND)
-    small = width < _SMALL
     figure = Picture(width * columns + _AROUND, 1.6 + width * RATIO * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
-    each_scales = [_scales(maps, k, panels.names, limits, cmap) for k in range(len(maps))]
+    frames = figure.panels(rows, columns, count, sharex=True, sharey=True)
+    scales = [_scales(maps, k, panels.names, limits, cmap) for k in range(len(maps))]
     entries: dict[str, Artist] = {}
-    first = None
-    widths = across * [1 if name else _BAR for name in groups[0]]
-    grid = figure.add_gridspec(rows, len(widths), width_ratios=widths)
-    for place, (k, kinds) in enumerate(product(range(len(maps)), groups)):
-        scales, (row, column) = each_scales[k], divmod(place, across)
-        for i, name in enumerate(kinds):
-            at = grid[row, column * len(kinds) + i]
-            if not name:
-                _bar(figure.add_subplot(at, label=BESIDE), dataset, kinds[i - 1], scales[kinds[i - 1]])
-                continue
-            axes = figure.add_subplot(at, sharex=first, sharey=first)
-            first = first or axes
-            shown, compared = maps[k][name], name in panels.compared
-            entries |= _map(axes, shown, scales[name], labelled=not small, compared=compared)
-            axes.set_title(_title(panels, name, panels.each[k], small=small and together > 1))
-            _label_axes(axes, dataset, shown, left=i == 0, lowest=place + across >= count)
-    figure.explain([*_meanings(panels, maps, each_scales[0][names[0]]), *entries.values()])
+    for k, shown in enumerate(maps):
+        axes = dict(zip(names, frames[k * len(names) :], strict=False))
+        for i, (name, one) in enumerate(axes.items(), k * len(names)):
+            compared = name in panels.compared
+            entries |= _map(one, shown[name], scales[k][name], labelled=width >= _SMALL, compared=compared)
+            one.set_title(_title(panels, name, panels.each[k]))
+            _label_axes(one, dataset, shown[name], left=i % together == 0, lowest=i + columns >= count)
+        for group in shared if not shown[names[0]].flags else ():
+            _bar([axes[name] for name in group], dataset, group[-1], scales[k][group[-1]])
+    figure.explain([*_meanings(panels, maps, scales[0][names[0]]), *entries.values()])
     return figure
 
 
@@ -81,7 +65,7 @@ def draw_in(axes: Axes, panels: Panels, limits: Limits | None, cmap: str | None)
     scale = common_scale([shown], limits, cmap)
     _map(axes, shown, scale, labelled=True)
     _label_axes(axes, panels.dataset, shown)
-    _bar(make_axes(axes)[0], panels.dataset, name, scale)
+    _bar([axes], panels.dataset, name, scale)
 
 
 Maps = list[dict[str, Map]]
@@ -117,16 +101,14 @@ def _map(axes: Axes, shown: Map, scale: Scale, *, labelled: bool, compared: bool
     return dict(lines.draw(axes, shown, labelled=labelled))
 
 
-def _title(panels: Panels, name: str, panel: Panel, *, small: bool) -> str:
-    """Name what a map shows; a small one beside others leaves the values of its panel to the first of them."""
+def _title(panels: Panels, name: str, panel: Panel) -> str:
+    """Name what a map shows."""
     words, compared = labels.words(panels.dataset, name), name in panels.compared
     if panels.compared:  # what they have in common stands at the bar
         words = words.rpartition(", ")[2] if compared else labels.short(name).partition(", ")[2] or "simulated"
-        words = (name if compared else words.partition(" (")[0]) if small else words
     elif panel and not labels.flag_words(panels.dataset, name):
         words = ""  # it stands at the bar
-    where = title(panels.dataset, panel) if not small or name == panels.names[0] else ""
-    return ", ".join(filter(None, [words, where]))
+    return ", ".join(filter(None, [words, title(panels.dataset, panel)]))
 
 
 def _label_axes(axes: Axes, dataset: xr.Dataset, shown: Map, *, left: bool = True, lowest: bool = True) -> None:
@@ -138,10 +120,11 @@ def _label_axes(axes: Axes, dataset: xr.Dataset, shown: Map, *, left: bool = Tru
         axes.set_xlabel(labels.label(dataset, shown.x.name))
 
 
-def _bar(axes: Axes, dataset: xr.Dataset, name: str, scale: Scale) -> None:
-    """Draw the bar of a scale, with what it shows."""
-    bar = Colorbar(axes, ScalarMappable(scale.norm, scale.colours), extend=scale.arrows)
-    bar.set_label(f"{labels.common(dataset, name)}\n")  # an empty line, or it would seem to belong to the next map
+def _bar(beside: list[Axes], dataset: xr.Dataset, name: str, scale: Scale) -> None:
+    """Draw the bar of a scale beside the maps that share it, with what it shows."""
+    figure = beside[0].figure
+    bar = figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=beside, extend=scale.arrows, pad=0.02)
+    bar.set_label(labels.common(dataset, name))
     if scale.ticks:
         bar.set_ticks(list(scale.ticks), labels=list(scale.ticks.values()))
         bar.ax.minorticks_off()

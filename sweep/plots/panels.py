@@ -20,6 +20,9 @@ from sweep.plots.quantities import COMPARISONS, derivable, field, first_picture,
 MAX_PANELS = 8
 """Panels that a figure may have."""
 
+_MAX_VALUES = 1000
+"""Values drawn of an axis of a map, taken evenly: more would be less than a pixel each.  The others are not read."""
+
 _TELLING = 3
 """Maps of probabilities, each of another count, that one figure shows unasked."""
 
@@ -55,14 +58,12 @@ def choose(
     x: str | None = None,
     y: str | None = None,
     sel: Mapping[str, float] | None = None,
-    most: int | None = None,
     alone: bool = False,
 ) -> Panels:
     """Choose what to draw of a dataset; other parameters as of `sweep.plots.picture.plot`.
 
     Parameters
     ----------
-    most : values of an axis that a map has at most, taken evenly; by default all.  The others are not read
     alone : whether a comparison is shown without what it compares
 
     Raises
@@ -88,8 +89,8 @@ def choose(
         shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
         raise fault_of(f"{count} panels ({shown}) are more than {MAX_PANELS}; select one value of an axis")
     whole = dataset
-    if most and len(across) == 2:
-        dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // most)) for d in across})
+    if len(across) == 2:
+        dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // _MAX_VALUES)) for d in across})
     dataset = dataset.assign({name: field(dataset, name) for name in names + compared})
     dataset = dataset.sortby([d for d in across if d in dataset.coords])
     return Panels(dataset, whole, names, compared, across, indices(dataset, rest))

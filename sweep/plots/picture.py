@@ -149,7 +149,7 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
         if given := [name for name, value in options.items() if value]:
             raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
         return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
-    chosen = panels.choose(dataset, variable, **axes, most=maps.MAX_VALUES)
+    chosen = panels.choose(dataset, variable, **axes)
     if len(chosen.across) == 2:
         return maps.draw(chosen, **how)
     figure, frames = framed(chosen.dataset, chosen.each, next(iter(chosen.across), ""))
@@ -161,7 +161,7 @@ def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str
     """Draw one map or curve into axes of the user."""
     if kind(dataset) != RUN:
         raise fault_of("only a map or a curve of a run is drawn into given axes", "ax")
-    chosen = panels.choose(dataset, variable, **axes, most=maps.MAX_VALUES, alone=True)
+    chosen = panels.choose(dataset, variable, **axes, alone=True)
     if len(chosen.each) > 1 or (chosen.names == ["probability"] and "count" in chosen.dataset.dims):
         raise fault_of(f"{chosen.names[0]} needs more than one panel; select a value of each other axis", "ax")
     if len(chosen.across) == 2:

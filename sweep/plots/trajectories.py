@@ -147,22 +147,13 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
     for i in range(dataset.sizes["trajectory"]):
         bodies.setdefault(tuple(theory.levels(dataset.isel(trajectory=i))), i)
     entries: dict[str, Line2D] = {}
-    written: list[float] = []
-    letter = mpl.rcParams["font.size"] / (72 * axes.bbox.height / axes.figure.dpi)
-    apart = 1.6 * letter * np.ptp(axes.get_ylim())
     for body, i in bodies.items():
         colour = "0.4" if len(bodies) == 1 else f"C{i}"
-        for name, symbol, at, source in body:
+        for name, _, at, source in body:
             style: Any = {"linestyle": theory.OVER_TIME[name], "linewidth": 0.9}
             axes.axhline(at, color=colour, gid=name, **style)
             words = theory.words(name, source, over_n0=True, spin="n")
             entries[name] = Line2D([], [], color=mpl.rcParams["text.color"], label=words, **style)
-            if all(abs(at - other) > apart for other in written):
-                axes.annotate(
-                    labels.in_maths(symbol), (1.0, at), xycoords=("axes fraction", "data"), xytext=(2, 0),
-                    textcoords="offset points", va="center", color=colour,
-                )  # fmt: skip
-                written.append(at)
     return list(entries.values())
 
 
@@ -192,17 +183,15 @@ def reversal_times(one: xr.Dataset) -> Array:
     if "ripple_free_spin" not in one:
         return np.array([])
     time, spin = one["time"].values, one["ripple_free_spin"].values
-    if is_of_own_body(one):  # whose period nobody knows
-        at = np.flatnonzero(spin[1:] * spin[:-1] < 0)
-        return np.asarray(time[at] + (time[at + 1] - time[at]) * spin[at] / (spin[at] - spin[at + 1]))
-    columns = {name: np.atleast_1d(one[name].values) for name in rigid_body.PARAMETERS if name in one}
-    surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
-    tau = float(rigid_body.slower_period(columns, surface)[0])
-    total = np.concatenate([[0], np.cumsum(np.diff(time) * (spin[1:] + spin[:-1]) / 2)])
-    ends = np.arange(0, time[-1], tau)
-    means = np.diff(np.interp(ends, time, total)) / tau
-    at = np.flatnonzero(means[1:] * means[:-1] < 0)
-    return np.asarray(ends[at] + tau * (0.5 + means[at] / (means[at] - means[at + 1])))
+    if not is_of_own_body(one):  # whose period nobody knows
+        columns = {name: np.atleast_1d(one[name].values) for name in rigid_body.PARAMETERS if name in one}
+        surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
+        tau = float(rigid_body.slower_period(columns, surface)[0])
+        total = np.concatenate([[0], np.cumsum(np.diff(time) * (spin[1:] + spin[:-1]) / 2)])
+        ends = np.arange(0, time[-1], tau)
+        time, spin = ends[:-1] + tau / 2, np.diff(np.interp(ends, time, total)) / tau
+    at = np.flatnonzero(spin[1:] * spin[:-1] < 0)
+    return np.asarray(time[at] + (time[at + 1] - time[at]) * spin[at] / (spin[at] - spin[at + 1]))
 
 
 def label(dataset: xr.Dataset, i: int) -> str:

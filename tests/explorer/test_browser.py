@@ -687,7 +687,8 @@ def test_what_is_seen_is_saved(clicked: Page, opened: xr.Dataset, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("origin", "status"), [("localhost", 101), ("evil.example", 403), ("localhost.evil.example", 403)]
+    ("origin", "status"),
+    [("localhost", 101), ("127.0.0.1", 101), ("evil.example", 403), ("localhost.evil.example", 403)],
 )
 def test_other_origins_are_refused(origin: str, status: int, served: str) -> None:
     place = urlsplit(served).netloc

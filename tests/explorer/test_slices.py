@@ -1,6 +1,6 @@
 """Slices of a dataset: the same numbers as xarray's own selection, whatever the axes, and what is told of a cell."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from itertools import permutations
 from pathlib import Path
 
@@ -35,7 +35,7 @@ def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
 def test_a_ratio_keeps_its_scale_where_a_limit_is_not_positive(opened: xr.Dataset, low: float) -> None:
     source = Source(opened.assign(t_first_reversal=opened["b"], t_first_reversal_predicted=2 * opened["mu"]))
     part, first = source.map("ratio", "mu", "b", {"n0": 1}), state.first(source)
-    scales = [style.scale_of(part, each) for each in (first, first.limited("low", low))]
+    scales = [style.scale_of(part, each) for each in (first, replace(first, limits={"low": low}))]
     assert style.mapping(scales[0]) == style.mapping(scales[1])
 
 
@@ -100,6 +100,6 @@ def test_what_has_no_map_is_refused(dims: tuple[str, ...]) -> None:
 
 
 def test_no_axis_has_the_name_of_a_key_of_the_address(opened: xr.Dataset) -> None:
-    assert {field.name for field in fields(state.State)} - {"cells", "at"} < slices.ADDRESS
+    assert {field.name for field in fields(state.State)} - {"cells", "at", "limits"} < slices.ADDRESS
     with pytest.raises(StoreError, match="the axis show has the name"):
         Source(opened.rename(mu="show"))

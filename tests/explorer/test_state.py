@@ -45,7 +45,7 @@ def test_the_longest_axes_are_shown_first(source: Source) -> None:
 
 def test_what_is_written_is_read_again(source: Source, base: state.Cell) -> None:
     cells = ({**base, "mu": 47.123456789, "b": 3.0}, {**base, "delta": -0.25})
-    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, cells, "gray", high=4.5)
+    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, cells, "gray", limits={"high": 4.5})
     again, faults = read(state.write(shown, source, base), source, base)
     assert not faults
     assert again == shown
@@ -85,7 +85,7 @@ def test_without_a_configuration_no_cell_is_taken(source: Source) -> None:
 def test_limits_may_stand_before_the_variable(query: str, source: Source, base: state.Cell) -> None:
     shown, faults = read(query, source, base)
     assert not faults
-    assert (shown.show, shown.low, shown.high) == ("status", 1, 5)
+    assert (shown.show, shown.limits) == ("status", {"low": 1, "high": 5})
 
 
 @pytest.mark.parametrize("query", ["x=b", "y=mu", "y=mu&x=b"])

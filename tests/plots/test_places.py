@@ -22,7 +22,7 @@ def across(b: float, first: int = 0, last: int = 21) -> Points:
 
 def numbers(*lines: list[Points]) -> list[tuple[float, float, str]]:
     """The numbers on boundaries of one reversal, two, and so on, of these parts."""
-    return list(places.numbers([Line("boundary", "", parts, f"{k}") for k, parts in enumerate(lines, 1)], MU, B))
+    return list(places.words([Line("boundary", "", parts, f"{k}") for k, parts in enumerate(lines, 1)], MU, B))
 
 
 def test_a_number_is_in_the_middle_of_its_line() -> None:
@@ -51,23 +51,10 @@ def test_a_line_without_room_has_no_number() -> None:
     assert [count for *_, count in numbers([across(0.3)], [across(0.3, 10, 12)])] == ["1"]
 
 
-def test_other_lines_have_no_number() -> None:
-    assert not list(places.numbers([Line("n_c2", "", [across(0.3)], "n_c2⁺")], MU, B))
-
-
-def test_a_number_keeps_off_lines_of_theory_if_it_can() -> None:
-    middle = Line("best", "", [(np.full(2, MU.values[10]), B.edges[[0, -1]])])
-    boundary = Line("boundary", "", [across(0.3)], "1")
-    ((at, *_),) = places.numbers([middle, boundary], MU, B)
-    assert at in (MU.values[9], MU.values[11])
-    along = Line("best", "", [across(0.3)])
-    assert list(places.numbers([along, boundary], MU, B)) == [(MU.values[10], 0.3, "1")]
-
-
 def test_the_symbol_of_a_line_is_within_the_map_and_off_the_numbers() -> None:
     far = Line("n_c1", "", [(MU.values, np.geomspace(0.2, 5, 21)), (np.full(2, np.nan), np.full(2, 0.5))], "n_c1")
     boundary = Line("boundary", "", [across(0.44)], "1")
-    (count, *_), (mu, b, symbol) = places.words([boundary, far], [far, boundary], MU, B)
+    (count, *_), (mu, b, symbol) = places.words([boundary, far], MU, B)
     assert symbol == "n_c1"
     assert (mu, b) in zip(*far.parts[0], strict=True)
     assert B.edges[0] + 0.03 < b < B.edges[-1] - 0.03

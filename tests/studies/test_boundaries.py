@@ -19,8 +19,7 @@ import sweep
 from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED
-from sweep.plots import levels as drawn
-from sweep.plots import picture
+from sweep.plots import description, picture
 from sweep.results.margins import FOUND, OPEN, Counts, distinct, smoothed
 from sweep.results.store import Store
 from sweep.studies.boundaries import Boundaries
@@ -124,7 +123,7 @@ def test_distances_are_of_the_level_asked_for() -> None:
 def test_a_spin_that_comes_no_nearer_to_zero_tells_no_distance_from_the_next_count() -> None:
     """Cells of a line that count four, from where five begins (b = 7.7) to where three begins (b = 8)."""
     cells = sweep.run(SCENE, mu=121.74, b=np.linspace(7.5, 7.98, 33), progress=False).squeeze()
-    counts = Counts.of({name: cells[name].values for name in drawn.NEEDED})
+    counts = Counts.of({name: cells[name].values for name in description.MARGINS})
     begins = float(cells.b[cells.reversals == 5].max())
     four = np.flatnonzero(cells.reversals == 4)
     flat = four[~counts.borders(5)[four]]
@@ -218,7 +217,7 @@ def test_both_ends_of_each_bracket_count_what_another_method_counts(found: xr.Da
 def test_margins_of_a_grid_draw_the_curves_without_a_search(found: xr.Dataset) -> None:
     grid = sweep.run(SCENE, **AXES)
     axes = [Axis(name, np.array(AXES[name])) for name in ("b", "mu")]
-    lines = {int(line.symbol): np.concatenate(line.parts, axis=1) for line in drawn.lines(grid, *axes)}
+    lines = {int(line.symbol): np.concatenate(line.parts, axis=1) for line in description.boundaries(grid, *axes)}
     assert set(lines) == set(found.level.values)
     points = [found.isel(point=i) for i in range(found.sizes["point"])]
     off = [
@@ -230,7 +229,7 @@ def test_margins_of_a_grid_draw_the_curves_without_a_search(found: xr.Dataset) -
     assert np.median(off) < 0.15
     assert max(off) < 0.5
     assert "by the margins" in " ".join(entries(picture.plot(grid, x="b", y="mu")))
-    assert not drawn.lines(grid.drop_vars("margin_more"), *axes)
+    assert not description.boundaries(grid.drop_vars("margin_more"), *axes)
 
 
 def test_what_does_not_end_is_open(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import xarray as xr
 
 from sweep.axis import Axis
 from sweep.kernels.status import DIVERGED, SETTLED
-from sweep.plots import levels
+from sweep.plots.description import boundaries
 from sweep.plots.theory import Points
 
 
@@ -21,7 +21,7 @@ def counted(counts: list[list[float]], widths: list[list[float]]) -> xr.Dataset:
 
 def drawn(dataset: xr.Dataset) -> dict[str, list[Points]]:
     x, y = (Axis(name, dataset[name].values) for name in ("mu", "b"))
-    return {line.symbol: line.parts for line in levels.lines(dataset, x, y)}
+    return {line.symbol: line.parts for line in boundaries(dataset, x, y)}
 
 
 def test_lines_between_distant_counts_are_evenly_apart_whatever_the_widths_of_the_cells() -> None:
