@@ -211,10 +211,10 @@ class Enlarged(Some):
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all cells, in memory."""
-        arrays, (found, costs) = dict[str, Array](), self._gather()
+        arrays = dict[str, Array]()
         self._place(*self.earlier.taken(), arrays)
-        self._place(self.cells, found, arrays)
-        words = self._attributes(len(self.cells), costs)
+        self._place(self.cells, self._gather(), arrays)
+        words = self._attributes(len(self.cells))
         if (self.earlier.cells >= 0).any():
             words["taken_over"] = self.earlier.words
         words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash
