@@ -72,7 +72,7 @@ def _looks(part: Part, patience: float) -> Array:
     """Run `part` on, in place, and look at its cells again and again: `vertical_spin`, shape (2, looks, cells)."""
     table = part.kernel.table(part.images)
     between = whole_blocks(_LONGER * patience / (_LOOKS * table["step"]))
-    begun, goal, looks = table["done"].copy(), table["goal"].copy(), list[Array]()
+    begun, goal, looks = table["done"].copy(), table["goal"].copy(), list[tuple[Array, Array]]()
     for look in range(_LOOKS + 1):
         table["goal"] = begun + look * between
         table["status"][(table["status"] == TIME_LIMIT) & (table["done"] < table["goal"])] = RUNNING
