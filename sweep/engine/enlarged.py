@@ -175,11 +175,10 @@ def _grid(there: xr.Dataset) -> Grid:
     """The grid of a dataset."""
     values = {str(name): coordinate.values for name, coordinate in there.coords.items()}
     constants = {name: float(value) for name, value in values.items() if value.ndim == 0}
-    *names, last = map(str, there["status"].dims or [""])
-    if last not in ROWS:
-        return Grid({name: values[name] for name in map(str, there["status"].dims)}, constants)
-    table = {n: v for n, v in values.items() if there[n].dims == (last,) and n != last}
-    return Grid({name: values[name] for name in names}, constants, table, last)
+    axes = {str(dim): values[str(dim)] for dim in there["status"].dims if dim not in ROWS}
+    rows = [str(dim) for dim in there["status"].dims if dim in ROWS]
+    table = {name: each for name, each in values.items() if rows and [*there[name].dims] == rows and name not in rows}
+    return Grid(axes, constants, table, *rows)
 
 
 def _match(grid: Grid, there: Grid) -> Array:

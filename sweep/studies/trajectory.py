@@ -217,7 +217,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
         plain = config.integrator.model_copy(update={"method": PLAIN, "step": "auto"})
         config = replace(config, integrator=plain)
     dataset.check_names(config, SERIES)
-    wanted = {name: np.array(values) for name, values in _numbers(config, at).items()}
+    wanted = _numbers(config, at)
     drawn = {name: np.array(values) for name, values in config.cases.items() if samples and name not in wanted}
     config = config.at_medians
     firsts = {name: v.numbers[0] for name, v in config.parameters.items()}
@@ -232,13 +232,13 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     return chosen
 
 
-def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
+def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, Array]:
     """The numbers asked for each parameter; `ConfigError` for the first that cannot be run."""
     model = config.tier
     if unknown := next((name for name in at if name not in model.parameters), ""):
         message = f"is no parameter of the {model.name} model{suggestion(unknown, model.parameters)}"
         raise fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", unknown)
-    return {name: numbers_of(config.table[name], value) for name, value in at.items()}
+    return {name: np.array(numbers_of(config.table[name], value)) for name, value in at.items()}
 
 
 Marks = list[Array]
