@@ -7,7 +7,6 @@ worker dies, another one computes the tile it was working on.
 from __future__ import annotations
 
 import logging
-import math
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -30,15 +29,8 @@ from sweep.results.store import StoreError
 if TYPE_CHECKING:
     from distributed import Client
 
-AHEAD = 3
-"""Tiles per worker that are sent out before the first comes back."""
-
 PATIENCE = "10s"
 """How long to wait for a scheduler to answer."""
-
-_RECOUNT = 1.0
-"""Time in s between two questions how many workers there are, who come and go.  Asked for each tile, the
-answers of 1000 workers would have kept this process busy."""
 
 _POLL = 0.01
 """Time in seconds between two looks at whether a tile has come back."""
@@ -60,23 +52,8 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
         build(kernels(config), APPROACH)  # once, into the cache that those workers read
     # A task's result rather than scattered data, which would be lost along with the workers that hold it.
     shared = client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
-    waiting, numbers = iter(todo), dict[Any, int]()
-    running = as_completed(loop=client.loop)
-    workers, counted = 0, -math.inf
-
-    def send_ahead() -> None:
-        nonlocal workers, counted
-        if time.monotonic() > counted + _RECOUNT:
-            workers, counted = len(client.nthreads()), time.monotonic()
-        while len(numbers) < AHEAD * max(1, workers):
-            if (i := next(waiting, None)) is None:
-                return
-            future = client.submit(_work, shared, i, pure=False)
-            numbers[future] = i
-            running.add(future)
-
-    send_ahead()
-    for future in _arriving(running):
+    numbers = {client.submit(_work, shared, i, pure=False): i for i in todo}
+    for future in _arriving(as_completed(numbers, loop=client.loop)):
         try:
             done: Done = future.result()
         except KilledWorker as error:
@@ -86,10 +63,6 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
             raise StoreError(_LOST) from None
         del numbers[future]
         future.release()
-        try:
-            send_ahead()
-        except OSError:
-            raise StoreError(_LOST) from None
         yield done
 
 

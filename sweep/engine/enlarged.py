@@ -175,11 +175,10 @@ def _grid(there: xr.Dataset) -> Grid:
     """The grid of a dataset."""
     values = {str(name): coordinate.values for name, coordinate in there.coords.items()}
     constants = {name: float(value) for name, value in values.items() if value.ndim == 0}
-    *names, last = map(str, there["status"].dims or [""])
-    if last not in ROWS:
-        return Grid({name: values[name] for name in map(str, there["status"].dims)}, constants)
-    table = {n: v for n, v in values.items() if there[n].dims == (last,) and n != last}
-    return Grid({name: values[name] for name in names}, constants, table, last)
+    axes = {str(dim): values[str(dim)] for dim in there["status"].dims if dim not in ROWS}
+    rows = [str(dim) for dim in there["status"].dims if dim in ROWS]
+    table = {name: each for name, each in values.items() if rows and [*there[name].dims] == rows and name not in rows}
+    return Grid(axes, constants, table, *rows)
 
 
 def _match(grid: Grid, there: Grid) -> Array:
@@ -211,10 +210,10 @@ class Enlarged(Some):
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all cells, in memory."""
-        arrays, (found, costs) = dict[str, Array](), self._gather()
+        arrays = dict[str, Array]()
         self._place(*self.earlier.taken(), arrays)
-        self._place(self.cells, found, arrays)
-        words = self._attributes(len(self.cells), costs)
+        self._place(self.cells, self._gather(), arrays)
+        words = self._attributes(len(self.cells))
         if (self.earlier.cells >= 0).any():
             words["taken_over"] = self.earlier.words
         words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash

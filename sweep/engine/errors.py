@@ -33,7 +33,7 @@ from sweep.grid import Array
 from sweep.kernels.measures.margin import EXTREMES
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.methods import METHODS
-from sweep.kernels.status import FAILURES, RUNNING, SETTLED
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, RUNNING, SETTLED
 from sweep.models.model import take
 
 ROUNDS = 3
@@ -243,19 +243,11 @@ def results(job: Plan, errors: Errors | None) -> dict[str, Array]:
         return found
     found["spin_error"] = errors.told
     if "reversals" in found:
-        found["sensitive"] = _sensitive(job, errors.reversals)
+        sound = ~np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
+        found["sensitive"] = sound & (errors.reversals != found["reversals"])  # a companion that fails counts NaN
     if "margin_more" in found:
         found["decided"] = _decided(found, errors)
     return found
-
-
-def _sensitive(job: Plan, companions: Array) -> Array:
-    """Find the cells whose companion counts other reversals or failed, shape (cells,)."""
-    sensitive = np.zeros(len(companions), bool)
-    for part in job.parts:
-        counts = part.kernel.table(part.images)["reversals"]
-        sensitive[part.cells] = (companions[part.cells] != counts) & ~part.failed
-    return sensitive
 
 
 def _decided(found: Mapping[str, Array], errors: Errors) -> Array:

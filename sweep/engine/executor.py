@@ -34,7 +34,7 @@ def execute(
     images: Array,
     *,
     stop_when_settled: bool,
-    after_chunk: Callable[[], None] | None = None,
+    after_chunk: Callable[[], None] = lambda: None,
     chunk_blocks: int | None = None,
 ) -> None:
     """Advance all unfinished `images`, in place, until every trajectory has ended.
@@ -64,8 +64,7 @@ def execute(
         kernel.carry(images)
         if chunk_blocks is None:
             blocks = _rescale(blocks, time.perf_counter() - chunk_began, CHUNK_SECONDS)
-        if after_chunk:
-            after_chunk()
+        after_chunk()
         point()
 
 

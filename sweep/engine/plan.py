@@ -145,7 +145,10 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     grids = grids or (config.grid,)
     chosen = choose(config, *grids)
     build(kernels(config, chosen), *also)
-    return fill(config, grids, chosen)
+    predictions = tuple(on_all_threads(lambda grid: predict(config.equations, grid, config.measure), grids))
+    stable = np.concatenate([each.ranges for each in predictions], axis=1)
+    parts = [Part(**vars(each), config=config, stable=stable[:, each.cells], images=np.empty(0)) for each in chosen]
+    return Plan(config, grids, predictions, tuple(part.start() for part in parts))
 
 
 def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
@@ -190,11 +193,3 @@ def steps_of(method: str, config: Config, columns: Columns) -> tuple[Array, Arra
     if step == "auto":
         return methods.automatic_step(method, config.equations, columns, config.integrator.tolerance)
     return np.full(cells, step), np.full(cells, FIXED)
-
-
-def fill(config: Config, grids: tuple[Grid, ...], chosen: tuple[Choice, ...]) -> Plan:
-    """Give each cell of `grids` its limits and start as well."""
-    predictions = tuple(on_all_threads(lambda grid: predict(config.equations, grid, config.measure), grids))
-    stable = np.concatenate([each.ranges for each in predictions], axis=1)
-    parts = [Part(**vars(each), config=config, stable=stable[:, each.cells], images=np.empty(0)) for each in chosen]
-    return Plan(config, grids, predictions, tuple(part.start() for part in parts))

@@ -76,9 +76,8 @@ class Refined(Some):
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all nodes, in memory."""
-        found, costs = self._gather()
-        words = self._attributes(len(self.cells), costs) | {"simulated_share": len(self.cells) / self.grid.size}
-        return dataset.label(self.config, self.grid, self._arrays(found), words)
+        words = self._attributes(len(self.cells)) | {"simulated_share": len(self.cells) / self.grid.size}
+        return dataset.label(self.config, self.grid, self._arrays(self._gather()), words)
 
     def _arrays(self, found: Mapping[str, Array]) -> dict[str, Array]:
         """All variables over the nodes or their bodies, by formula, simulated (`found`) or inferred."""

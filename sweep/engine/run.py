@@ -135,7 +135,6 @@ def _compute(
 ) -> Whole:
     if earlier:
         reporter.note(earlier.words)
-    if earlier:
         result: Whole = Enlarged(config, store, earlier)
     else:
         # A single cell has no neighbours from which it could be inferred.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,6 @@ from sweep.grid import Array, Tile
 from sweep.results import dataset, netcdf
 from sweep.results.provenance import provenance
 from sweep.results.store import Store
-
-Cost = dict[str, Array]
-"""What a tile holds apart from the results of its cells: the `seconds` that it took, and the type of `cpu`."""
 
 
 class Whole:
@@ -47,8 +44,7 @@ class Whole:
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset, in memory."""
-        arrays, costs = self._gather()
-        return self._labelled(arrays, costs)
+        return self._labelled(self._gather())
 
     def save(self, path: Path) -> None:
         """Write the labelled dataset, tile by tile; it need not fit into memory.
@@ -58,17 +54,14 @@ class Whole:
         if self.config.samples:  # a probability is of all samples together
             netcdf.write(path, self.dataset())
             return
-        tails, costs = dict[str, tuple[int, ...]](), list[Cost]()
-        for _, arrays in self._finished():
-            tails |= {name: values.shape[1:] for name, values in arrays.items()}
-            costs.append(cost_of(arrays))
+        tails = {name: values.shape[1:] for name, values in self.store.load(0).items()}
         first = dict(zip(self.grid.dims, self.tiles[0], strict=True))
         empty, sizes = dict[str, Array](), dict[str, tuple[int, ...]]()
         for name, (over, spec) in dataset.layout(self.grid, tails).items():
             empty[name] = np.broadcast_to(np.zeros((), spec.dtype), over.shape + tails[name])
             sizes[name] = tuple(first[dim].stop for dim in over.dims) + tails[name]
         pieces = (piece for tile, arrays in self._finished() for piece in dataset.pieces(self.grid, tile, arrays))
-        netcdf.write(path, self._labelled(empty, costs), sizes, pieces)
+        netcdf.write(path, self._labelled(empty), sizes, pieces)
 
     def _cut(self, cells: int, tile_size: Callable[[int], int]) -> bool:
         """Simulate so many cases more, in tiles of their own; False if there are none."""
@@ -76,28 +69,22 @@ class Whole:
         self.tiles += [(slice(i, min(i + step, first + cells)),) for i in range(first, first + cells, step)]
         return cells > 0
 
-    def _gather(self) -> tuple[dict[str, Array], list[Cost]]:
-        """Collect arrays over all simulated cells (or bodies), and the costs of the tiles."""
-        costs: list[Cost] = []
-
-        def read() -> Iterator[tuple[Tile, dict[str, Array]]]:
-            for tile, arrays in self._finished():
-                costs.append(cost_of(arrays))
-                yield tile, arrays
-
-        return dataset.assemble(self.simulated().grid, read()), costs
+    def _gather(self) -> dict[str, Array]:
+        """Collect arrays over all simulated cells (or bodies)."""
+        return dataset.assemble(self.simulated().grid, self._finished())
 
     def _finished(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
         """Read the tiles one after another, with what each holds."""
         return ((tile, self.store.load(i)) for i, tile in enumerate(self.tiles))
 
-    def _labelled(self, arrays: Mapping[str, Array], costs: Sequence[Cost]) -> xr.Dataset:
+    def _labelled(self, arrays: Mapping[str, Array]) -> xr.Dataset:
         """Give `arrays` over all cells their coordinates and attributes."""
-        return dataset.label(self.config, self.grid, arrays, self._attributes(self.grid.size, costs))
+        return dataset.label(self.config, self.grid, arrays, self._attributes(self.grid.size))
 
-    def _attributes(self, cells: int, costs: Sequence[Cost]) -> dict[str, Any]:
+    def _attributes(self, cells: int) -> dict[str, Any]:
         """Where the numbers of a finished run come from, and what its `cells` have cost."""
-        seconds, cpus = sum(float(tile["seconds"]) for tile in costs), {str(tile["cpu"]) for tile in costs}
+        costs = [(float(tile["seconds"]), str(tile["cpu"])) for _, tile in self._finished()]
+        seconds, cpus = sum(seconds for seconds, _ in costs), {cpu for _, cpu in costs}
         return provenance(self.config, seconds, cells, cpus) | described_impossible(self.config)
 
 
@@ -136,8 +123,3 @@ class Some(Whole):
                 nothing = np.nan if spec.dtype.startswith("float") else 0
                 arrays[name] = np.full((over.size, *found[name].shape[1:]), nothing, spec.dtype)
             arrays[name][body[cells] if spec.per_body else cells] = found[name]
-
-
-def cost_of(arrays: Mapping[str, Array]) -> Cost:
-    """Pick the cost of a tile from its arrays."""
-    return {name: arrays[name] for name in ("seconds", "cpu")}

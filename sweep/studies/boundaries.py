@@ -113,7 +113,7 @@ class Boundaries(Search):
         for (_, each, place), cell in zip(self._asked, cells, strict=True):
             each.learn(place, cell)
 
-    def labelled(self) -> xr.Dataset:
+    def dataset(self) -> xr.Dataset:
         """The points, with what their search has cost."""
         columns = self._columns()
         head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.told()

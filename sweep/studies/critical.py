@@ -171,7 +171,7 @@ class CriticalSpins(Search):
         for spin, places in self._asked:
             spin.learn([Answer(place, *next(answers)) for place in places])
 
-    def labelled(self) -> xr.Dataset:
+    def dataset(self) -> xr.Dataset:
         """Critical spins by formulas, eigenvalues and simulation, with what the search has cost."""
         second, inner, outer = self.first.copy(), *np.full((2, *self.first.shape), np.nan)
         for spin in self.spins:

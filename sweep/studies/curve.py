@@ -208,7 +208,6 @@ class Curve:
         settled = {before: middle.settled(deviation) for before, middle in self.middles.items()}
         self._insert({before: point for before, point in settled.items() if isinstance(point, Point)})
         found, places = self._found()
-        rank = self._ranks(found)
         if len(found) < (3 if self.closed else 2):
             return
         after = np.roll(places, -1, axis=0)[: None if self.closed else -1]
@@ -217,10 +216,12 @@ class Curve:
         padded = np.pad(long, 1, mode="wrap" if self.closed else "edge")
         around = np.minimum(padded[:-2], padded[2:])
         expected = np.stack(smoothed(*places.T, closed=self.closed, parts=2), axis=1)[1::2]
-        new = {}
+        kept, new = {*map(id, found)}, {}
+        line = [point for point in self.points if id(point) in kept or not point.found]
+        after_it = {id(point): other for point, other in zip(line, [*line[1:], line[0]], strict=True)}
         for i in np.flatnonzero(long > _FARTHER * deviation).tolist():
             this, following = found[i], found[(i + 1) % len(found)]
-            if (rank[id(following)] - rank[id(this)]) % len(rank) != 1:
+            if after_it[id(this)] is not following:
                 continue  # a point between them is being looked for
             if (middle := self.middles.get(id(this))) is None:
                 middle = self._middle(this, expected[i], (places[i], after[i]), deviation)
@@ -254,12 +255,6 @@ class Curve:
         places = np.array([self._place(point) for point in found]).reshape(-1, 2)
         apart = distinct(*places.T, closed=self.closed)
         return [point for point, last in zip(found, apart, strict=True) if last], places[apart]
-
-    def _ranks(self, found: list[Point]) -> dict[int, int]:
-        """How many points come before each of `found` and of those being looked for, by `id`."""
-        kept = {*map(id, found)}
-        counted = (point for point in self.points if id(point) in kept or not point.found)
-        return {id(point): i for i, point in enumerate(counted)}
 
     def _place(self, point: Point) -> Array:
         middle = point.parameters(point.root.expected)

@@ -139,7 +139,8 @@ def _range(config: Config, name: str) -> tuple[float, float]:
 def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
     """The minima over the whole film, the lowest first."""
     sobol = qmc.Sobol(len(problem.free), rng=0).random(POPULATION)
-    horizons = _horizons(len(problem.film.time))
+    rows = len(problem.film.time)
+    horizons = [ceil(rows / _LONGER**k) for k in range(_HORIZONS - 1, -1, -1)]
     cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
     places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:KEPT]]]
     for number, instants in enumerate(horizons, start=1):
@@ -149,11 +150,6 @@ def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
         note(f"film up to {problem.film.time[instants - 1]:.4g}, {number} of {len(horizons)}: minima: {len(minima)}")
         places = [each.place for each in minima]
     return minima
-
-
-def _horizons(rows: int) -> list[int]:
-    """Numbers of instants of a film, each half as many again as the one before, up to all."""
-    return [ceil(rows / _LONGER**k) for k in range(_HORIZONS - 1, -1, -1)]
 
 
 def _different(minima: list[Minimum]) -> list[Minimum]:

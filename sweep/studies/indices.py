@@ -13,11 +13,12 @@ from scipy.stats import bootstrap, sobol_indices
 
 from sweep.config import Config, ConfigError
 from sweep.config.distributions import chances
+from sweep.engine.whole import Whole
 from sweep.grid import Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.results.dataset import variables
 from sweep.studies.kept import Task
-from sweep.studies.search import Study, require_simulated
+from sweep.studies.search import require_simulated
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
@@ -66,18 +67,18 @@ def designed(config: Config) -> Config:
     return replace(config, cases=cases, samples=len(chance))
 
 
-class Indices(Study):
+class Indices(Whole):
     """A run of the design, and the indices that follow from it."""
 
-    def labelled(self) -> xr.Dataset:
+    def dataset(self) -> xr.Dataset:
         """The indices of all quantities that were measured; NaN where a sample failed, or none differs."""
-        arrays, apart = self._gather()
+        arrays = self._gather()
         names = [name for name in QUANTITIES if name in arrays]
         failed = np.isin(arrays["status"], (*FAILURES, IMPOSSIBLE))
         values = np.stack([np.where(failed, np.nan, arrays[name]) for name in names])
         parameters = list(self.config.cases)
         found = estimated(values.reshape(len(names), len(parameters) + 2, -1), self.config.seed)
-        attributes = {"title": f"{self.config.name}: Sobol indices", **self._attributes(self.grid.size, apart)}
+        attributes = {"title": f"{self.config.name}: Sobol indices", **self._attributes(self.grid.size)}
         return xr.Dataset(
             variables(VARIABLES, ("quantity", "parameter"), found),
             {"quantity": names, "parameter": parameters},

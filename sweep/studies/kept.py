@@ -13,6 +13,7 @@ from sweep.config import Config
 from sweep.engine.cluster import connected
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import carry_out
+from sweep.engine.whole import Whole
 from sweep.interrupt import deferred
 from sweep.models.user.blame import blamed
 from sweep.results import netcdf
@@ -22,7 +23,6 @@ from sweep.results.identity import require_same
 from sweep.results.kind import ATTRIBUTE
 from sweep.results.provenance import identify
 from sweep.results.store import Store
-from sweep.studies.search import Study
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -36,7 +36,7 @@ class Task(NamedTuple):
     """Its command, after which its files and its module in `sweep.studies` are named."""
     settings: str
     """Its own settings, in words."""
-    make: Callable[[Config, Store], Study]
+    make: Callable[[Config, Store], Whole]
 
 
 @deferred()
@@ -52,7 +52,7 @@ def kept(
         with blamed(config.origin):
             found = make(config, store)
         carry_out(found, store, reporter, there)
-        return found.labelled().assign_attrs({ATTRIBUTE: verb, **vars(identity)})
+        return found.dataset().assign_attrs({ATTRIBUTE: verb, **vars(identity)})
 
     if output is None:
         with connected(client) as there:

@@ -12,11 +12,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from sweep.config import Config, ConfigError
 from sweep.engine.errors import ROUND_OFF
-from sweep.engine.whole import Cost, Whole, cost_of
+from sweep.engine.whole import Whole
 from sweep.faults import either
 from sweep.grid import Array
 from sweep.kernels.measures import default
@@ -57,16 +56,8 @@ def require_simulated(config: Config) -> None:
         raise ConfigError([config.fault(("model",), message)])
 
 
-class Study(Whole):
-    """Simulations that are kept as those of a run are, but whose dataset says what was found with them."""
-
-    @abstractmethod
-    def labelled(self) -> xr.Dataset:
-        """What has been found."""
-
-
-class Search(Study):
-    """A search, and the table of the cells that it has asked for."""
+class Search(Whole):
+    """A search, and the table of the cells that it has asked for; its dataset is what it has found."""
 
     def __init__(self, config: Config, store: Store, width: float) -> None:
         """Make a search whose brackets are to be as narrow as `width`, relative to a parameter."""
@@ -78,8 +69,8 @@ class Search(Study):
         """That of the cells that were asked for last."""
         self.estimates = False
         """Whether their errors are estimated."""
-        self.costs: list[Cost] = []
-        """Those of the tiles that the search has learned from."""
+        self._learned = 0
+        """Tiles that the search has learned from."""
 
     @abstractmethod
     def ask(self) -> Mapping[str, Array]:
@@ -100,11 +91,10 @@ class Search(Study):
     def grow(self, tile_size: Callable[[int], int]) -> bool:
         """Add the cells to simulate next, judging by all results so far; False if the search has ended."""
         if self.tiles:
-            new = [self.store.load(i) for i in range(len(self.costs), len(self.tiles))]
-            self.costs += map(cost_of, new)
-            self.learn(
-                {name: np.concatenate([tile[name] for tile in new]) for name in new[0].keys() - {*self.costs[0]}}
-            )
+            new = [self.store.load(i) for i in range(self._learned, len(self.tiles))]
+            self._learned = len(self.tiles)
+            of_cells = [name for name, values in new[0].items() if values.ndim]
+            self.learn({name: np.concatenate([tile[name] for tile in new]) for name in of_cells})
         asked = self.ask()
         cells = len(next(iter(asked.values())))
         if cells:
@@ -119,4 +109,4 @@ class Search(Study):
         """The attributes of a dataset: how exact it is, where it comes from, what it has cost."""
         simulations = self.tiles[-1][0].stop if self.tiles else 0
         exact = {"relative_width": self.width, "bracket_tolerance": self.sharp(self.width), "trajectories": simulations}
-        return exact | self._attributes(simulations, self.costs)
+        return exact | self._attributes(simulations)

@@ -6,15 +6,13 @@ A minimiser asks for a few trajectories, and goes on when it knows them.  Alone 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
 Found = TypeVar("Found")
-
-_ENDED = object()
 
 
 def together(
@@ -35,43 +33,42 @@ def together(
     Exception
         What `answer` or a search has raised; other searches end at their next question.
     """
-    asked: SimpleQueue[tuple[int, Any]] = SimpleQueue()
-    answered: list[SimpleQueue[Any]] = [SimpleQueue() for _ in searches]
+    asked: SimpleQueue[tuple[int, Any, Future[Answer] | None]] = SimpleQueue()
     found: dict[int, Found] = {}
 
     def run(k: int) -> None:
         def ask(question: Question) -> Answer:
-            asked.put((k, question))
-            if (told := answered[k].get()) is _ENDED:
-                raise CancelledError
-            return told  # type: ignore[no-any-return]
+            reply: Future[Answer] = Future()
+            asked.put((k, question, reply))
+            return reply.result()
 
         try:
             found[k] = searches[k](ask)
         finally:
-            asked.put((k, _ENDED))
+            asked.put((k, None, None))
 
     with ThreadPoolExecutor(len(searches)) as pool:
         ends = [pool.submit(run, k) for k in range(len(searches))]
-        running, waiting = len(searches), dict[int, Question]()
+        running, waiting = len(searches), dict[int, tuple[Question, Future[Answer]]]()
         try:
             while running:
-                k, question = asked.get()
-                if question is _ENDED:
-                    running -= 1
+                k, question, reply = asked.get()
+                if reply:
+                    waiting[k] = question, reply
                 else:
-                    waiting[k] = question
-                if len(waiting) < running:
+                    running -= 1
+                if len(waiting) < running or not waiting:
                     continue
                 if any(map(enough, found.values())):
                     break
-                order = sorted(waiting)
-                for k, told in zip(order, answer([waiting[k] for k in order]) if order else (), strict=True):
-                    answered[k].put(told)
+                pairs = [waiting[k] for k in sorted(waiting)]
+                answers = [*answer([question for question, _ in pairs])]
+                for (_, reply), told in zip(pairs, answers, strict=True):
+                    reply.set_result(told)
                 waiting.clear()
         finally:
-            for each in answered:
-                each.put(_ENDED)
+            for _, reply in waiting.values():
+                reply.cancel()
     for end in ends:
         if not isinstance(error := end.exception(), CancelledError) and error:
             raise error

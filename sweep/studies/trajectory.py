@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from sweep import units as u
-from sweep.config import Config, ConfigError, ConfigLike, load_config
+from sweep.config import Config, ConfigLike, load_config
 from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.schema import FOREVER
 from sweep.config.values import numbers_of
@@ -72,16 +72,8 @@ SERIES: dict[str, tuple[Unit, str] | tuple[Unit, str, str]] = {
     "heading": (u.ANGLE, "heading", "Angle by which the body has turned about the upward normal."),
     "roll_angle": (u.ANGLE, "angle about the axis of a"),
     "pitch_angle": (u.ANGLE, "angle about the axis of b", "Angle about the axis of b, after roll."),
-    "table_x": (
-        u.LENGTH,
-        "contact point on the table along x",
-        "Contact point along x, the direction of heading zero.",
-    ),
-    "table_y": (
-        u.LENGTH,
-        "contact point on the table along y",
-        "Contact point along y, to the left of x.",
-    ),
+    "table_x": (u.LENGTH, "contact point on the table along x", "Contact point along x, towards heading zero."),
+    "table_y": (u.LENGTH, "contact point on the table along y", "Contact point along y, to the left of x."),
     "slip_1": (u.SPEED, "slip velocity along x", "Slip velocity v_p along the body's x."),
     "slip_2": (u.SPEED, "slip velocity along y", "Slip velocity v_p along the body's y."),
     "slip_rate_1": (u.ACCELERATION, "acceleration of the slip along x", "Time derivative of v_p along x."),
@@ -225,7 +217,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
         plain = config.integrator.model_copy(update={"method": PLAIN, "step": "auto"})
         config = replace(config, integrator=plain)
     dataset.check_names(config, SERIES)
-    wanted = {name: np.array(values) for name, values in _numbers(config, at).items()}
+    wanted = _numbers(config, at)
     drawn = {name: np.array(values) for name, values in config.cases.items() if samples and name not in wanted}
     config = config.at_medians
     firsts = {name: v.numbers[0] for name, v in config.parameters.items()}
@@ -240,21 +232,13 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     return chosen
 
 
-def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
-    """The numbers asked for each parameter; `ConfigError` with a fault for each that cannot be run."""
-    numbers, faults, model = {}, [], config.tier
-    for name, value in at.items():
-        if name not in model.parameters:
-            message = f"is no parameter of the {model.name} model{suggestion(name, model.parameters)}"
-            faults += fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", name).faults
-            continue
-        try:
-            numbers[name] = numbers_of(config.table[name], value)
-        except ConfigError as error:
-            faults += error.faults
-    if faults:
-        raise ConfigError(faults)
-    return numbers
+def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, Array]:
+    """The numbers asked for each parameter; `ConfigError` for the first that cannot be run."""
+    model = config.tier
+    if unknown := next((name for name in at if name not in model.parameters), ""):
+        message = f"is no parameter of the {model.name} model{suggestion(unknown, model.parameters)}"
+        raise fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", unknown)
+    return {name: np.array(numbers_of(config.table[name], value)) for name, value in at.items()}
 
 
 Marks = list[Array]

@@ -155,12 +155,6 @@ def test_what_is_refused(write: Write) -> None:
             load_config(write(TEXT), change)
     with pytest.raises(ConfigError, match="upright rest is not stable"):
         sweep.trajectory(write(TEXT), b=[0.9, 3.0], offset=0.05)
-    # A fixed step is judged by the bodies that there are.
-    config = load_config(write(TEXT), {"step": 0.02})
-    assert config.grid.size == 18
-    assert "cells:  18" in estimate(config)
-    predicted = sweep.predict(config)["n_c1_plus_linear"].transpose("b", "offset").values
-    np.testing.assert_array_equal(np.isnan(predicted), GONE)
 
 
 @pytest.mark.parametrize("change", [{"Izz": [21.0, 30.0]}, {"Ixy": [-0.3, -10.0]}])

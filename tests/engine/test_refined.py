@@ -153,17 +153,6 @@ def test_a_change_that_shows_late_halves_the_patches_it_reaches() -> None:
     assert simulated.mean() < 0.4
 
 
-@settings(max_examples=40)
-@given(st.integers(1, 3), st.floats(0.1, 0.9), st.booleans())
-def test_lines_one_cell_wide_are_followed(depth: int, slope: float, upright: bool) -> None:
-    columns = np.arange(65)
-    at = np.round(slope * columns).astype(int)
-    full = np.zeros((65, 65), np.int32)
-    full[at, columns] = full[at[1:], columns[:-1]] = 1  # from a coarse node on, without diagonal gaps
-    full = full.T if upright else full
-    np.testing.assert_array_equal(refine(full, depth)[0], full)
-
-
 def test_a_strip_beside_another_is_found() -> None:
     """No first node meets the second; a patch that the first one contradicts is looked at more closely."""
     columns = np.arange(17, 60)
