@@ -246,7 +246,7 @@ def results(job: Plan, errors: Errors | None) -> dict[str, Array]:
         sound = ~np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
         found["sensitive"] = sound & (errors.reversals != found["reversals"])  # a companion that fails counts NaN
     if "margin_more" in found:
-        found["decided"] = _decided(found, errors)
+        found["decided"] = _decided(found, errors) & _consistent(job, found)
     return found
 
 
@@ -255,3 +255,15 @@ def _decided(found: Mapping[str, Array], errors: Errors) -> Array:
     firm = (found["sensitive"] == 0) & (found["window_dependent"] == 0) & (found["status"] == SETTLED)
     below = (found["reversals"] == 0) | (found["margin_fewer"] > DECIDED * errors.overshoot)
     return np.asarray(firm & below & (found["margin_more"] > DECIDED * errors.nearest_approach))
+
+
+def _consistent(job: Plan, found: Mapping[str, Array]) -> Array:
+    """Tell where the parity of the count is that of the signs of the spin at the start and the end, shape (cells,)."""
+    consistent = np.zeros(len(found["reversals"]), bool)
+    for part in job.parts:
+        model = part.config.equations
+        start, _, _ = model.energy(model.start(part.columns), model.constants.of(part.columns))
+        turned = start * found["spin_final"][part.cells]
+        odd = found["reversals"][part.cells] % 2 == 1
+        consistent[part.cells] = np.where(odd, turned <= 0, turned >= 0)
+    return consistent

@@ -17,13 +17,19 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED
+from sweep.models.ladder import slip
 from sweep.models.model import MODES
+from sweep.models.stiff.form import subset
+from sweep.models.theory import linear
 
 CHUNK_SECONDS = 0.7
 """Length of a chunk.  Progress, checkpoints and Ctrl-C wait for the end of one."""
 
 STEP_SECONDS = 25e-9
 """Rough time of a step of one lane on one thread, measured on the slip model with dopri5 (`sweep bench`)."""
+
+_REACH = 4.0
+"""How many times the change of the spin at the present rates may be exceeded, where no slow equations hold."""
 
 UNTIL_ALL_STOP = 2**40
 """Blocks of steps: as many as are needed."""
@@ -81,16 +87,34 @@ def nominal_seconds(steps: Array) -> float:
 
 
 def too_early(kernel: Kernel, images: Array) -> Array:
-    """Find the cells, by index, that have settled although it can be foreseen that their spin reverses once more.
+    """Find the cells, by index, that have settled although their spin may reverse once more.
 
     The kernel lets a cell settle by a bound on what the energy of its rattle can do to the spin
-    (`sweep.kernels.lanes`).  The bound fails where a strong rattle hardly decays, and turns the spin all the while: of
-    2800 wide cells 3 settled and reversed later.  The slow equations tell of these.
+    (`sweep.kernels.lanes`).  The bound fails where a strong rattle hardly decays, and turns the spin all the while, and
+    where friction is too weak to stop the slip.  The slow equations foresee what comes; where they do not hold, the
+    spin must keep its sign, and the rattle decay, even if the rattle changes the spin `_REACH` times as much as at its
+    present rates.
     """
     if MODES not in kernel.model.offers:
         return np.empty(0, np.intp)
     table = kernel.table(images)
-    return np.flatnonzero(endings(table, table["status"] == SETTLED).reversals > 0)
+    settled = table["status"] == SETTLED
+    left = endings(table, settled).reversals
+    early, unknown = left > 0, np.flatnonzero(settled & np.isnan(left))
+    if len(unknown):
+        early[unknown] = ~_stays(kernel, images[unknown])
+    return np.flatnonzero(early)
+
+
+def _stays(kernel: Kernel, images: Array) -> Array:
+    """Tell where the spin keeps its sign and the rattle decays even at `_REACH` times the change foreseen."""
+    constants = subset(slip.Constants, kernel.unpack(images)[1])
+    states = kernel.model_states(images)
+    spin, _, _ = slip.MODEL.energy(tuple(states), constants)
+    farthest = spin + _REACH * (linear.resting_spin(slip.MODEL, constants, states) - spin)
+    known = np.isfinite(farthest)
+    growth = linear.growth_rate(slip.MODEL, constants, np.where(known, farthest, spin))
+    return np.asarray(known & (spin * farthest > 0) & (growth < 0))
 
 
 class Work:

@@ -20,6 +20,7 @@ from sweep.engine.plan import Part
 from sweep.grid import Array
 from sweep.kernels.build import APPROACH, build
 from sweep.kernels.failure import approach
+from sweep.kernels.layout import BLOCK
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.status import DIVERGED, RUNNING, SETTLED
 from sweep.models.model import stack, take
@@ -30,7 +31,7 @@ falsely, because then its numbers are worth nothing."""
 
 MOST_STEPS = 1e8
 """Steps beyond which a repeat is not tried: a minute for one cell, or for all that fill the lanes beside it.  If only
-the way to a failure is shorter, that is repeated, once."""
+the way to a failure is shorter, that alone is repeated."""
 
 SAME = 1e-6
 """Largest difference of the times at which two runs meet the same failure, in sqrt(c/g)."""
@@ -80,7 +81,9 @@ def _repeat(part: Part, rows: Array, first: Part, work: Work, name: str) -> None
     while len(rows):
         before = now
         if halvings:
-            most = np.where(brief, 2 * (now.kernel.table(now.images)["done"] + _BEYOND), np.inf)
+            # A run may be stopped before the failure that lies ahead of it.
+            steps = np.maximum(now.times, met.time) / now.kernel.table(now.images)["step"]
+            most = np.where(brief, 2 * (steps + _BEYOND) + BLOCK, np.inf)
             now = now.start(2)
             final.run(now, work, f"{name} halved {halvings}", most)
         met, met_before = _meet(now, work, f"{name} halved {halvings} approach"), met
@@ -90,7 +93,7 @@ def _repeat(part: Part, rows: Array, first: Part, work: Work, name: str) -> None
         else:
             rounds = np.where(now.failed & ~met.agrees(met_before, np.inf), FALSE_ROUNDS, ROUNDS)
             long, failed_late = 2 * table["goal"] > MOST_STEPS, 2 * table["done"] > MOST_STEPS
-            last = (halvings >= rounds) | (long & (brief | ~now.failed | failed_late))
+            last = (halvings >= rounds) | (long & (~now.failed | failed_late))
             within = np.where(last & ~unsound(now), np.inf, SAME)
         true = met.agrees(met_before, within)
         doubtful = ~true & (now.failed | unsound(now))

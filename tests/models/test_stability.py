@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import columns, wide_bodies
+from support.adaptive import motion
 from support.kernels import threads
 
 import sweep
@@ -14,7 +15,7 @@ from sweep.grid import Grid
 from sweep.kernels.status import SETTLED
 from sweep.models import MODELS
 from sweep.models.ladder import slip
-from sweep.models.model import stack
+from sweep.models.model import stack, take
 from sweep.models.theory import linear, stability
 from sweep.prediction import predict
 
@@ -83,3 +84,21 @@ def test_each_body_by_itself() -> None:
     some = {name: values[::7] for name, values in bodies.items()}
     np.testing.assert_array_equal(found[0][:, ::7], stability.stable_ranges(slip.MODEL, some))
     assert np.isfinite(found[0][2:]).any()
+
+
+@pytest.mark.parametrize(("mu", "n0", "y0"), [(0.3, -0.02, 0.002), (2.0, -0.03, -0.002), (5.0, -0.01, 0.002)])
+def test_the_spin_that_stays_is_where_an_adaptive_integrator_ends(mu: float, n0: float, y0: float) -> None:
+    """Also with little friction, where the slip modes are no faster than the rocking."""
+    values = {"a": 3.0, "b": 2.0, "c": 1.0, "delta": 0.2, "mu": mu, "n0": n0, "x0": 0.003, "y0": y0}
+    body = {name: np.array([value]) for name, value in values.items()}
+    constants = slip.Constants.of(body)
+    end = motion(body, [0, 300], rtol=1e-12, atol=1e-16)[:7, -1]
+    changed = slip.rhs(tuple(end), take(constants, 0))[1][0] - n0
+    found = linear.resting_spin(slip.MODEL, constants, stack(slip.start(body))) - n0
+    assert found == pytest.approx([changed], rel=1e-4)
+
+
+def test_no_spin_stays_where_the_rattle_grows() -> None:
+    body = columns(n0=0.05)
+    states = stack(slip.start(body))
+    assert np.isnan(linear.resting_spin(slip.MODEL, slip.Constants.of(body), states)).all()

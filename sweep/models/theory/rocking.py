@@ -19,6 +19,10 @@ from sweep.jit import inline
 from sweep.models import ellipsoid
 from sweep.models.model import Array, Columns
 
+LONGEST = 10.0
+"""Ratio of the two periods of the rocking beyond which the spin is averaged over a shorter time than the longer one.
+Bodies with b > 1.04 c have a smaller ratio (a = 10); none of the configurations has a larger one."""
+
 Rocking = namedtuple("Rocking", "B11 B12 B21 B22 C11 C12 C21 C22")
 """The elements of B and C."""
 
@@ -53,14 +57,18 @@ def frequencies(of: Rocking) -> tuple[Array, Array]:
 
 
 def longer_period(of: Rocking) -> Array:
-    """Period of the slower mode, shape (cells,); infinite for a body that is round about one axis."""
-    lower, _ = frequencies(of)
+    """Return the period over which the spin is averaged, shape (cells,): that of the slower mode.
+
+    In a body that is nearly round about one axis, the slower mode hardly swings back: its period may outlast the whole
+    motion, and reversals would vanish in the average.  So it is at most `LONGEST` periods of the faster mode.
+    """
+    lower, higher = frequencies(of)
     with np.errstate(divide="ignore"):
-        return np.asarray(2 * np.pi / lower)
+        return np.asarray(2 * np.pi / np.maximum(lower, higher / LONGEST))
 
 
 def slower_period(columns: Columns) -> Array:
-    """Period of the slower mode of the paper's body, in sqrt(c/g), shape (cells,)."""
+    """Return `longer_period` for the paper's body, in sqrt(c/g), shape (cells,)."""
     return longer_period(rocking(Body.of(columns)))
 
 
