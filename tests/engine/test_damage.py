@@ -12,7 +12,6 @@ from importlib import metadata
 from pathlib import Path
 from zipfile import ZipFile, is_zipfile
 
-import numba
 import numpy as np
 import pytest
 from click.testing import Result
@@ -27,6 +26,7 @@ from sweep.results import provenance
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.identity import Identity
 from sweep.results.store import StoreError
+from sweep.sources import versions
 
 TILE = 3
 """Cells a tile at the most; of twelve cells there are then six tiles in two groups."""
@@ -190,23 +190,22 @@ def refuses(result: Result, *words: str) -> None:
 
 
 @pytest.fixture
-def forgets() -> Iterator[None]:
+def forgets() -> Iterator[Callable[[], None]]:
     """A process reads versions and sources once, as if they never changed while it runs."""
 
     def forget() -> None:
-        provenance.sources.cache_clear()
-        provenance._version.cache_clear()
+        for each in (provenance.sources, provenance._version, versions):
+            each.cache_clear()
 
     forget()
-    yield
+    yield forget
     forget()
 
 
-@pytest.mark.usefixtures("forgets")
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.campaign)], ids=["half", "whole"])
 @pytest.mark.parametrize("package", ["rattleback-sweep", "numba"])
 def test_another_version_is_refused(
-    config: Path, out: Path, whole: bool, package: str, monkeypatch: pytest.MonkeyPatch
+    config: Path, out: Path, whole: bool, package: str, monkeypatch: pytest.MonkeyPatch, forgets: Callable[[], None]
 ) -> None:
     if whole:
         assert invoke("run", config, "--output", out).exit_code == 0
@@ -214,10 +213,7 @@ def test_another_version_is_refused(
     true = metadata.version
     with monkeypatch.context() as patch:
         patch.setattr(metadata, "version", lambda name: "9.9" if name == package else true(name))
-        if package == "numba":
-            patch.setattr(numba, "__version__", "9.9")
-        provenance.sources.cache_clear()
-        provenance._version.cache_clear()
+        forgets()
         result = invoke("run", config, "--output", out)
     refuses(result, "not resumed, it comes from other versions: sweep")
     assert f"{package.removeprefix('rattleback-')} 9.9" in result.stderr.partition(", now")[2]
