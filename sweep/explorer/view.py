@@ -109,7 +109,7 @@ class View:
         dataset, axes = self._source.dataset, self._source.axes
         here = [labels.measured(dataset, d, axes[d].values[index[d]]) for d in self._source.dims]
         told = self._source.describe(index)
-        self._cell.text = str(PARTS.cell(", ".join(here), told.pop("note", ""), told))
+        self._cell.text = str(PARTS.cell(", ".join(here), told.pop("note", ""), told, self._source.meanings))
 
     # ---- the cells whose trajectories are drawn
 
