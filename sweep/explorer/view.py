@@ -118,7 +118,7 @@ class View:
         index = self._place(self._shown.request)
         if index is None or not self._setup:
             return
-        cell = {**self._setup.base, **self._source.parameters_at(tuple(self._setup.base), index)}
+        cell = {**self._base, **self._source.parameters_at(tuple(self._base), index)}
         if cell in self._drawn.cells:
             self._activate(self._drawn.cells.index(cell))
             return
