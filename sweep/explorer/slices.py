@@ -95,8 +95,13 @@ class Source:
         """Say what a variable or an axis is."""
         return labels.words(self.cell, name)
 
+    @cached_property
+    def meanings(self) -> dict[str, str]:
+        """The sentences that describe the variables, by their words."""
+        return {self.words(name): str(self.cell[name].attrs.get("description", "")) for name in self.variables}
+
     def label(self, name: str) -> str:
-        """The same with the unit."""
+        """What it is, with the unit."""
         return labels.label(self.cell, name) if name in self.cell.variables else self.words(name)
 
     def map(self, name: str, x: str, y: str, at: Mapping[str, int]) -> Map:

@@ -109,7 +109,7 @@ class View:
         dataset, axes = self._source.dataset, self._source.axes
         here = [labels.measured(dataset, d, axes[d].values[index[d]]) for d in self._source.dims]
         told = self._source.describe(index)
-        self._cell.text = str(PARTS.cell(", ".join(here), told.pop("note", ""), told))
+        self._cell.text = str(PARTS.cell(", ".join(here), told.pop("note", ""), told, self._source.meanings))
 
     # ---- the cells whose trajectories are drawn
 
@@ -118,7 +118,7 @@ class View:
         index = self._place(self._shown.request)
         if index is None or not self._setup:
             return
-        cell = {**self._setup.base, **self._source.parameters_at(tuple(self._setup.base), index)}
+        cell = {**self._base, **self._source.parameters_at(tuple(self._base), index)}
         if cell in self._drawn.cells:
             self._activate(self._drawn.cells.index(cell))
             return

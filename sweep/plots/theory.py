@@ -53,10 +53,10 @@ class Line:
 
 def critical_spins(dataset: xr.Dataset, name: str) -> Iterator[tuple[str, xr.DataArray, str]]:
     """The symbol, values and source of n_c1 or n_c2, for both signs, as far as the dataset has them."""
-    for side in ("plus", "minus"):
+    for side, sign in (("plus", "⁺"), ("minus", "⁻")):
         for suffix, source in _SOURCES[name]:
             if f"{name}_{side}{suffix}" in dataset:
-                yield symbol(f"{name}_{side}"), dataset[f"{name}_{side}{suffix}"], source
+                yield f"{name}{sign}", dataset[f"{name}_{side}{suffix}"], source
                 break
 
 
@@ -64,12 +64,6 @@ def levels(one: xr.Dataset) -> list[tuple[str, str, float, str]]:
     """The name, symbol, value and source of each critical spin that one trajectory has."""
     spins = ((name, *found) for name in OVER_TIME for found in critical_spins(one, name))
     return [(name, sign, float(at), source) for name, sign, at, source in spins if np.isfinite(at)]
-
-
-def symbol(name: str) -> str:
-    """The symbol of a critical spin: n_c1⁺ for `n_c1_plus` and for `n_c1_plus_linear`."""
-    _, number, side, *_ = name.split("_")
-    return f"n_{number}{'⁺' if side == 'plus' else '⁻'}"
 
 
 def words(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> str:

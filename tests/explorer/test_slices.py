@@ -74,6 +74,7 @@ def test_a_cell_is_told_in_words(source: Source, opened: xr.Dataset) -> None:
     cell = opened.isel(mu=1, b=0, n0=1)
     assert told[1]["spin reversals, simulated"] == str(int(cell["reversals"]))
     assert told[1]["time of the end"] == f"{float(cell['t_stop']):.6g} √(c/g)"
+    assert source.meanings["time of the end"] == opened["t_stop"].attrs["description"] != ""
     assert len(told[1]) == len([n for n, v in opened.data_vars.items() if v.dims]) + 1
 
 

@@ -1,6 +1,5 @@
 """Figures for print, in a style of the user's own, and in axes of the user's own."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -59,14 +58,6 @@ def test_titles_and_units_are_whole(width: str) -> None:
         (letter,) = (text for text in axes.texts if text.get_weight() == "bold")
         assert not letter.get_window_extent().overlaps(axes.title.get_window_extent())
         assert {line.count("(") - line.count(")") for line in axes.get_ylabel().split("\n")} == {0}
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_no_text_in_a_file_for_print_is_smaller_than_6_points(kind: str, tmp_path: Path) -> None:
-    with mpl.rc_context({"pdf.compression": 0}):
-        picture.plot(made(n0=[0.02, 0.05]), width="85mm", output=tmp_path / "map.pdf", **KINDS[kind])
-    sizes = {float(size) for size in re.findall(rb"/F\S+ ([\d.]+) Tf", (tmp_path / "map.pdf").read_bytes())}
-    assert min(size for size in sizes if not 0.69 < size / 6.25 < 0.71) >= 6  # subscripts aside
 
 
 def test_words_with_symbols_are_as_long_as_they_look() -> None:

@@ -39,8 +39,3 @@ def test_a_body_that_lifts_off_has_none() -> None:
     found = dataset([*CELLS.values(), (LIFT_OFF, 0, np.nan, np.nan)])
     assert "failed: 1 lifted off" in legend(found, "regime")["failed"]
     assert any("lifted off" in each for each in entries(sweep.plot(found, "regime")))
-
-
-def test_without_an_exponent_there_is_no_regime() -> None:
-    with pytest.raises(ValueError, match="no variable regime"):
-        field(dataset([CELLS["reverses_regularly"]]).drop_vars("lyapunov"), "regime")

@@ -64,13 +64,6 @@ def test_a_set_of_critical_lines_for_each_body(mu: list[float], sets: int) -> No
         assert {line.get_color() for line in lines} == set(curves.values())
 
 
-def test_axes_have_plain_names() -> None:
-    figure = picture.plot(made([60]))
-    assert figure.axes[0].get_ylabel() == "spin n (√(g/c))"
-    assert figure.axes[-1].get_xlabel() == "time t (√(c/g))"
-    assert "b = 3" in constants(figure)
-
-
 def test_a_body_in_si_has_its_units_everywhere() -> None:
     dataset = made([60, 60], a=0.2, n0=[-1.0, 2.0])
     for name, units in (("a", "m"), ("n0", "radian s-1"), ("spin", "radian s-1"), ("energy", "m2 s-2")):
