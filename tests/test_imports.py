@@ -12,25 +12,19 @@ FOREIGN = {
     "click": {"cli"},
     "contourpy": {"axis"},
     "distributed": {"api", "engine", "studies"},
-    "IPython": {"progress"},
     "jinja2": {"explorer", "report"},
     "llvmlite": {"bench", "jit", "results"},
-    "matplotlib": {"bench", "explorer", "plots", "report", "reproduce"},
+    "matplotlib": {"api", "bench", "explorer", "plots", "report", "reproduce"},
     "mpl_toolkits": {"explorer"},
     "netCDF4": {"results"},
     "numba": {"bench", "engine", "jit", "kernels", "results"},
-    "pandas": {"config", "explorer"},
-    "PIL": {"explorer"},
-    "pint": {"config", "plots"},
+    "pandas": {"config"},
     "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "rich": {"progress"},
     "ruamel": {"config"},
     "scipy": {"config", "engine", "plots", "reproduce", "results", "studies"},
-    "tornado": {"explorer"},
-    "xarray": {
-        "api", "bench", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies",
-    },
+    "xarray": {"api", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies"},
 }  # fmt: skip
 """The rooms that import each package; NumPy is for all."""
 
@@ -52,13 +46,8 @@ def foreign(graph: grimp.ImportGraph) -> dict[str, set[str]]:
 def beyond(graph: grimp.ImportGraph) -> set[str]:
     """What numeric code imports, in whatever way, besides NumPy, Numba and the standard library."""
     reached = set[str]().union(*(graph.find_upstream_modules(f"sweep.{room}", as_package=True) for room in NUMERIC))
-    return {name.partition(".")[0] for name in reached} - {
-        "sweep",
-        "numpy",
-        "numba",
-        "llvmlite",
-        *sys.stdlib_module_names,
-    }
+    own = {"sweep", "numpy", "numba", "llvmlite", *sys.stdlib_module_names}
+    return {name.partition(".")[0] for name in reached} - own
 
 
 def test_each_room_imports_its_own_packages(graph: grimp.ImportGraph) -> None:

@@ -145,10 +145,7 @@ import numpy as np
 import sweep
 
 reveal_type(sweep.run({"friction": {"mu": 60}}, mu=np.array([1.0]), progress=False))
-reveal_type(sweep.trajectory("x.yaml", mu=60, t_end=300))
-reveal_type(sweep.critical(sweep.load_config("x.yaml"), bracket=0.1))
 reveal_type(sweep.predict("x.yaml"))
-reveal_type(sweep.open("x.nc"))
 reveal_type(sweep.load_config("x.yaml").axes)
 sweep.run(3)
 sweep.run("x.yaml", fresh="yes")
@@ -157,7 +154,7 @@ sweep.nothing
 """A user's program, and what a type checker has to say of its lines."""
 
 TYPES = [
-    *['Revealed type is "xarray.core.dataset.Dataset"'] * 5,
+    *['Revealed type is "xarray.core.dataset.Dataset"'] * 2,
     'Revealed type is "dict[str, tuple[float, ...]]"',
     'Argument 1 to "run" has incompatible type "int"',
     'Argument "fresh" to "run" has incompatible type "str"',

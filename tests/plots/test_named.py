@@ -46,13 +46,6 @@ def test_pictures_of_another_dataset_are_removed(tmp_path: Path, write: Write) -
     assert set(drawn(tmp_path)) == {"map.png"}
 
 
-def test_without_a_name_it_is_what_the_dataset_is_about(tmp_path: Path, write: Write) -> None:
-    result = sweep.run(write(FORMULA, "map.yaml"), output=tmp_path, progress=False)
-    assert "pictured" not in result.attrs
-    sweep.plot(result, output=tmp_path / "again.png")
-    assert drawn(tmp_path)["map.png"] == drawn(tmp_path)["again.png"]
-
-
 def test_pictures_are_no_part_of_what_a_run_is() -> None:
     asked = {"friction": {"mu": [20, 60]}}
     plain, named = load_config(asked), load_config(asked, {"picture": ["spin_mean"]})

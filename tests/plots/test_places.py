@@ -36,12 +36,6 @@ def test_numbers_of_close_lines_are_apart() -> None:
     assert np.diff(places).min() > 0.06
 
 
-def test_small_parts_have_no_number_beside_large_ones() -> None:
-    island = across(0.8, 5, 8)
-    assert numbers([across(0.3), island, across(0.6)]) == [(MU.values[10], 0.3, "1"), (MU.values[10], 0.6, "1")]
-    assert numbers([island]) == [(MU.values[6], 0.8, "1")]
-
-
 def test_no_number_is_on_the_edge_of_a_map() -> None:
     edge = (np.full(21, MU.edges[-1]), B.values)
     assert [count for *_, count in numbers([edge], [across(0.3)])] == ["2"]
@@ -51,10 +45,6 @@ def test_a_line_without_room_has_no_number() -> None:
     assert [count for *_, count in numbers([across(0.3)], [across(0.3, 10, 12)])] == ["1"]
 
 
-def test_other_lines_have_no_number() -> None:
-    assert not list(places.numbers([Line("n_c2", "", [across(0.3)], "n_c2⁺")], MU, B))
-
-
 def test_a_number_keeps_off_lines_of_theory_if_it_can() -> None:
     middle = Line("best", "", [(np.full(2, MU.values[10]), B.edges[[0, -1]])])
     boundary = Line("boundary", "", [across(0.3)], "1")
@@ -62,16 +52,6 @@ def test_a_number_keeps_off_lines_of_theory_if_it_can() -> None:
     assert at in (MU.values[9], MU.values[11])
     along = Line("best", "", [across(0.3)])
     assert list(places.numbers([along, boundary], MU, B)) == [(MU.values[10], 0.3, "1")]
-
-
-def test_the_symbol_of_a_line_is_within_the_map_and_off_the_numbers() -> None:
-    far = Line("n_c1", "", [(MU.values, np.geomspace(0.2, 5, 21)), (np.full(2, np.nan), np.full(2, 0.5))], "n_c1")
-    boundary = Line("boundary", "", [across(0.44)], "1")
-    (count, *_), (mu, b, symbol) = places.words([boundary, far], [far, boundary], MU, B)
-    assert symbol == "n_c1"
-    assert (mu, b) in zip(*far.parts[0], strict=True)
-    assert B.edges[0] + 0.03 < b < B.edges[-1] - 0.03
-    assert mu != count
 
 
 @pytest.mark.parametrize("width", [None, "85mm"])

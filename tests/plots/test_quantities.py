@@ -14,9 +14,11 @@ import sweep
 from sweep.config import load_config
 from sweep.explorer import state
 from sweep.explorer.slices import Source
-from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
-from sweep.plots import labels, picture
+from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
+from sweep.plots import picture
+from sweep.plots.marks import legend
 from sweep.plots.quantities import DERIVED, derivable, field, subject
+from sweep.plots.regimes import REGIMES
 from sweep.results.provenance import provenance
 
 SIZE = (6, 7)
@@ -101,11 +103,6 @@ def test_the_picture_of_a_configuration_shows_what_it_is_about(name: str, variab
     assert subject(whole.assign_attrs(provenance(config, 1.0, 1))) == variable
 
 
-def test_a_run_tells_what_it_measured(small: xr.Dataset) -> None:
-    assert small.attrs["measured"].split()[0] == "reversals"
-    assert "energy_error" in small.attrs["measured"].split()
-
-
 def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
     source = Source(whole)
     assert set(DERIVED) == set(derivable(whole)) < set(source.variables)
@@ -160,12 +157,6 @@ def test_a_bar_has_arrows_where_values_lie_beyond(variable: str, limits: Any, ar
     assert variable != "ratio" or bars[-1].get_yticklabels()[2].get_text() == "1"
 
 
-def test_a_ratio_of_seconds_has_no_unit(whole: xr.Dataset) -> None:
-    for name in ("t_first_reversal", "t_first_reversal_predicted"):
-        whole[name].attrs["units"] = "s"
-    assert labels.label(whole.assign(ratio=field(whole, "ratio")), "ratio") == "first reversal, simulated / predicted"
-
-
 def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None:
     whole["t_first_reversal_predicted"][:, :2] = np.nan
     figure = picture.plot(whole, "ratio")
@@ -177,3 +168,36 @@ def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None
     (missing,) = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
     assert (missing.get_label(), len(missing.get_xdata())) == ("no reversal (1 of 6)", 1)
     assert entries(picture.plot(whole.isel(delta=1), "ratio")) == ["time of the first reversal"]
+
+
+CELLS = {
+    "settles": (SETTLED, 7, 0.5, 0.1),
+    "few_reversals": (TIME_LIMIT, 3, np.nan, 0.1),
+    "reverses_regularly": (TIME_LIMIT, 30, 0.009, 0.001),
+    "wanders": (TIME_LIMIT, 30, 0.011, 0.0031),
+    "undecided": (TIME_LIMIT, 30, 0.011, 0.0029),
+}
+"""Status, reversals, variation of the cycles, and exponent."""
+
+
+def moving(cells: list[tuple[Any, ...]]) -> xr.Dataset:
+    names = ("status", "reversals", "cycle_variation", "lyapunov")
+    columns = {name: ("n0", np.array(values)) for name, values in zip(names, zip(*cells, strict=True), strict=True)}
+    dataset = xr.Dataset(columns, {"n0": np.arange(len(cells)) / 10})
+    return dataset.assign(lyapunov_error=("n0", np.full(len(cells), 1e-3)), status=dataset["status"].astype("int8"))
+
+
+@pytest.mark.parametrize("regime", CELLS)
+def test_a_regime_is_told_by_its_thresholds(regime: str) -> None:
+    assert REGIMES[field(moving([CELLS[regime]]), "regime").item()] == regime
+
+
+def test_a_body_that_lifts_off_has_none() -> None:
+    found = moving([*CELLS.values(), (LIFT_OFF, 0, np.nan, np.nan)])
+    assert "failed: 1 lifted off" in legend(found, "regime")["failed"]
+    assert any("lifted off" in each for each in entries(sweep.plot(found, "regime")))
+
+
+def test_without_an_exponent_there_is_no_regime() -> None:
+    with pytest.raises(ValueError, match="no variable regime"):
+        field(moving([CELLS["reverses_regularly"]]).drop_vars("lyapunov"), "regime")

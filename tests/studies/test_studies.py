@@ -77,13 +77,3 @@ def test_trajectory_shows_the_motion(write: Write) -> None:
     times = reversal_times(one)
     assert len(times) == int(one.reversals) == 2
     assert times[-1] == pytest.approx(float(one.t_last_reversal), abs=0.05)
-
-
-@pytest.mark.parametrize(
-    "model", ["averaged", *(pytest.param(name, marks=pytest.mark.campaign) for name in ("noslip", "effective"))]
-)
-def test_trajectories_of_every_model(model: str, write: Write) -> None:
-    config = sweep.load_config(write(STANDARD), {"model": model, "mu": 60.0, "t_end": 50.0})
-    series = sweep.trajectory(config)
-    assert float(series.spin[0, 0]) == pytest.approx(0.05)
-    assert np.isfinite(series.spin).all()
