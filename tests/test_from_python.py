@@ -66,9 +66,7 @@ def test_a_mapping_is_left_as_it_was() -> None:
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "a word": ({"mu": "x"}, "mu: must be a finite number >= 0 and < 1e+12, a list of such"),
     "an entry": ({"mu": [1, "x"]}, "mu[1]: must be a finite number >= 0 and < 1e+12, not 'x'"),
-    "of an array": ({"mu": np.array([1.0, np.nan])}, "mu[1]: must be a finite number >= 0 and < 1e+12, not nan"),
     "a key of a range": ({"mu": {"strat": 1, "stop": 2, "num": 3}}, "mu.strat: unknown key (did you mean start?)"),
-    "two dimensions": ({"mu": np.ones((2, 2))}, "mu[0]: must be a finite number >= 0 and < 1e+12, not [1.0, 1.0]"),
     "another type": ({"mu": 1j}, "mu: must be a finite number >= 0 and < 1e+12, a list of such"),
     "by path": ({"friction.mu": -1}, "friction.mu: must be a finite number >= 0 and < 1e+12, not -1"),
     "misspelt": ({"t_edn": 3}, "t_edn: unknown key (did you mean integrator.t_end?); the keys here are name, model"),
@@ -88,16 +86,13 @@ def test_a_wrong_argument_is_called_by_its_name(function: Callable[..., Any], ki
         assert "\n" not in str(refusal.value)
 
 
-def test_faults_of_a_mapping_have_its_path_and_those_of_a_file_their_line(write: Write) -> None:
+def test_faults_of_a_mapping_have_its_path() -> None:
     with pytest.raises(ConfigError) as refusal:
         load_config({"body": {"a": -1}, "friction": {"mu": [20, "x"]}})
     assert str(refusal.value).splitlines() == [
         "body.a: must be a finite number > 0 and < 1e+06, not -1",
         "friction.mu[1]: must be a finite number >= 0 and < 1e+12, not 'x'",
     ]
-    path = write("friction: {mu: x}\n")
-    with pytest.raises(ConfigError, match=f"^{path}:1:16: friction.mu: must be"):
-        sweep.run(path)
 
 
 def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name() -> None:

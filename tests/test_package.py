@@ -1,7 +1,6 @@
 """The package as a user installs it: a wheel in a fresh environment, every verb run from another folder."""
 
 import fcntl
-import json
 import os
 import re
 import shutil
@@ -112,20 +111,6 @@ VERBS = {
 def test_every_verb_runs_from_another_folder(command: str, python: Path, folder: Path) -> None:
     sweep(python, folder, *command.split())
     assert [name for name in VERBS[command] if not (folder / name).is_file()] == []
-
-
-def test_data_of_the_reports_is_found(python: Path, folder: Path) -> None:
-    """`bench` and `reproduce` take minutes; this is all that they read."""
-    program = (
-        "import json, sweep\n"
-        "from sweep.bench.reference import read_spins\n"
-        "from sweep.reproduce.rows import published\n"
-        "spins = {model: len(found.spins) for model, found in read_spins().items()}\n"
-        "print(json.dumps([sweep.__file__, spins, published()['reversals_60']['value']]))\n"
-    )
-    file, spins, printed = json.loads(call(folder, python, "-c", program))
-    assert Path(file).is_relative_to(python.parent.parent)
-    assert (spins, printed) == ({"slip": 13, "noslip": 4, "effective": 8, "averaged": 8}, 3)
 
 
 def test_console_script(python: Path, folder: Path) -> None:

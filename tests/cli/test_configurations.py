@@ -36,14 +36,6 @@ def test_what_is_printed_loads_with_the_numbers_measured(tmp_path: Path) -> None
     assert found["Ixy"] < 0
 
 
-def test_units_of_one_size_are_one_body() -> None:
-    sizes = {"--mass": ("30g", "0.03 kg"), "--length": ("12cm", "0.12m"), "--width": ("3cm", "30mm"),
-             "--height": ("15e-3 m", "1.5cm"), "--angle": ("1.8deg", "0.0314159265358979rad")}  # fmt: skip
-    one, other = (printed(*(w for name, both in sizes.items() for w in (name, both[i]))) for i in (0, 1))
-    assert one.partition("units:")[2] == other.partition("units:")[2]
-    assert one != other  # what was given is told
-
-
 def test_errors_stand_beside_what_they_make_uncertain() -> None:
     text = printed(*TOY)
     lines = dict(re.findall(r"^  (\w+): \S+  # (.*)$", text, re.MULTILINE))
@@ -137,17 +129,6 @@ def test_a_copied_example_loads_measures_what_it_draws_and_is_not_overwritten(na
     (folder / f"{name}.yaml").write_text("mine", encoding="utf-8")
     refused(invoke("examples", name, "--output", folder), f"{name}.yaml: exists already; choose another folder")
     assert (folder / f"{name}.yaml").read_text(encoding="utf-8") == "mine"
-
-
-def test_a_table_of_cases_is_copied_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shipped = tmp_path / "shipped"
-    shipped.mkdir()
-    (shipped / "tabled.yaml").write_text("# A table.\ncases: table.csv\n", encoding="utf-8")
-    (shipped / "table.csv").write_text("mu\n60\n", encoding="utf-8")
-    monkeypatch.setattr("sweep.cli.configurations._EXAMPLES", shipped)
-    monkeypatch.chdir(tmp_path)
-    assert invoke("examples", "tabled").stdout == "wrote tabled.yaml\nwrote table.csv\n"
-    assert (tmp_path / "table.csv").read_text(encoding="utf-8") == "mu\n60\n"
 
 
 def test_an_unknown_example_is_one_line() -> None:

@@ -57,8 +57,6 @@ assert "smear" in SETTINGS["friction.law"].annotation.__args__
 assert made.described("a")["long_name"] == "hollow"
 assert "units" not in made.described("mu")
 refused(lambda: config("dish", {"law": "smear"}, x0=4), "start point off the dish at x0=4")
-refused(lambda: config("dish", {"law": "smear", "regularisation": "tanh"}), "the law smear needs no regularisation")
-refused(lambda: config("dish", {"law": "smear", "mu_static": 1}), "does not belong to the law smear")
 refused(lambda: config("plate", {"law": "smear"}), "must be ellipsoid, paraboloid or dish, not 'plate'")
 refused(lambda: load_config({"body": {"surface": "dish", **INERTIA}, "friction": {"mu": 1}}), "body.b: missing")
 """

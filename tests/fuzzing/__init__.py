@@ -211,13 +211,6 @@ def _invoke(folder: Path, *arguments: str) -> bool:
     return result.exit_code == 0
 
 
-def dry_run(random: Random, folder: Path) -> bool:
-    """A configuration through the command line."""
-    file = folder / "fuzzed.yaml"
-    file.write_bytes(near_valid(random))
-    return _invoke(folder, "run", str(file), "--dry-run", "--output", str(folder / "out"))
-
-
 def foreign(random: Random, folder: Path) -> bool:
     """A dataset of another program, whose variables may have the same names as ours."""
     names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step",
@@ -260,5 +253,5 @@ def foreign(random: Random, folder: Path) -> bool:
 
 
 KINDS: dict[str, Callable[[Random, Path], bool]] = {
-    kind.__name__: kind for kind in (yaml_tree, yaml_bytes, setting, mapping, at, table, dry_run, foreign)
+    kind.__name__: kind for kind in (yaml_tree, yaml_bytes, setting, mapping, at, table, foreign)
 }

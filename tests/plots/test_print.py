@@ -1,6 +1,5 @@
 """Figures for print, in a style of the user's own, and in axes of the user's own."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -48,14 +47,6 @@ def test_a_figure_for_print_is_as_wide_as_asked_and_can_be_read(kind: str, width
     panels = [axes for axes in figure.axes if axes.get_label() == ""]
     assert letters(figure) == ("abcdefghijkl"[: len(panels)] if len(panels) > 1 else "")
     assert all(axes.get_window_extent().width > 0.3 * figure.bbox.width / 3 for axes in panels)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_no_text_in_a_file_for_print_is_smaller_than_6_points(kind: str, tmp_path: Path) -> None:
-    with mpl.rc_context({"pdf.compression": 0}):
-        picture.plot(made(n0=[0.02, 0.05]), width="85mm", output=tmp_path / "map.pdf", **KINDS[kind])
-    sizes = {float(size) for size in re.findall(rb"/F\S+ ([\d.]+) Tf", (tmp_path / "map.pdf").read_bytes())}
-    assert min(size for size in sizes if not 0.69 < size / 6.25 < 0.71) >= 6  # subscripts aside
 
 
 def test_maps_that_do_not_fit_side_by_side_stand_below_each_other() -> None:
