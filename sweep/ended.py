@@ -12,6 +12,7 @@ ENDED: dict[str, str] = {
     "film_lean_y": "lay the sensor so that its z axis is upright at rest, or correct the film first",
     "cluster": "give client, a distributed.Client or the address of a scheduler",
     "--workers": "a run uses all cores of this machine; for more machines start a dask cluster and give --scheduler",
+    "width": "the width of brackets is bracket",
     "boundaries --width": "the width of brackets is --bracket",
     "critical --width": "the width of brackets is --bracket",
     "plot --histogram": "use xarray: dataset.reversals.plot.hist()",

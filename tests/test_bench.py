@@ -28,14 +28,6 @@ def two() -> Spins:
     return Spins(spins.columns, spins.times[:2], spins.spins[:, :2])
 
 
-def test_references_are_read_by_model_and_body() -> None:
-    spins = read_spins()
-    assert set(spins) == set(MODELS)
-    assert list(spins["slip"].times) == list(np.arange(25, 401, 25))
-    assert [two().is_standard(i) for i in (0, 1)] == [True, False]
-    assert [spins["noslip"].is_standard(i) for i in (0, 2)] == [True, False]
-
-
 @pytest.mark.campaign
 @pytest.mark.parametrize("method", METHODS)
 def test_error_is_the_largest_difference_from_the_reference(method: str) -> None:

@@ -4,8 +4,8 @@
 """
 
 import csv
-import importlib.util
 import re
+import runpy
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
@@ -28,17 +28,6 @@ def _references() -> dict[str, dict[float, float]]:
     for row in _rows("references.csv"):
         spins.setdefault(row["case"], {})[float(row["t"])] = float(row["spin"])
     return spins
-
-
-@pytest.fixture(scope="module")
-def example() -> Any:
-    """The module `data/benchmark/example_scipy.py`."""
-    spec = importlib.util.spec_from_file_location("example_scipy", FOLDER / "example_scipy.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def _score(folder: Path, lines: list[str], code: int = 0) -> CompletedProcess[str]:
@@ -92,11 +81,12 @@ def test_references_agree_with_those_of_128_bits() -> None:
 @pytest.mark.parametrize(
     ("case", "end", "error"), [("mu60_b3", 50, 1e-10), ("mu10000_b4", 50, 1e-8), ("kane_levinson_left", 1, 1e-7)]
 )
-def test_the_example_agrees_with_the_references(example: Any, case: str, end: float, error: float) -> None:
-    chosen = example.read_cases()[case]
+def test_the_example_agrees_with_the_references(case: str, end: float, error: float) -> None:
+    example = runpy.run_path(str(FOLDER / "example_scipy.py"))
+    chosen = example["read_cases"]()[case]
     chosen["times"] = [t for t in chosen["times"] if t <= end]
     np.testing.assert_allclose(
-        example.solve(chosen), [_references()[case][t] for t in chosen["times"]], rtol=0, atol=error
+        example["solve"](chosen), [_references()[case][t] for t in chosen["times"]], rtol=0, atol=error
     )
 
 

@@ -59,9 +59,9 @@ def test_a_mapping_a_path_and_a_config_are_one_configuration(write: Write) -> No
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "a word": ({"mu": "x"}, "mu: must be a finite number >= 0 and < 1e+12, a list of such"),
-    "of an array": ({"mu": np.array([1.0, np.nan])}, "mu[1]: must be a finite number >= 0 and < 1e+12, not nan"),
+    "an entry": ({"mu": [1, "x"]}, "mu[1]: must be a finite number >= 0 and < 1e+12, not 'x'"),
     "a key of a range": ({"mu": {"strat": 1, "stop": 2, "num": 3}}, "mu.strat: unknown key (did you mean start?)"),
-    "two dimensions": ({"mu": np.ones((2, 2))}, "mu[0]: must be a finite number >= 0 and < 1e+12, not [1.0, 1.0]"),
+    "another type": ({"mu": 1j}, "mu: must be a finite number >= 0 and < 1e+12, a list of such"),
     "by path": ({"friction.mu": -1}, "friction.mu: must be a finite number >= 0 and < 1e+12, not -1"),
     "misspelt": ({"t_edn": 3}, "t_edn: unknown key (did you mean integrator.t_end?); the keys here are name, model"),
     "a section": ({"friction": {}}, "friction.mu: missing; give a finite number >= 0"),
@@ -79,32 +79,21 @@ def test_a_wrong_argument_is_called_by_its_name(function: Callable[..., Any], ki
         assert "\n" not in str(refusal.value)
 
 
-def test_faults_of_a_mapping_have_its_path_and_those_of_a_file_their_line(write: Write) -> None:
+def test_faults_of_a_mapping_have_its_path() -> None:
     with pytest.raises(ConfigError) as refusal:
         load_config({"body": {"a": -1}, "friction": {"mu": [20, "x"]}})
     assert str(refusal.value).splitlines() == [
         "body.a: must be a finite number > 0 and < 1e+06, not -1",
         "friction.mu[1]: must be a finite number >= 0 and < 1e+12, not 'x'",
     ]
-    path = write("friction: {mu: x}\n")
-    with pytest.raises(ConfigError, match=f"^{path}:1:16: friction.mu: must be"):
-        sweep.run(path)
 
 
-@pytest.mark.parametrize(
-    ("config", "cell", "said"),
-    [
-        (SAID, {"mu": -1}, "mu: must be a finite number >= 0 and < 1e[+]12, not -1"),
-        (SAID, {"muu": 60}, r"muu: unknown key \(did you mean friction\.mu\?\)"),
-        (SAID, {"x0": 20}, "start point off the ellipsoid at x0=20"),
-        ({"model": "noslip"}, {"mu": 60}, "mu: is no parameter of the noslip model; its parameters are a, b"),
-    ],
-)
-def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name(
-    config: dict[str, Any], cell: dict[str, Any], said: str
-) -> None:
-    with pytest.raises(ConfigError, match=f"^{said}"):
-        sweep.trajectory(config, **cell)
+def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name() -> None:
+    for cell, said in (({"mu": []}, "mu: an empty axis"), ({"x0": 20}, "start point off the ellipsoid at x0=20")):
+        with pytest.raises(ConfigError, match=f"^{said}"):
+            sweep.trajectory(SAID, **cell)
+    with pytest.raises(ConfigError, match=r"^mu: is no parameter of the noslip model; its parameters are a, b"):
+        sweep.trajectory({"model": "noslip"}, mu=60)
 
 
 def test_overrides_of_a_config_act_as_on_its_file(write: Write) -> None:
@@ -148,52 +137,44 @@ def test_open_takes_what_sweep_wrote_and_nothing_else(tmp_path: Path) -> None:
         sweep.open(tmp_path / "other.nc")
 
 
-def test_a_bar_is_shown_where_it_is_asked_for(capfd: pytest.CaptureFixture[str]) -> None:
-    sweep.run(SAID)
-    assert tuple(capfd.readouterr()) == ("", "")
-    sweep.run(SAID, progress=True)
+@pytest.mark.parametrize(
+    ("shell", "asked", "shown"),
+    [
+        (None, {}, False),
+        (None, {"progress": True}, True),
+        ({"kernel": None}, {}, True),
+        ({"kernel": None}, {"progress": False}, False),
+        ({}, {}, False),
+    ],
+    ids=["plain", "plain, asked", "notebook", "notebook, declined", "prompt"],
+)
+def test_a_notebook_shows_progress_unasked_and_others_where_it_is_asked_for(
+    shell: dict[str, None] | None, asked: dict[str, bool], shown: bool,
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """In a notebook whose kernel lacks ipywidgets; a prompt of IPython is none."""
+    if shell is not None:
+        ipython = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(**shell))
+        monkeypatch.setitem(sys.modules, "IPython", ipython)
+    sweep.run(SAID, **asked)
     out, err = capfd.readouterr()
-    assert (out, "4/4 cells" in err) == ("", True)
+    assert (out, "4/4 cells" in err, bool(err)) == ("", shown, shown)
 
 
-@pytest.fixture
-def notebook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a notebook whose kernel lacks ipywidgets."""
-    ipython = types.ModuleType("IPython")
-    ipython.get_ipython = lambda: types.SimpleNamespace(kernel=None)  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "IPython", ipython)
-
-
-@pytest.mark.usefixtures("notebook")
-def test_a_notebook_shows_progress_unasked(capfd: pytest.CaptureFixture[str]) -> None:
-    sweep.run(SAID, progress=False)
-    assert tuple(capfd.readouterr()) == ("", "")
-    sweep.run(SAID)
-    out, err = capfd.readouterr()
-    assert (out, "4/4 cells" in err) == ("", True)
-
-
-@pytest.mark.usefixtures("notebook")
 def test_a_notebook_with_widgets_shows_a_bar_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = list[object]()
 
     class Output(nullcontext[None]):
         clear_output = staticmethod(lambda wait: None)  # noqa: ARG005
 
-    for name in ("ipywidgets", "IPython.display"):
+    given = {"Output": Output, "display": shown.append, "get_ipython": lambda: types.SimpleNamespace(kernel=None)}
+    for name in ("IPython", "ipywidgets", "IPython.display"):
         module = types.ModuleType(name)
         module.__spec__ = ModuleSpec(name, None)
-        vars(module).update(Output=Output, display=shown.append)
+        vars(module).update(given)
         monkeypatch.setitem(sys.modules, name, module)
     sweep.run(SAID)
     assert isinstance(shown[0], Output)
-
-
-@pytest.mark.usefixtures("notebook")
-def test_a_python_prompt_is_no_notebook(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(sys.modules["IPython"], "get_ipython", lambda: types.SimpleNamespace())
-    sweep.run(SAID)
-    assert tuple(capfd.readouterr()) == ("", "")
 
 
 HALVES: dict[str, list[dict[str, Any]]] = {

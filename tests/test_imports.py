@@ -25,7 +25,7 @@ FOREIGN = {
     "ruamel": {"config"},
     "scipy": {"config", "engine", "plots", "reproduce", "results", "studies"},
     "xarray": {"api", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies"},
-}
+}  # fmt: skip
 """The rooms that import each package; NumPy is for all."""
 
 
@@ -46,13 +46,8 @@ def foreign(graph: grimp.ImportGraph) -> dict[str, set[str]]:
 def beyond(graph: grimp.ImportGraph) -> set[str]:
     """What numeric code imports, in whatever way, besides NumPy, Numba and the standard library."""
     reached = set[str]().union(*(graph.find_upstream_modules(f"sweep.{room}", as_package=True) for room in NUMERIC))
-    return {name.partition(".")[0] for name in reached} - {
-        "sweep",
-        "numpy",
-        "numba",
-        "llvmlite",
-        *sys.stdlib_module_names,
-    }
+    own = {"sweep", "numpy", "numba", "llvmlite", *sys.stdlib_module_names}
+    return {name.partition(".")[0] for name in reached} - own
 
 
 def test_each_room_imports_its_own_packages(graph: grimp.ImportGraph) -> None:

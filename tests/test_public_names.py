@@ -2,24 +2,14 @@
 
 import ast
 import doctest
-import importlib
 import inspect
 import re
 import tomllib
-import types
 from pathlib import Path
 
 import pytest
 
 import sweep
-
-
-@pytest.mark.parametrize(("name", "module"), [("run", "sweep.engine.run"), ("trajectory", "sweep.studies.trajectory")])
-def test_functions_and_modules_of_one_name_do_not_hide_each_other(name: str, module: str) -> None:
-    assert isinstance(importlib.import_module(module), types.ModuleType)
-    room, _, _ = module.rpartition(".")
-    assert isinstance(getattr(importlib.import_module(room), name), types.ModuleType)
-    assert isinstance(getattr(sweep, name), types.FunctionType)
 
 
 @pytest.mark.parametrize("name", sweep.__all__)

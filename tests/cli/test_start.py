@@ -18,12 +18,9 @@ HELP = [["--help"], ["--version"], ["run", "--help"], ["body", "--help"], ["run"
 
 REFUSED = {
     "not YAML": ("run", "body: {b: 3\n"),
-    "out of bounds": ("run", "friction: {mu: -1}\n"),
     "not measured": ("run", "friction: {mu: 60}\nmeasure: [colour]\n"),
     "off the body": ("run", "friction: {mu: 60}\nstart: {x0: 50}\n"),
     "too long a step": ("run", "friction: {mu: 60}\nintegrator: {step: 5}\n"),
-    "dry run": ("run --dry-run", "friction: {mu: -1}\n"),
-    "trajectory": ("trajectory", "friction: {mu: -1}\n"),
     "no setting": ("trajectory --set mu", SMALL),
     "no parameter": ("trajectory --at colour=1", SMALL),
 }

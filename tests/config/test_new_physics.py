@@ -1,5 +1,6 @@
-"""A new surface or law of friction is its record alone: what the configuration and labels know stands there."""
+"""A new surface, law of friction or explicit method is its record alone: all that asks about it finds it there."""
 
+import pytest
 from support.processes import python
 
 PROGRAM = """
@@ -56,8 +57,6 @@ assert "smear" in SETTINGS["friction.law"].annotation.__args__
 assert made.described("a")["long_name"] == "hollow"
 assert "units" not in made.described("mu")
 refused(lambda: config("dish", {"law": "smear"}, x0=4), "start point off the dish at x0=4")
-refused(lambda: config("dish", {"law": "smear", "regularisation": "tanh"}), "the law smear needs no regularisation")
-refused(lambda: config("dish", {"law": "smear", "mu_static": 1}), "does not belong to the law smear")
 refused(lambda: config("plate", {"law": "smear"}), "must be ellipsoid, paraboloid or dish, not 'plate'")
 refused(lambda: load_config({"body": {"surface": "dish", **INERTIA}, "friction": {"mu": 1}}), "body.b: missing")
 """
@@ -65,3 +64,40 @@ refused(lambda: load_config({"body": {"surface": "dish", **INERTIA}, "friction":
 
 def test_a_new_surface_and_a_new_law_are_their_records_alone() -> None:
     python("-c", PROGRAM)
+
+
+RK4 = """
+from fractions import Fraction as F
+
+import numpy as np
+
+from sweep.kernels import methods, runge_kutta
+from sweep.kernels.tableau import Tableau
+
+methods.METHODS["rk4"] = runge_kutta.method(Tableau(
+    name="rk4", code=9, summary="the classical formula", order=4,
+    a=((F(1, 2),), (F(0), F(1, 2)), (F(0), F(0), F(1))),
+    b=(F(1, 6), F(1, 3), F(1, 3), F(1, 6)), c=(F(0), F(1, 2), F(1, 2), F(1)),
+    real_stability=2.7853, phase=0.3, layer_error=0.1,
+))  # before anybody has read the registry
+
+import sweep
+
+def run(**settings):
+    scene = {"model": "averaged", "friction": {"mu": 20}, "start": {"n0": 0.1}, "measure": []}
+    found = sweep.run(scene, t_end=400, stop_when_settled=False, **settings)
+    return float(found.spin_final), float(found.step)
+
+exact, _ = run(method="dopri5", step=0.02)
+errors = [abs(run(method="rk4", step=step)[0] - exact) for step in (0.8, 0.4, 0.2)]
+assert np.allclose(np.diff(np.log2(errors)), -4, atol=0.1), errors
+(loose, long), (tight, short) = (run(method="rk4", tolerance=tolerance) for tolerance in (1e-6, 1e-10))
+assert abs(loose - exact) < 1e-6
+assert abs(tight - exact) < 1e-10
+assert abs(long / short - 10) < 0.2  # the fourth root of the ratio of the tolerances
+"""
+
+
+@pytest.mark.campaign
+def test_an_explicit_runge_kutta_method_is_one_record() -> None:
+    python("-c", RK4)

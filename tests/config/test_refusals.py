@@ -38,11 +38,9 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (small("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); the keys here are surface, a, b, c, delta"),
     ("mu: 60\n", 1, "mu", "unknown key (did you mean friction.mu?); the keys here are name"),
     ("friction: {mu: 60}\nt_end: 3\n", 2, "t_end", "unknown key (did you mean integrator.t_end?)"),
-    ("friction: {mu: 60, b: 3}\n", 1, "friction.b", "unknown key (did you mean body.b?); the keys here are law"),
     (SMALL + "name: again\n", 6, "name", "duplicate key, first on line 1"),
     (mu("[]"), 3, "friction.mu", "an empty axis; give it one number or more"),
     (mu(".nan"), 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, not nan"),
-    (mu("[-40, 60]"), 3, "friction.mu[0]", "must be a finite number >= 0 and < 1e+12, not -40"),
     (small("10.0", "ten"), 2, "body.a", "a list of such, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}, not 'ten'"),
     (small("a: 10.0", "a: "), 2, "body.a", "not nothing"),
     (mu("{start: 1, num: 3}"), 3, "friction.mu.stop", "missing; give a finite number"),
@@ -60,7 +58,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     ("model: analytic\nfriction: {mu: 60}\nstart: {x0: [0.01, 0.02]}\n", 3, "start.x0", "the analytic model has no x0"),
     ("model: effective\nfriction: {mu: 60}\nmeasure: [reversals, energy_error]\n", 3, "measure[1]", "energy_error cannot be measured on the effective model"),
     ("model: effective\nfriction: {mu: [0, 60]}\n", 2, "friction.mu", "must be > 0 for the effective model, not 0"),
-    (step("step: 0"), 5, "integrator.step", "must be auto or a finite number > 0, not 0"),
+    (step("step: aut"), 5, "integrator.step", "not 'aut' (did you mean auto?)"),
     (step("step: 5"), 5, "integrator.step", "must be auto or at most 0.802, a quarter of the rattle's period, not 5"),
     (step("step: 1.0e-320"), 5, "integrator.step", "steps to t_end; keep to 1e+15, or choose auto"),
     (step("method: auto, step: 0.1"), 5, "integrator.step", "must be auto with method: auto; or choose a method"),
@@ -68,8 +66,6 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (step("tolerance: 5e-324"), 5, "integrator.tolerance", "must be a finite number >= 1e-14 and < 1, not 5e-324"),
     (step("stop_when_settled: no"), 5, "integrator.stop_when_settled", "must be true or false, not 'no'"),
     (SMALL + "measure: [colour]\n", 6, "measure[0]", "must be reversals, energy_error"),
-    (SMALL + "measure: [reversals, [reversals]]\n", 6, "measure[1]", "or misfit, not ['reversals']"),
-    (SMALL + "measure: {a: 1}\n", 6, "measure", "must be a list of reversals"),
     (SMALL + "measure: [reversals, reversals]\n", 6, "measure", "a measurement twice; name each once"),
     (SMALL + "measure: [reversals, reversal_times, {reversal_times: 3}]\n", 6, "measure", "a measurement twice; name each once"),
     (SMALL + "measure: [{reversal_times: 3}]\n", 6, "measure[0]", "reversal_times is measured with the reversals; add reversals"),
@@ -80,9 +76,8 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (SMALL + "picture: [cycle_mean]\n", 6, "picture[0]", "cycle_mean is not measured; add cycles to measure"),
     (SMALL + "picture: [regime]\n", 6, "picture[0]", "regime is not measured; add cycles, lyapunov to measure"),
     (SMALL + "picture: [status, status]\n", 6, "picture[1]", "status twice; name each once"),
-    (SMALL + "picture: status\n", 6, "picture", "must be a list of variables, such as [reversals, spin_mean], not 'status'"),
+    (SMALL + "max_failed_fraction: 2\n", 6, "max_failed_fraction", "must be a finite number >= 0 and <= 1, not 2"),
     (small("name: small", "name: ../small"), 1, "name", "must be up to 100 letters, digits"),
-    (small("name: small", "name: 2024"), 1, "name", "in quotes if a number, not 2024"),
     (small("{mu: [40, 60]}", "40"), 3, "friction", "must be a section with law, regularisation, mu, speed"),
     (SMALL + "cases: nowhere.csv\n", 6, "cases", "nowhere.csv: no such file"),
     (SMALL + "cases: cells.parquet\n", 6, "cases", "cells.parquet: Parquet files have ended; read it with pandas"),
@@ -90,17 +85,19 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (small("10.0", "!!python/name:os.system 1"), 2, "body.a", "a YAML tag or anchor; write the plain value"),
     (small("body: {", "body: !!set {"), 2, "body", "a YAML tag or anchor"),
     (mu("&a [*a]"), 3, "friction.mu", "a YAML tag or anchor"),
+    (small("10.0", "&a 10.0"), 2, "body.a", "a YAML tag or anchor"),
     ("- 1\n- 2\n", 1, "", "a configuration is a mapping of keys to values"),
     (SMALL + "---\nname: b\n", 6, "", "not YAML"),
     *((SMALL + f"refine: {n}\n", 6, "refine", f"must be a whole number >= 0 and <= 24, not {n}") for n in (-1, 1.5, 25)),
     (SMALL + "refine: 2\nmeasure: [energy_error]\n", 7, "measure", "must have reversals, on which refine depends"),
     ("model: analytic\nfriction: {mu: [40, 60]}\nrefine: 2\n", 3, "refine", "is a formula; set it to 0"),
     ("friction: {mu: {start: 1, stop: 2, num: 5000}}\nbody: {b: {start: 2, stop: 3, num: 5000}}\nrefine: 1\n", 3, "refine", "keep to 16777216"),
+    ("cases: {mu: [60]}\nbody: {b: [1, 2]}\n", 2, "body.b", "cannot be an axis beside cases"),
+    ("cases: {mu: [60, 0]}\nmodel: averaged\n", 1, "cases", "column mu: must be > 0 for the averaged model"),
     ("cases: {mu: [60]}\nrefine: 1\n", 2, "refine", "cannot be combined with cases, which have no neighbours"),
     (mu("{normal: [5, 9]}") + "samples: 32\n", 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, but 9 of 32 samples"),
     (drawn("{normal: [0.05, -0.01]}"), 4, "start.n0.normal[1]", "must be the standard deviation, a finite"),
     (drawn("{uniform: [0.02, 0]}"), 4, "start.n0.uniform[1]", "must be the highest value, a finite number > 0.02"),
-    (drawn("{normal: 0.05}"), 4, "start.n0.normal", "must be [mean, standard deviation], not 0.05"),
     (drawn("{normal: [0.05, 0.01], num: 3}"), 4, "start.n0", "a distribution beside other keys"),
     (drawn("0.05"), 6, "samples", "needs a parameter that is a distribution"),
     (drawn("{normal: [0.05, 0.01]}", "samples: 32\nrefine: 2"), 7, "refine", "cannot be combined with samples"),
@@ -115,15 +112,15 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("b: 0.03", "b: [0.01, 0.012]"), ("offset: 0.01", "offset: 0.002")), 4, "body", "offset > c - b²/c (at a=0.2, b=0.01"),
     (stone(("offset", "delta: 0.03, offset")), 4, "body.delta", "cannot be combined with Ixx, Ixy, Iyy, Izz; leave out either"),
     (stone(("units: SI\ngravity: 9.81\n", "")), 2, "body.mass", "is 1 in the paper's units; leave it out, or set units: SI"),
-    (stone(("SI", "cgs")), 2, "units", "must be paper or SI, not 'cgs'"),
+    (stone(("units: SI", "units: paper"), (" mass: 1.0,", "")), 3, "gravity", "is 1 in the paper's units"),
     (stone(("coulomb", "coulumb")), 5, "friction.law", "did you mean coulomb?"),
     (stone(("law: coulomb, ", "law: viscous, "), ("regularisation: tanh, ", "")), 5, "friction.speed", "does not belong to the law viscous"),
     (stone(("law: coulomb", "law: none"), ("speed: 1.0e-3, ", "")), 5, "friction.regularisation", "the law none needs no regularisation; leave it out"),
     (stone((" speed: 1.0e-3,", "")), 5, "friction.speed", "missing"),
-    (stone(("sigma: 1.0e-4", "mu_spinning: 0.1, radius_spinning: 1.0e-3")), 5, "friction.speed_spinning", "missing"),
+    (stone(("law: coulomb", "law: contensou"), ("regularisation: tanh, ", "")), 5, "friction.radius_contact", "missing"),
     (stone(("slip1: 0,", "n0: 1,")), 6, "start.n0", "with omega1, omega2, omega3, pitch, roll, slip2; give either n0, x0, y0 or angles"),
     (stone(("roll: 0.5 deg", "roll: 30 min")), 6, "start.roll", "not '30 min'"),
-    (stone(("{a:", "{surface: cone, a:")), 4, "body.surface", "must be ellipsoid or paraboloid, not 'cone'"),
+    (stone(("roll: 0.5 deg", "roll: 91 deg")), 6, "start.roll", "< 1.5708, not 1.588"),
     (stone(("{a: 0.2", "{surface: paraboloid, delta: 0, a: 0.01"), (MOMENTS, "")), 4, "body.delta", "means nothing with surface: paraboloid; give the elements of inertia instead"),
     ("body: {surface: paraboloid, b: 0.2, Ixx: 1, Iyy: 1, Izz: 1}\nfriction: {mu: 1}", 1, "body.a", "missing"),
     (stone(BOWL, ("offset: 0.01", "offset: 0.02")), 4, "body", "centre of mass outside the paraboloid; keep offset < c (at a=0.01"),
@@ -209,17 +206,3 @@ def test_broken_cases(table: str, place: str, said: str, write: Write, tmp_path:
     result = invoke("run", write(CASES))
     refused(result, said)
     assert result.stderr.startswith(f"{tmp_path}/{place}: ")
-
-
-@pytest.mark.parametrize(
-    ("beside", "said"),
-    [
-        ("body: {b: [1, 2]}\n", r"small\.yaml:4:8: body\.b: cannot be an axis beside cases"),
-        ("model: averaged\n", "column mu: must be > 0 for the averaged model"),
-        ("samples: 5\n", "samples: needs a parameter that is a distribution"),
-    ],
-)
-def test_what_cannot_stand_beside_cases_is_refused(beside: str, said: str, write: Write, tmp_path: Path) -> None:
-    (tmp_path / "cells.csv").write_text("mu\n60\n0\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match=said):
-        load_config(write(CASES + beside))

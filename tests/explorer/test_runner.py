@@ -95,18 +95,6 @@ def test_short_stretches_go_first(setup: Setup) -> None:
     assert told.index((70.0, False)) < told.index((60.0, True))
 
 
-def test_long_trajectories_are_sampled_sparsely(
-    source: Source, setup: Setup, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
-    cell = cell_at(source, setup, mu=3, b=2, n0=1)
-    dense = whole(setup, cell).dataset
-    monkeypatch.setattr(runner, "LONG", 250.0)
-    sparse = whole(setup, cell).dataset
-    assert dense.sizes["time"] > 2000
-    assert 200 < sparse.sizes["time"] <= 502
-    assert sparse["spin_final"] == dense["spin_final"]
-
-
 def test_what_cannot_be_run_is_told(setup: Setup) -> None:
     job = Heard({**setup.base, "x0": 50.0})
     Runner(setup).submit(job)

@@ -15,15 +15,11 @@ HOSTILE = {
     "x=delta": "x=delta is not there; choose mu, b, n0",
     "file=/etc/passwd": "unknown URL parameter 'file'; expected one of show, x, y, mu, b, n0, palette, low,",
     "n0=nan": "n0=nan is not there; choose from 0.02 to 0.05",
-    "n0=1e999": "n0=1e999 is not there",
-    "n0=7": "n0=7 is not there",
     "n0=" + "1" * 5000: "n0=1111",
     "palette=jet": "palette=jet is not there; choose , viridis",
     "low=nan": "low=nan is no number",
     "cell=__class__:1": "cell=__class__:1: __class__ is no parameter; there are ",
     "cell=mu:-1": "cell=mu:-1: mu has to be a finite number >= 0",
-    "cell=mu:sixty": "cell=mu:sixty: mu has to be",
-    "cell=mu:inf": "cell=mu:inf: mu has to be",
     "cell=:": "cell=::  is no parameter",
 }
 """What is said of an address that asks for what is not there."""

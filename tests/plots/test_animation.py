@@ -3,7 +3,6 @@
 import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -62,23 +61,6 @@ def test_a_clip_lasts_as_asked_and_moves(tmp_path: Path) -> None:
             clip.seek(i)
             frames.append(np.asarray(clip.convert("L"), float))
     assert np.abs(frames[0] - frames[-1]).max() > 50
-
-
-def test_all_that_is_said_of_a_real_body_can_be_read(tmp_path: Path) -> None:
-    inertia = dict.fromkeys(("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"), 1.23456e-5)
-    given = turning(**inertia, mass=0.0123456, gravity=9.80665, mu=0.123456, sigma=1.23456e-6)
-    given["spin"].attrs = {"long_name": "spin n", "units": "radian s-1"}
-    clip: Any = animation.animate(given, tmp_path / "clip.gif", begin=2, end=4, speed=10)
-    words, title = (text.get_window_extent() for text in (clip._fig._suptitle, clip._fig.axes[1].title))
-    assert 0 <= words.x0 < words.x1 <= clip._fig.bbox.x1
-    assert title.y1 <= words.y0
-    assert clip._fig.axes[0].get_ylabel() == "spin n (rad/s)"
-
-
-def test_neither_a_steady_spin_nor_a_body_is_lost_at_a_frame(tmp_path: Path) -> None:
-    clip: Any = animation.animate(turning(), tmp_path / "clip.gif", begin=0, end=0.1, speed=1)
-    assert clip._fig.axes[0].get_ylim()[1] > 0.32
-    assert not clip._fig.axes[1].collections[0].get_clip_on()  # or tips of the body were cut off
 
 
 def test_ffmpeg_is_given_all_frames_of_a_film(tmp_path: Path) -> None:

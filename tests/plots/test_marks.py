@@ -84,16 +84,6 @@ def test_the_difference(cells: xr.Dataset) -> None:
         field(cells.drop_vars("reversals_predicted"), "difference")
 
 
-def test_a_dataset_of_predictions_has_no_marks(cells: xr.Dataset) -> None:
-    assert not legend(cells[["reversals_predicted"]], "reversals_predicted")
-
-
-def test_every_status_has_words(cells: xr.Dataset) -> None:
-    assert labels.flag_words(cells, "status")[TIME_LIMIT] == "ended at the time limit"
-    assert labels.flag_words(cells, "window_dependent") == {0: "no", 1: "yes"}
-    assert not labels.flag_words(cells, "reversals")
-
-
 def test_labels(cells: xr.Dataset) -> None:
     assert labels.label(cells, "mu") == "friction μ (1/√(g c))"
     assert labels.label(cells, "spin_final") == "final spin n (√(g/c))"

@@ -7,7 +7,6 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib import style
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from support.cli import invoke, refused
@@ -48,32 +47,6 @@ def test_a_figure_for_print_is_as_wide_as_asked_and_can_be_read(kind: str, width
     panels = [axes for axes in figure.axes if axes.get_label() == ""]
     assert letters(figure) == ("abcdefghijkl"[: len(panels)] if len(panels) > 1 else "")
     assert all(axes.get_window_extent().width > 0.3 * figure.bbox.width / 3 for axes in panels)
-
-
-@pytest.mark.parametrize("width", ["85mm", "120mm"])
-def test_titles_and_units_are_whole(width: str) -> None:
-    figure = picture.plot(made(n0=[0.02, 0.05]), width=width)
-    figure.draw_without_rendering()
-    for axes in (each for each in figure.axes if each.get_label() == ""):
-        (letter,) = (text for text in axes.texts if text.get_weight() == "bold")
-        assert not letter.get_window_extent().overlaps(axes.title.get_window_extent())
-        assert {line.count("(") - line.count(")") for line in axes.get_ylabel().split("\n")} == {0}
-
-
-def test_words_with_symbols_are_as_long_as_they_look() -> None:
-    figure = picture.plot(made(n0=[0.02]), "reversals", width="85mm")
-    lines = [line for text in entries(figure) if "formula" in text for line in text.split("\n")]
-    assert lines == [r"n₀ = n$_{\mathrm{c2}}$ (formula): the spin reverses where that is", "smaller"]
-
-
-def test_marks_on_dense_curves_are_small() -> None:
-    sizes = {}
-    for number in (10, 60):
-        figure = picture.plot(made(mu=np.linspace(20, 200, number)), x="mu", sel={"b": 3.0}, width="85mm")
-        (mark,) = [line for line in figure.axes[0].lines if line.get_label() == "spin reversals, simulated"]
-        sizes[number] = mark.get_markersize()
-    assert sizes[10] == 5
-    assert sizes[60] < 85 / 25.4 * 72 / 60
 
 
 def test_maps_that_do_not_fit_side_by_side_stand_below_each_other() -> None:
@@ -124,14 +97,6 @@ def test_settings_of_the_user_are_obeyed() -> None:
     assert {tick.get_fontsize() for tick in axes.get_xticklabels()} == {11}
     assert figure.get_figwidth() == pytest.approx(7)
     assert mpl.rcParams["font.size"] == mpl.rcParamsDefault["font.size"]
-
-
-def test_lines_and_numbers_can_be_read_on_a_dark_page() -> None:
-    dataset = made().assign(margin_more=made()["spin_final"] + 1, margin_fewer=made()["spin_final"] + 1)
-    with style.context("dark_background"):
-        figure = picture.plot(dataset, "reversals")
-    assert {text.get_color() for text in figure.axes[0].texts} == {"black"}  # with a white halo
-    assert {line.get_color() for line in figure.legends[0].get_lines()} == {"white"}
 
 
 def test_a_figure_has_the_size_that_is_asked_for(small: xr.Dataset) -> None:

@@ -1,22 +1,26 @@
-"""What can be drawn of a dataset, and what it is about, is the same for pictures and the explorer; nothing is run."""
+"""What can be drawn of a dataset, what it is about, and the pictures that a configuration names."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import to_rgb
-from support import ROOT
+from support import ROOT, Write
+from support.cli import invoke
 from support.figures import entries
 
 import sweep
 from sweep.config import load_config
 from sweep.explorer import state
 from sweep.explorer.slices import Source
-from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
-from sweep.plots import labels, picture
+from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
+from sweep.plots import picture
+from sweep.plots.marks import legend
 from sweep.plots.quantities import DERIVED, derivable, field, subject
+from sweep.plots.regimes import REGIMES
 from sweep.results.provenance import provenance
 
 SIZE = (6, 7)
@@ -101,11 +105,6 @@ def test_the_picture_of_a_configuration_shows_what_it_is_about(name: str, variab
     assert subject(whole.assign_attrs(provenance(config, 1.0, 1))) == variable
 
 
-def test_a_run_tells_what_it_measured(small: xr.Dataset) -> None:
-    assert small.attrs["measured"].split()[0] == "reversals"
-    assert "energy_error" in small.attrs["measured"].split()
-
-
 def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
     source = Source(whole)
     assert set(DERIVED) == set(derivable(whole)) < set(source.variables)
@@ -160,12 +159,6 @@ def test_a_bar_has_arrows_where_values_lie_beyond(variable: str, limits: Any, ar
     assert variable != "ratio" or bars[-1].get_yticklabels()[2].get_text() == "1"
 
 
-def test_a_ratio_of_seconds_has_no_unit(whole: xr.Dataset) -> None:
-    for name in ("t_first_reversal", "t_first_reversal_predicted"):
-        whole[name].attrs["units"] = "s"
-    assert labels.label(whole.assign(ratio=field(whole, "ratio")), "ratio") == "first reversal, simulated / predicted"
-
-
 def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None:
     whole["t_first_reversal_predicted"][:, :2] = np.nan
     figure = picture.plot(whole, "ratio")
@@ -177,3 +170,96 @@ def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None
     (missing,) = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
     assert (missing.get_label(), len(missing.get_xdata())) == ("no reversal (1 of 6)", 1)
     assert entries(picture.plot(whole.isel(delta=1), "ratio")) == ["time of the first reversal"]
+
+
+CELLS = {
+    "settles": (SETTLED, 7, 0.5, 0.1),
+    "few_reversals": (TIME_LIMIT, 3, np.nan, 0.1),
+    "reverses_regularly": (TIME_LIMIT, 30, 0.009, 0.001),
+    "wanders": (TIME_LIMIT, 30, 0.011, 0.0031),
+    "undecided": (TIME_LIMIT, 30, 0.011, 0.0029),
+}
+"""Status, reversals, variation of the cycles, and exponent."""
+
+
+def moving(cells: list[tuple[Any, ...]]) -> xr.Dataset:
+    names = ("status", "reversals", "cycle_variation", "lyapunov")
+    columns = {name: ("n0", np.array(values)) for name, values in zip(names, zip(*cells, strict=True), strict=True)}
+    dataset = xr.Dataset(columns, {"n0": np.arange(len(cells)) / 10})
+    return dataset.assign(lyapunov_error=("n0", np.full(len(cells), 1e-3)), status=dataset["status"].astype("int8"))
+
+
+@pytest.mark.parametrize("regime", CELLS)
+def test_a_regime_is_told_by_its_thresholds(regime: str) -> None:
+    assert REGIMES[field(moving([CELLS[regime]]), "regime").item()] == regime
+
+
+def test_a_body_that_lifts_off_has_none() -> None:
+    found = moving([*CELLS.values(), (LIFT_OFF, 0, np.nan, np.nan)])
+    assert "failed: 1 lifted off" in legend(found, "regime")["failed"]
+    assert any("lifted off" in each for each in entries(sweep.plot(found, "regime")))
+
+
+def test_without_an_exponent_there_is_no_regime() -> None:
+    with pytest.raises(ValueError, match="no variable regime"):
+        field(moving([CELLS["reverses_regularly"]]).drop_vars("lyapunov"), "regime")
+
+
+FORMULA = """\
+model: analytic
+body: {b: [2, 3, 4, 5, 6]}
+friction: {mu: [20, 60, 100, 140, 180]}
+"""
+
+
+def pictures(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.png")}
+
+
+def test_a_run_draws_the_pictures_that_are_named(tmp_path: Path, write: Write) -> None:
+    file, folder = write(f"{FORMULA}picture: [status, form_factor]\n", "map.yaml"), tmp_path / "out"
+    first = invoke("run", file, "--output", folder)
+    assert first.stdout.splitlines()[-1] == f"wrote {folder / 'map'}.nc and .png and _form_factor.png"
+    before = pictures(folder)
+    for name, variable in (("map.png", None), ("map.png", "status"), ("map_form_factor.png", "form_factor")):
+        picture.plot(folder / "map.nc", variable, output=tmp_path / "again.png")
+        assert before[name] == (tmp_path / "again.png").read_bytes()
+    assert "nothing was written" in invoke("run", file, "--output", folder).stdout
+
+    other = invoke("run", file, "--output", folder, "--set", "picture=[form_factor]")
+    assert "already complete" in other.stderr
+    assert pictures(folder)["map.png"] == before["map_form_factor.png"]
+
+
+def test_pictures_of_another_dataset_are_removed(tmp_path: Path, write: Write) -> None:
+    """With those that a run which was killed has left half-written."""
+    file = write(f"{FORMULA}picture: [status, form_factor]\n", "map.yaml")
+    sweep.run(file, output=tmp_path)
+    (tmp_path / ".map_form_factor.png.77.part").touch()
+    sweep.run(file, output=tmp_path, progress=False)
+    assert not [*tmp_path.glob(".*.part")]
+    sweep.run(file, output=tmp_path, fresh=True, mu=[20, 61], picture=["status"])
+    assert set(pictures(tmp_path)) == {"map.png"}
+
+
+def test_pictures_are_no_part_of_what_a_run_is() -> None:
+    asked = {"friction": {"mu": [20, 60]}}
+    plain, named = load_config(asked), load_config(asked, {"picture": ["spin_mean"]})
+    assert plain.fingerprint() == named.fingerprint()
+    assert "picture: [spin_mean]" in named.to_yaml()
+    assert load_config(named.document()).picture == ("spin_mean",)
+
+
+def test_pictures_of_a_file_are_set_aside_where_something_else_is_measured() -> None:
+    asked = load_config({"friction": {"mu": [20, 60]}, "measure": ["cycles", "reversals"], "picture": ["cycle_mean"]})
+    assert load_config(asked, {"measure": ["reversals"]}).picture == ()
+    assert load_config(asked, {"measure": ["reversals"], "picture": ["status"]}).picture == ("status",)
+    assert load_config(asked, {"mu": [20, 70]}).picture == ("cycle_mean",)
+
+
+def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_pictures(tmp_path: Path, write: Write) -> None:
+    file = write(f"{FORMULA}picture: [probability, status]\n", "map.yaml")
+    result = invoke("run", file, "--output", tmp_path / "out")
+    assert result.exit_code == 0
+    assert "no picture of probability: variable: there is no variable probability" in result.stderr
+    assert list(pictures(tmp_path / "out")) == ["map_status.png"]

@@ -1,4 +1,9 @@
-"""The lines of theory over maps and curves, beside the formulas and eigenvalues of the bodies that they pass."""
+"""Lines where counts change, and those of theory, beside the formulas and eigenvalues of the bodies that they pass.
+
+And where their numbers and symbols stand.
+"""
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -6,10 +11,11 @@ import xarray as xr
 
 import sweep
 from sweep.axis import Axis
+from sweep.kernels.status import DIVERGED, SETTLED
 from sweep.models import MODELS
 from sweep.models.ladder import analytic
 from sweep.models.theory import stability
-from sweep.plots import picture
+from sweep.plots import description, picture
 from sweep.plots.theory import Line, crossings, lines
 
 BODY = {"a": 10.0, "c": 1.0, "delta": 0.03}
@@ -81,3 +87,36 @@ def test_curves_of_critical_spins_are_smooth_from_the_first_value_to_the_last() 
         assert [len(mu) > 100, mu[0], mu[-1]] == [True, 30, 180]
         wanted = exact(Line(name[:4], "", []), b=np.full(len(mu), 4.5), mu=mu)
         np.testing.assert_allclose(line.get_ydata(), wanted, rtol=1e-9)
+
+
+def counted(counts: list[list[float]], widths: list[list[float]]) -> xr.Dataset:
+    """Cells near the middle of their counts; where there is no width, no count is known."""
+    width, count = np.array(widths), np.array(counts)
+    values = {"reversals": count, "margin_more": 0.48 * width, "margin_fewer": 0.52 * width}
+    values["status"] = np.where(np.isnan(width), DIVERGED, SETTLED)
+    coordinates = {"b": np.arange(float(count.shape[0])), "mu": np.arange(1.0, count.shape[1] + 1)}
+    return xr.Dataset({name: (("b", "mu"), v) for name, v in values.items()}, coordinates)
+
+
+def drawn(dataset: xr.Dataset) -> dict[str, list[Any]]:
+    x, y = (Axis(name, dataset[name].values) for name in ("mu", "b"))
+    return {line.symbol: line.parts for line in description.boundaries(dataset, x, y)}
+
+
+def test_lines_between_distant_counts_are_evenly_apart_whatever_the_widths_of_the_cells() -> None:
+    found = drawn(counted([[1, 5], [1, 5]], [[0.001, 0.1], [0.001, 0.1]]))
+    at = [found[level][0][0][0] for level in "2345"]
+    assert np.diff(at) == pytest.approx(at[1] - at[0], rel=1e-6)
+    assert 0.2 < at[1] - at[0] < 0.4
+
+
+def test_a_cell_without_a_count_breaks_no_line_between_the_others() -> None:
+    nowhere = float("nan")
+    found = drawn(counted([[0, 1, 1], [0, 1, 1], [0, 0, 1]], [[1, 1, 1], [1, 1, 1], [nowhere, 1, 1]]))
+    assert len(found["1"]) == 1
+    (x, y), *_ = found["1"]
+    assert [x.max(), y.min(), y.max()] == pytest.approx([2.48, 0, 2])
+
+
+MU = Axis("mu", np.geomspace(1, 100, 21))
+B = Axis("b", np.linspace(0, 1, 21))

@@ -76,13 +76,6 @@ def test_a_body_in_si_has_its_units_everywhere() -> None:
     assert (figure.axes[-1].get_title("left"), figure.axes[-1].get_ylabel()) == ("energy per mass", "m²/s²")
 
 
-def test_critical_spins_have_their_unit_and_sources() -> None:
-    spins = {f"{name}_simulated": ("mu", [1.0, 2.0], {"units": "radian s-1"}) for name in CRITICAL}
-    figure = picture.plot(xr.Dataset({**spins, "critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]}))
-    assert figure.axes[0].get_ylabel() == "spin n (rad/s)"
-    assert entries(figure)[2:] == ["simulation"]
-
-
 def test_constants_break_between_them_alone() -> None:
     constants = "a = 0.2 m, Ixy = −2×10⁻⁵ kg m², gravity = 9.81 m/s²"
     for width in np.linspace(1.8, 4, 40):
@@ -104,10 +97,6 @@ def test_samples_are_lines_of_the_spin_alone() -> None:
     (axes,) = figure.axes
     assert sum(line.get_gid() == "spin" for line in axes.lines) == 20
     assert entries(figure)[12] == "and 8 more"
-
-
-def test_a_page_of_all_series_fits_a_screen() -> None:
-    assert picture.plot(made([60])).get_size_inches()[1] * 110 < 1200
 
 
 def told_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:

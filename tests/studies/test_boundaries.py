@@ -20,7 +20,7 @@ from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED
 from sweep.plots import description, picture
-from sweep.results.margins import FOUND, OPEN, Counts, distinct, smoothed
+from sweep.results.margins import FOUND, OPEN, Counts, smoothed
 from sweep.results.store import Store
 from sweep.studies.boundaries import Boundaries
 from sweep.studies.curve import Cell, Curve, Point
@@ -108,18 +108,6 @@ def test_margins_are_those_of_cells_that_settle() -> None:
     same_numbers(endless, usual)
 
 
-def test_distances_are_of_the_level_asked_for() -> None:
-    """Counts take as much spin as cells with them, 0.4 and 0.7, or where there is none as all cells do, 0.55."""
-    counts = Counts(
-        np.array([2.0, 3.0, 5.0]), np.array([0.1, np.nan, 0.2]), np.array([0.3, 0.4, 0.5]), np.ones(3, bool)
-    )
-    np.testing.assert_allclose(counts.distance(2), [0.3, 0.4 + 0.4, 0.5 + 0.55 + 0.55 + 0.4])
-    np.testing.assert_allclose(counts.distance(3), [-0.1, 0.4, 0.5 + 0.55 + 0.55])
-    np.testing.assert_allclose(counts.distance(4), [-0.1 - 0.55, np.nan, 0.5 + 0.55])
-    np.testing.assert_allclose(counts.distance([6, 7, 7]), [-0.1 - 2 * 0.55 - 0.7, np.nan, -0.2])
-    assert list(counts.levels()) == [3, 4, 5]
-
-
 def test_a_spin_that_comes_no_nearer_to_zero_tells_no_distance_from_the_next_count() -> None:
     """Cells of a line that count four, from where five begins (b = 7.7) to where three begins (b = 8)."""
     cells = sweep.run(SCENE, mu=121.74, b=np.linspace(7.5, 7.98, 33), progress=False).squeeze()
@@ -190,15 +178,6 @@ def test_smooth_curves_pass_through_their_points_and_near_a_circle(closed: bool)
     np.testing.assert_allclose(np.hypot(x, y)[inner], 1, atol=3e-4)
     assert min(np.hypot(x - 1, y)) < 1e-12
     assert np.hypot(x[-1] - x[0], y[-1] - y[0]) < (1e-9 if closed else 0.3)
-
-
-@pytest.mark.parametrize(("closed", "kept"), [(False, [1, 2, 4, 5]), (True, [1, 2, 4])])
-def test_of_points_at_one_place_a_curve_takes_the_last(closed: bool, kept: list[int]) -> None:
-    """The first two differ by rounding, and the last one lies on the first where the curve is closed."""
-    x, y = np.array([[0.0, 1e-16, 1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0, 1.0, 0.0]])
-    last = distinct(x, y, closed=closed)
-    assert np.flatnonzero(last).tolist() == kept
-    assert len(smoothed(x[last], y[last], closed=closed, parts=2)[0]) == 2 * (len(kept) - (not closed)) + 1
 
 
 def test_both_ends_of_each_bracket_count_what_another_method_counts(found: xr.Dataset) -> None:

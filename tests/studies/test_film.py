@@ -102,16 +102,11 @@ def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, lin
     assert f"{path}{line}" in str(refusal.value)
 
 
-def test_a_film_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"film\.csv: cannot be read: No such file"):
-        film.read(tmp_path / "film.csv")
-
-
-def test_a_film_that_is_not_in_utf_8_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "film.csv"
-    path.write_bytes("t,spin (°/s)\n".encode("cp1252"))
-    with pytest.raises(ConfigError, match=r"film\.csv: cannot be read: not UTF-8 text"):
-        film.read(path)
+def test_a_film_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "film.csv").write_bytes("t,spin (°/s)\n".encode("cp1252"))
+    for name, words in (("none.csv", "No such file"), ("film.csv", "not UTF-8 text")):
+        with pytest.raises(ConfigError, match=rf"{name}: cannot be read: {words}"):
+            film.read(tmp_path / name)
 
 
 def test_repeated_instants_and_gaps_are_kept(write: Write) -> None:

@@ -95,11 +95,8 @@ def test_the_command_resumes_and_says_what_it_found(write: Write, tmp_path: Path
     [
         ("b: 3", "b: [3, 4]", "body.b: cannot be an axis of indices; give one number"),
         ("model: averaged", "model: analytic", "is a formula and cannot be simulated"),
+        (SCENE, "friction: {mu: 60}\n", "no parameter is a distribution; give one"),
     ],
 )
 def test_what_has_no_indices_is_refused(write: Write, old: str, new: str, words: str) -> None:
     refused(invoke("indices", write(SCENE.replace(old, new))), words)
-
-
-def test_numbers_alone_have_no_indices(write: Write) -> None:
-    refused(invoke("indices", write("friction: {mu: 60}\n")), "no parameter is a distribution; give one")
