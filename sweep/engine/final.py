@@ -39,7 +39,7 @@ def run(part: Part, work: Work, name: str, most: Array | float = np.inf) -> None
     if patience is None or not part.settles:
         return
     rest = np.flatnonzero(_late(part) & ~on)
-    on[rest] = wind_down(part, rest, patience)
+    on[rest] = wind_down(part, rest, work, f"{name} winding", patience)
     rows = np.flatnonzero(on)
     if len(rows):
         later = part.take(rows)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.engine.executor import UNTIL_ALL_STOP, execute
+from sweep.engine.executor import UNTIL_ALL_STOP, Work, execute
 from sweep.engine.plan import Part
 from sweep.grid import Array
 from sweep.kernels.lanes import BEYOND, STABLE
@@ -21,6 +21,9 @@ from sweep.models.stiff.precession import vertical_spin
 # Looks at a rattle that winds down, and over which share of the patience.  Of the roundest bodies of `mu_b` it loses
 # 0.03 % of its energy in that time, so that few looks would not tell this from the ripple of M·u/I3, which is 3e-6.
 _LOOKS, _LONGER = 256, 0.1
+
+_KEPT = 32
+"""Looks after which they are kept for an interrupted run to go on."""
 
 # The slope of M·u/I3 over the energy grows as the rattle decays, in nearly round bodies about as the sixth power of
 # 1/spin.  Then the spin stays away from zero if it would with seven times the slope.
@@ -35,7 +38,7 @@ def whole_blocks(steps: Array) -> Array:
     return np.asarray(BLOCK * np.ceil(steps / BLOCK))
 
 
-def wind_down(part: Part, rows: Array, patience: float) -> Array:
+def wind_down(part: Part, rows: Array, work: Work, name: str, patience: float) -> Array:
     """Follow the rattle of the cells `rows` for a while, and settle those that it hardly turns any more, in place.
 
     In that time M·u/I3 changes with the energy of the rattle by some slope.  If `_STEEPER` times this slope and all the
@@ -50,7 +53,7 @@ def wind_down(part: Part, rows: Array, patience: float) -> Array:
     if not len(rows):
         return np.empty(0, bool)
     on = part.take(rows)
-    spins, totals = _looks(on, patience)
+    spins, totals = _looks(on, work, name, patience)
     table = on.kernel.table(on.images)
     spin, energies, off = spins[-1], totals - spins**2, totals - totals.mean(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -68,16 +71,20 @@ def wind_down(part: Part, rows: Array, patience: float) -> Array:
     return np.asarray(goes_on)
 
 
-def _looks(part: Part, patience: float) -> Array:
+def _looks(part: Part, work: Work, name: str, patience: float) -> Array:
     """Run `part` on, in place, and look at its cells again and again: `vertical_spin`, shape (2, looks, cells)."""
     table = part.kernel.table(part.images)
     between = whole_blocks(_LONGER * patience / (_LOOKS * table["step"]))
-    begun, goal, looks = table["done"].copy(), table["goal"].copy(), list[tuple[Array, Array]]()
-    for look in range(_LOOKS + 1):
+    begun, goal, looks = table["done"].copy(), table["goal"].copy(), list(work.kept.get(f"{name} looks", ()))
+    part.images[:] = work.kept.get(name, part.images)
+    for look in range(len(looks), _LOOKS + 1):
         table["goal"] = begun + look * between
         table["status"][(table["status"] == TIME_LIMIT) & (table["done"] < table["goal"])] = RUNNING
         execute(part.kernel, part.images, stop_when_settled=False, chunk_blocks=UNTIL_ALL_STOP)
         looks.append(vertical_spin(*slow_states(table)))
+        if look % _KEPT == 0:
+            work.kept |= {name: part.images.copy(), f"{name} looks": np.array(looks)}
+            work.after_chunk()
     table["goal"] = goal
     return np.array(looks).swapaxes(0, 1)
 

@@ -116,7 +116,3 @@ def test_a_cell_without_a_count_breaks_no_line_between_the_others() -> None:
     assert len(found["1"]) == 1
     (x, y), *_ = found["1"]
     assert [x.max(), y.min(), y.max()] == pytest.approx([2.48, 0, 2])
-
-
-MU = Axis("mu", np.geomspace(1, 100, 21))
-B = Axis("b", np.linspace(0, 1, 21))
