@@ -8,7 +8,6 @@ from support import Write, columns
 from support.runs import in_sittings, same_numbers
 
 import sweep
-from sweep.engine.plan import plan
 from sweep.kernels import methods
 from sweep.models import MODELS
 
@@ -46,8 +45,3 @@ def test_auto_resumes_from_a_checkpoint(write: Write, tmp_path: Path) -> None:
     found, interruptions, _ = in_sittings(3, file, tmp_path / "out")
     assert interruptions >= 2
     same_numbers(found, sweep.run(file))
-
-
-def test_a_model_without_a_stiff_form_has_one_method(write: Write) -> None:
-    averaged = sweep.load_config(write("model: averaged\nfriction: {mu: 60}\nintegrator: {method: auto}\n"))
-    assert [part.method for part in plan(averaged).parts] == ["dopri5"]
