@@ -45,6 +45,10 @@ integrator: {t_end: 1}
 """
 
 
+def ranged(values: int) -> str:
+    return ONE.replace("[2.0, 3.0, 5.0]", f"{{start: 1.2, stop: 9.7, num: {values}}}")
+
+
 def by(method: str, text: str) -> str:
     return text.replace("{t_end", f"{{method: {method}, t_end")
 
@@ -55,6 +59,7 @@ SINGLE = "name: small\nfriction: {mu: 60}\nintegrator: {method: dopri5, t_end: 1
 FEWER = by("dopri5", ONE) + "measure: [reversals]\n"
 GROWN = {
     "more": (ONE, MORE, "12 of 24"),
+    "finer": (ranged(4), ranged(10), "16 of 40"),
     "later": (ONE, LATER, ANY),
     "more, dopri5": (by("dopri5", ONE), by("dopri5", MORE), "12 of 24"),
     "later, dopri5": (by("dopri5", ONE), by("dopri5", LATER), ANY),
@@ -79,11 +84,6 @@ def test_a_grown_run_is_the_run_of_all_at_once(
     assert re.match(f"{taken} cells are taken over", note)
     assert found.attrs.get("taken_over", note) in note
     same_numbers(found, sweep.run(write(later)))
-
-
-def test_a_finer_range(write: Write, tmp_path: Path) -> None:
-    coarse, fine = (ONE.replace("[2.0, 3.0, 5.0]", f"{{start: 1.2, stop: 9.7, num: {n}}}") for n in (4, 10))
-    assert grown(write, tmp_path / "out", coarse, fine)[1][0].startswith("16 of 40 cells are taken over")
 
 
 def test_a_longer_table_of_cases(write: Write, tmp_path: Path) -> None:

@@ -1,9 +1,12 @@
 """Cells run until their counts are final, if no end of the time is given."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import xarray as xr
 from support import ROOT, STANDARD, Write
+from support.kernels import default_measures
 from support.runs import in_sittings, run_cells, same_numbers
 
 import sweep
@@ -92,3 +95,19 @@ def test_shipped_configurations_end_decided(name: str) -> None:
 def test_nearly_round_bodies_have_settled_in_the_end(name: str) -> None:
     found = sweep.run(ROOT / "configs" / f"{name}.yaml", estimate_errors=False)
     assert (found.status == SETTLED).all()
+
+
+def test_settled_trajectories_stay_where_they_are_said_to() -> None:
+    settings: dict[str, Any] = {"b": [2.0, 3.0], "mu": [40, 70], "n0": 0.05, "x0": 0.01, "y0": 0.01}
+    settings |= {"t_end": 30_000, "method": "adams", "measure": list(default_measures("slip"))}
+    quick = ROOT / "configs" / "quick.yaml"
+    left, later = (sweep.run(quick, **settings, stop_when_settled=stops) for stops in (True, False))
+    settled = (left.status == SETTLED).values
+    rest, end = left.spin_rest.values, later.spin_final.values
+    # Beyond n_c1 a rattle grows, and turns the spin back, before it decays.
+    n_c1 = xr.where(left.spin_final > 0, left.n_c1_plus_linear, left.n_c1_minus_linear)
+    grows = (left.spin_final / n_c1 > 1).values
+    assert min((settled & grows).sum(), (settled & ~grows).sum()) >= 2
+    assert (np.abs(rest / end - 1) < np.where(grows, 4e-3, 1e-3))[settled].all()
+    assert np.abs(left.spin_final.values / end - 1)[settled].max() > 0.01
+    assert np.isnan(rest[~settled]).all()

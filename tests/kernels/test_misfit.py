@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from support import Write, adaptive, columns
 from support.cli import invoke
-from support.kernels import threads
-from support.runs import in_sittings, same_numbers
+from support.runs import same_numbers
 
 import sweep
 from sweep.config import ConfigError
@@ -76,17 +75,8 @@ def test_a_run_that_fails_has_none(config: Path) -> None:
     assert np.isfinite(found.misfit).values.ravel().tolist() == [True, False]
 
 
-def test_numbers_do_not_depend_on_threads_workers_or_interruptions(
-    config: Path, tmp_path: Path, client: distributed.Client
-) -> None:
-    with threads(1):
-        alone = sweep.run(config)
-    with threads(2):
-        same_numbers(sweep.run(config), alone)
-    again, interruptions, _ = in_sittings(1, config, tmp_path / "out")
-    assert interruptions
-    same_numbers(again, alone)
-    same_numbers(sweep.run(config, client=client), alone)
+def test_workers_get_the_film(config: Path, client: distributed.Client) -> None:
+    same_numbers(sweep.run(config, client=client), sweep.run(config))
 
 
 def test_another_film_is_another_run(write: Write, config: Path, tmp_path: Path) -> None:

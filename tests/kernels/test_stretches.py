@@ -118,19 +118,16 @@ def test_what_a_fast_reversal_stirs_up_is_not_let_down() -> None:
     assert not fast.lifts.any()
 
 
-def test_a_hidden_mode_is_waited_for() -> None:
+@pytest.mark.parametrize(
+    ("sizes", "least", "most"),
+    [([1e-6, 1e-18], 0, 2000), ([1e-3, 1e-8], 0, 2000), ([0.1, 1e-5], 50, np.inf), ([1e-5, 0.1], 50, np.inf)],
+    ids=["hidden by round-off", "hidden by products", "large fast mode", "large slow mode"],
+)
+def test_hidden_modes_and_large_rattles_are_left_to_the_steps(sizes: list[float], least: float, most: float) -> None:
     """A mode that round-off or products of the other hide must not be read off the state."""
-    for sizes in ([1e-6, 1e-18], [1e-3, 1e-8]):
-        hidden = decide(sizes)
-        assert not hidden.now[0]
-        assert 0 < hidden.wait[0] < 2000
-
-
-def test_a_large_rattle_is_left_to_the_steps() -> None:
-    for sizes in ([0.1, 1e-5], [1e-5, 0.1]):
-        large = decide(sizes)
-        assert not large.now[0]
-        assert large.wait[0] > 50
+    found = decide(sizes)
+    assert not found.now[0]
+    assert least < found.wait[0] <= most
 
 
 def test_where_both_decay_nothing_is_lifted() -> None:
