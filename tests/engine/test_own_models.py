@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from support import own
 from support.own import FADING, PENDULUM
-from support.runs import Heard, same_numbers
+from support.runs import Heard, same_numbers, settled
 
 import sweep
 from sweep.config import ConfigError, load_config
@@ -175,6 +175,15 @@ def test_what_does_not_compile_is_told_with_its_line(folder: Path, file: str, ol
     (fault,) = error.value.faults
     assert (fault.file, fault.line) == (str(folder / f"{file}.py"), line), fault
     assert fault.message.startswith(message)
+
+
+@pytest.mark.campaign
+def test_its_body_settles_as_one_of_ours_and_reverses_no_more(folder: Path) -> None:
+    """The page's law of friction, where the couple alone would stop it after minutes."""
+    asked = {"fading": [0.1, 1.0], "omega3": [-5.0, -1.0, 0.5, 5.0]}
+    ends, later, _ = settled(folder / "fading.yaml", 1.0, t_end=120, **asked)
+    assert (ends["t_stop"] < 0.5 * later["t_stop"]).all()
+    assert ends["reversals"].sum() > 0
 
 
 def test_a_model_with_an_upright_spin_settles_by_the_linear_theory(folder: Path) -> None:

@@ -16,7 +16,7 @@ from support.cli import invoke
 from support.runs import in_sittings, same_numbers
 
 import sweep
-from sweep.engine import local
+from sweep.engine import local, refinement
 from sweep.engine.local import Done
 from sweep.engine.refinement import UNKNOWN, Outcomes, search
 from sweep.kernels.status import SETTLED
@@ -134,12 +134,14 @@ def test_one_outcome_is_known_from_the_coarse_nodes() -> None:
 
 
 @pytest.mark.parametrize("slope", [0.22, 0.47, 0.8])
-def test_a_strip_that_becomes_thinner_than_a_node_is_followed(slope: float) -> None:
+def test_a_strip_that_becomes_thinner_than_a_node_is_followed(slope: float, monkeypatch: pytest.MonkeyPatch) -> None:
     x, y = lattice((129, 129))
     full = (np.abs(x - 10 - slope * y) < np.maximum(6 - 0.1 * y, 0.25)).astype(np.int32)
     inferred, simulated = refine(full, 3)
     np.testing.assert_array_equal(inferred, full)
     assert simulated.mean() < 0.3
+    monkeypatch.setattr(refinement, "_AROUND", 0)
+    assert (refine(full, 3)[0] != full).sum() > 10
 
 
 def test_a_change_that_shows_late_halves_the_patches_it_reaches() -> None:
@@ -149,6 +151,17 @@ def test_a_change_that_shows_late_halves_the_patches_it_reaches() -> None:
     inferred, simulated = refine(full, 4)
     np.testing.assert_array_equal(inferred, full)
     assert simulated.mean() < 0.4
+
+
+@settings(max_examples=40)
+@given(st.integers(1, 3), st.floats(0.1, 0.9), st.booleans())
+def test_lines_one_cell_wide_are_followed(depth: int, slope: float, upright: bool) -> None:
+    columns = np.arange(65)
+    at = np.round(slope * columns).astype(int)
+    full = np.zeros((65, 65), np.int32)
+    full[at, columns] = full[at[1:], columns[:-1]] = 1  # from a coarse node on, without diagonal gaps
+    full = full.T if upright else full
+    np.testing.assert_array_equal(refine(full, depth)[0], full)
 
 
 def test_a_strip_beside_another_is_found() -> None:

@@ -9,11 +9,14 @@ from support.kernels import finish, images, run, spin, threads
 from support.kernels import kernel as make
 
 from sweep.kernels.adams import start_up
+from sweep.kernels.adams.step import HISTORY, names
+from sweep.kernels.codegen import compile_lanes
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES
 from sweep.kernels.methods import METHODS, automatic_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
 from sweep.models import MODELS
+from sweep.models.stiff.slip import PAPER_FORM
 
 KERNELS = {method: make(method) for method in METHODS}
 each_method = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
@@ -170,3 +173,13 @@ def test_the_loop_over_lanes_is_vector_instructions(method: str, model: str) -> 
     assert found.count("divpd") >= divisions
     assert found.count("sqrtpd") >= roots
     assert method != "dopri5" or found.count("divsd") + found.count("sqrtsd") == 0
+
+
+@pytest.mark.x86
+def test_the_loop_over_lanes_of_start_up_is_vector_instructions() -> None:
+    lines = start_up._advance(PAPER_FORM, start_up._places(PAPER_FORM))
+    advance = compile_lanes("advance", "group, points, ticks", lines, names(PAPER_FORM))
+    group = np.zeros(len(start_up.layout(PAPER_FORM).names) * LANES)
+    found = assembly(advance, group, np.zeros((HISTORY + 1) * start_up._POINT_SIZE), 1.0)
+    assert found.count("divpd") >= 3
+    assert found.count("sqrtpd") >= 2

@@ -68,6 +68,23 @@ def test_states_history_and_work_against_dopri5(mu: float, step: float, bound: f
             assert image[ADAMS.layout.index(f"power{j}")] == pytest.approx(power, rel=1e-3, abs=1e-12)
 
 
+def test_start_up_leaves_no_trace_in_the_spin() -> None:
+    """A floor of 1e-10 at t = 400: the last spin is the same to that with a start-up of twice the care."""
+    mu = np.array([1.0, 20.0, 60.0, 100.0, 200.0, 500.0, 1e3, 1e4, 1e5])
+    body, step = columns(mu=mu), np.full(9, 0.02)
+
+    def spins() -> np.ndarray:
+        return spin(ADAMS, finish(ADAMS, begun(body, step), settle=False))
+
+    usual = spins()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(start_up, "_SHARE", start_up._SHARE / 8)
+        patch.setattr(start_up, "_EXTRA_STEPS", 16)
+        patch.setattr(start_up, "_LAYER_LEVELS", 30)
+        careful = spins()
+    assert np.abs(usual - careful).max() < 1e-10
+
+
 def test_bit_identical_for_each_grouping_and_thread() -> None:
     with threads(2):
         expected = begun(MIXED, STEPS)

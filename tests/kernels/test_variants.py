@@ -105,6 +105,16 @@ def test_units_make_no_difference(scene: dict[str, Any]) -> None:
     assert natural["spin_final"].attrs["units"] == "sqrt(g/c)"
 
 
+@pytest.mark.parametrize("more", ["law: viscous", "offset: 0", "units: paper"])
+def test_bodies_that_need_no_variant_are_bit_for_bit_as_they_were(tmp_path: Path, more: str) -> None:
+    """Naming the default of what is new changes nothing."""
+    plain = "body: {b: [3, 5]}\nfriction: {mu: 60}\nintegrator: {t_end: 300, method: dopri5}\n"
+    places = {"law": ("{mu", f"{{{more}, mu"), "offset": ("{b", f"{{{more}, b"), "units": ("body", f"{more}\nbody")}
+    named = plain.replace(*places[more.partition(":")[0]])
+    assert named != plain
+    xr.testing.assert_identical(*(run(tmp_path, text).drop_attrs(deep=False) for text in (plain, named)))
+
+
 @pytest.mark.campaign
 def test_the_stiff_method_takes_any_body_with_viscous_friction(tmp_path: Path) -> None:
     """Against dopri5, the steps of which are far shorter at strong friction."""
