@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
-from scipy.stats import bootstrap, sobol_indices
+from scipy import stats
 
 from sweep.config import Config, ConfigError
 from sweep.config.distributions import chances
@@ -101,11 +101,11 @@ def estimated(values: Array, seed: int) -> dict[str, Array]:
 
     def find(rows: Array) -> Array:
         first, second, *mixed = filled[..., rows].swapaxes(0, 1)
-        found = sobol_indices(func={"f_A": first, "f_B": second, "f_AB": np.stack(mixed)}, n=n)
+        found = stats.sobol_indices(func={"f_A": first, "f_B": second, "f_AB": np.stack(mixed)}, n=n)
         return np.reshape([found.first_order, found.total_order], (len(_ORDERS), quantities + 1, both - 2))
 
     # `bootstrap` of what `sobol_indices` returns takes no seed.
-    low, high = bootstrap(
+    low, high = stats.bootstrap(
         (np.arange(n),), find, vectorized=False, n_resamples=_RESAMPLED, method="percentile", rng=seed
     ).confidence_interval
     ends = {"": find(np.arange(n)), "_low": low, "_high": high}
