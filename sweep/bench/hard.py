@@ -58,10 +58,11 @@ def cases() -> Iterator[Case]:
     for loose in (1e-4, 1e-6):
         names = [f"μ = {x:g}, tolerance {loose:g}" for x in mu]
         yield Case(names, standard(mu=mu), 400.0, near=loose, energy=np.inf, tolerance=loose, stiff=True)
-    # Nearly round seen from above, which takes long to settle, and nearly round across.
-    b, mu = np.array([9.99, 1.001, 9.99, 1.001]), np.array([75.0, 75.0, 200.0, 200.0])
-    names, ends = [f"b = {x:g}, μ = {y:g}" for x, y in zip(b, mu, strict=True)], [TIME_LIMIT, SETTLED] * 2
-    yield Case(names, standard(b=b, mu=mu), LONGEST, ends, settle=True)
+    # Nearly round seen from above, which takes long to settle; and nearly round across, which settles before its spin
+    # has stopped changing, so that spins are compared at one time.
+    mu = np.array([75.0, 200.0])
+    yield Case([f"b = 9.99, μ = {x:g}" for x in mu], standard(b=9.99, mu=mu), LONGEST, settle=True)
+    yield Case([f"b = 1.001, μ = {x:g}" for x in mu], standard(b=1.001, mu=mu), 1000.0)
     # Without an angle between the axes nothing couples the rattle to the spin, which gains its energy at most.
     columns = standard(delta=[0.0, 1e-12])
     spin, rattle, inertia = slip.energy(slip.start(columns), slip.Constants.of(columns))
