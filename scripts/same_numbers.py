@@ -32,10 +32,7 @@ ORIGIN = {
 ENDED = ("verified_*", "reversals_low", "reversals_high", "film_lean_?")
 """Patterns of variables, and attributes of datasets, that older revisions have."""
 
-WORDS = (
-    "config", "config_hash", "coordinates", "measured", "pictured", "sweep_kind", "title", "units", "long_name",
-    "description",
-)  # fmt: skip
+WORDS = ("config", "config_hash", "coordinates", "pictured", "sweep_kind", "title", "units", "long_name", "description")
 """Attributes in words: the configuration, whose keys may have ended, and what a dataset or a variable is."""
 
 
