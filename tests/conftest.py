@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from functools import partial
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 # Compiling takes longer than any deadline; the same examples on every machine.
 settings.register_profile("sweep", deadline=None, derandomize=True, max_examples=200)
 settings.load_profile("sweep")
+
+# A shell ignores SIGINT in what it starts in the background, and so would the processes that tests interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Several processes share the cores; what a test says of threads, it sets.
 if "PYTEST_XDIST_WORKER" in os.environ:
