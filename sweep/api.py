@@ -492,7 +492,7 @@ class Accessor:
         Raises
         ------
         ValueError
-            if the dataset tells no configuration.
+            if the dataset contains no configuration.
         ConfigError
             as `sweep.trajectory`; also if its model is code of a user, which runs only if `sweep.trajectory` is given
             the configuration.

@@ -1,4 +1,4 @@
-"""The configuration that a dataset tells, as what runs it again needs it."""
+"""Reads the configuration stored in a dataset, so that it can be run again."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from sweep.kernels.measures.misfit import Misfit
 def configuration(
     dataset: xr.Dataset, model: Mapping[str, str] | None = None, announce: Callable[[str], None] | None = None
 ) -> Config:
-    """The configuration that a dataset tells, without a film; a table of cases gives way to the first of them.
+    """Return the configuration of a dataset, without a film; its first case stands for a table of cases.
 
     Parameters
     ----------
     model : the keys by which the user names their model, if it is to run
-    announce : told in words that code of a user is about to run; None if such a model is to be refused
+    announce : called with a message before user code runs; None to refuse a user-defined model
 
     Raises
     ------

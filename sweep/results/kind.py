@@ -1,4 +1,4 @@
-"""The kinds of dataset: what each is of, and how it is told from the others."""
+"""Defines the kinds of dataset: what each contains, and how to recognise it."""
 
 from __future__ import annotations
 
@@ -69,5 +69,5 @@ def is_of_own_body(dataset: xr.Dataset) -> bool:
 
 
 def parameters(dataset: xr.Dataset) -> list[str]:
-    """Names of the physical parameters that a dataset tells."""
+    """Return the names of the physical parameters that a dataset contains."""
     return [name for name in str(dataset.attrs.get("model_parameters", "")).split() or PARAMETERS if name in dataset]
