@@ -1,6 +1,6 @@
 """Slices of a dataset: the same numbers as xarray's own selection, whatever the axes, and what is told of a cell."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 from itertools import permutations
 from pathlib import Path
 
@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sweep.explorer import slices, state, style
+from sweep.explorer import slices, state
 from sweep.explorer.slices import PlacedAxis, Source, open_source
-from sweep.kernels.status import LIFT_OFF
 from sweep.results.store import StoreError
 
 
@@ -22,21 +21,6 @@ def test_a_slice_is_the_selection(name: str, x: str, y: str, source: Source, ope
     expected = whole.broadcast_like(opened["status"]).isel({rest: 1}).transpose(y, x).values
     part = source.map(name, x, y, {rest: 1})
     np.testing.assert_array_equal(part.values, expected)
-
-
-def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
-    source = Source(opened.assign(status=xr.full_like(opened["status"], LIFT_OFF)))
-    part = source.map("reversals", "mu", "b", {"n0": 1})
-    assert not part.shown.size
-    assert style.beyond(part, style.scale_of(part, state.first(source))) == ""
-
-
-@pytest.mark.parametrize("low", [0.0, -1.0])
-def test_a_ratio_keeps_its_scale_where_a_limit_is_not_positive(opened: xr.Dataset, low: float) -> None:
-    source = Source(opened.assign(t_first_reversal=opened["b"], t_first_reversal_predicted=2 * opened["mu"]))
-    part, first = source.map("ratio", "mu", "b", {"n0": 1}), state.first(source)
-    scales = [style.scale_of(part, each) for each in (first, replace(first, limits={"low": low}))]
-    assert style.mapping(scales[0]) == style.mapping(scales[1])
 
 
 def test_descending_axes_are_turned(opened: xr.Dataset) -> None:

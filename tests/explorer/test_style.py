@@ -1,0 +1,33 @@
+"""How the explorer draws: the scales of its maps.  It imports Bokeh, which the extra `browser` brings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import xarray as xr
+
+from sweep.explorer import state
+from sweep.explorer.slices import Source
+from sweep.kernels.status import LIFT_OFF
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
+    from sweep.explorer import style
+
+    source = Source(opened.assign(status=xr.full_like(opened["status"], LIFT_OFF)))
+    part = source.map("reversals", "mu", "b", {"n0": 1})
+    assert not part.shown.size
+    assert style.beyond(part, style.scale_of(part, state.first(source))) == ""
+
+
+@pytest.mark.parametrize("low", [0.0, -1.0])
+def test_a_ratio_keeps_its_scale_where_a_limit_is_not_positive(opened: xr.Dataset, low: float) -> None:
+    from sweep.explorer import style
+
+    source = Source(opened.assign(t_first_reversal=opened["b"], t_first_reversal_predicted=2 * opened["mu"]))
+    part, first = source.map("ratio", "mu", "b", {"n0": 1}), state.first(source)
+    scales = [style.scale_of(part, each) for each in (first, replace(first, limits={"low": low}))]
+    assert style.mapping(scales[0]) == style.mapping(scales[1])
