@@ -41,19 +41,24 @@ def whole_blocks(steps: Array) -> Array:
 def wind_down(part: Part, rows: Array, work: Work, name: str, patience: float) -> Array:
     """Follow the rattle of the cells `rows` for a while, and settle those that it hardly turns any more, in place.
 
-    In that time M·u/I3 changes with the energy of the rattle by some slope.  If `_STEEPER` times this slope and all the
-    energy left carry the spin neither through zero nor to where a rattle grows, no reversal will come.  Of the 423
-    cells of `configs/mu_b.yaml` that nothing else settles by t = 30 000, that is so of 334; none of these reverses by
-    t = 10⁶, while 27 of the others do.
+    A cell that would pass its `t_end` in that time is left alone.  While the rattle decays, M·u/I3 changes with its
+    energy by some slope.  If `_STEEPER` times this slope and all the energy left carry the spin neither through zero
+    nor to where a rattle grows, no reversal will come.  Of the 423 cells of `configs/mu_b.yaml` that nothing else
+    settles by t = 30 000, that is so of 334; none of these reverses by t = 10⁶, while 27 of the others do.
 
     Returns
     -------
     Where the rattle has wound down before `t_end`, and what then happens can be followed, shape (rows,).
     """
-    if not len(rows):
-        return np.empty(0, bool)
-    on = part.take(rows)
-    spins, totals = _looks(on, work, name, patience)
+    every = part.kernel.table(part.images[rows])
+    between = whole_blocks(_LONGER * patience / (_LOOKS * every["step"]))
+    in_time = every["done"] + _LOOKS * between <= every["goal"]
+    goes_on = np.zeros(len(rows), bool)
+    if not in_time.any():
+        return goes_on
+    followed = rows[in_time]
+    on = part.take(followed)
+    spins, totals = _looks(on, work, name, between[in_time])
     table = on.kernel.table(on.images)
     spin, energies, off = spins[-1], totals - spins**2, totals - totals.mean(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -66,15 +71,15 @@ def wind_down(part: Part, rows: Array, work: Work, name: str, patience: float) -
     table["status"] = np.where(final, SETTLED, TIME_LIMIT)
     if WOUND in table.layout:
         table[WOUND] = np.where(final, np.abs(end), 0)
-    goes_on = falls & ~final & (left * patience < part.config.integrator.t_end - patience)
-    part.images[rows[final | goes_on]] = on.images[final | goes_on]
-    return np.asarray(goes_on)
+    later = falls & ~final & (left * patience < part.config.integrator.t_end - patience)
+    part.images[followed[final | later]] = on.images[final | later]
+    goes_on[in_time] = later
+    return goes_on
 
 
-def _looks(part: Part, work: Work, name: str, patience: float) -> Array:
-    """Run `part` on, in place, and look at its cells again and again: `vertical_spin`, shape (2, looks, cells)."""
+def _looks(part: Part, work: Work, name: str, between: Array) -> Array:
+    """Run `part` on, in place, and take `vertical_spin` every `between` steps, shape (2, looks, cells)."""
     table = part.kernel.table(part.images)
-    between = whole_blocks(_LONGER * patience / (_LOOKS * table["step"]))
     begun, goal, looks = table["done"].copy(), table["goal"].copy(), list(work.kept.get(f"{name} looks", ()))
     part.images[:] = work.kept.get(name, part.images)
     for look in range(len(looks), _LOOKS + 1):

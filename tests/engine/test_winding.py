@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support import columns
+from support.runs import run_cells
 
 import sweep
 from sweep.config import load_config
@@ -50,6 +51,13 @@ def test_upright_spin_has_nothing_to_lose() -> None:
     left, total = vertical_spin(states, p)
     np.testing.assert_allclose(left, spin)
     np.testing.assert_allclose(total, spin**2)
+
+
+@pytest.mark.parametrize("patience", [500.0, 950.0, 2000.0])
+def test_no_run_goes_beyond_its_end(patience: float) -> None:
+    """The rattles of the first two wind down slowly; t_end comes before it is known how."""
+    found = run_cells([{"b": 9.7}, {"b": 9.9}, {"b": 3.0}], t_end=1000.0, patience=patience)
+    assert (found.t_stop <= 1000.0).all()
 
 
 @pytest.mark.campaign
