@@ -86,7 +86,8 @@ class Errors(NamedTuple):
     """What the companions of a run's cells tell, each of shape (cells,)."""
 
     spin: Array
-    """Error of the spin at the end by the spin of the companion; NaN for runs that failed, infinite if that did."""
+    """Error of the spin at the end by the spin of the companion, infinite if that failed; for a run that failed, by the
+    repeat that met the same failure, or NaN."""
     rattle: Array
     """Error of the rattle, as that of the spin with its energy; NaN where there is no companion."""
     least: Array
@@ -119,9 +120,11 @@ def keep_tolerance(job: Plan, work: Work) -> Errors:
     waiting = []
     for part in job.parts:
         rows = np.flatnonzero(~part.failed)
-        first = part.take(rows)
+        first, table = part.take(rows), part.kernel.table(part.images)
         waiting.append((part, rows, first))
-        part.kernel.table(part.images)["status"][rows] = RUNNING
+        table["status"][rows] = RUNNING
+        met = np.flatnonzero(table["failed_at"] > 0)
+        found.spin[part.cells[met]] = table["failed_error"][met]
     for part, rows, first in waiting:
         _keep(part, rows, first, found, work)
     found.spin[np.isinf(found.spin)] = np.nan

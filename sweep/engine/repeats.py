@@ -20,8 +20,10 @@ from sweep.engine.plan import Part
 from sweep.grid import Array
 from sweep.kernels.build import APPROACH, build
 from sweep.kernels.failure import approach
+from sweep.kernels.kernel import FAILURE
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.method import MISSED, REPEAT
+from sweep.kernels.methods import METHODS
 from sweep.kernels.status import DIVERGED, RUNNING, SETTLED
 from sweep.models.model import stack, take
 
@@ -58,10 +60,10 @@ def unsound(part: Part) -> Array:
 def decide_failures(part: Part, work: Work, name: str) -> None:
     """Make what the images of `part`, all of which have ended, say about failures true, in place.
 
-    A failure gets its true status, and its time in `failed_at`.  Where two runs do not meet the same one, the step is
-    halved again, at most `ROUNDS` times, until a run ends soundly.  That run takes the place of the first.  A run that
-    still fails without meeting the same failure twice has `DIVERGED`, and so has every run whose energy balance is off
-    by more than `UNSOUND`.
+    A failure gets its true status, its time and the spin at that time.  Where two runs do not meet the same one, the
+    step is halved again, at most `ROUNDS` times, until a run ends soundly.  That run takes the place of the first.  A
+    run that still fails without meeting the same failure twice has `DIVERGED`, and so has every run whose energy
+    balance is off by more than `UNSOUND`.
 
     `name` is that of the runs of `part`, to which the names of repeats are added.  While `work` goes on, the cells that
     are not decided yet are `RUNNING`.
@@ -75,7 +77,7 @@ def decide_failures(part: Part, work: Work, name: str) -> None:
 
 def _repeat(part: Part, rows: Array, first: Part, work: Work, name: str) -> None:
     """Decide the cells of `part` with the indices `rows`; `first` are these cells after their first run."""
-    now, met, halvings = first, Met(np.full(len(rows), RUNNING), np.zeros(len(rows))), 0
+    now, met, halvings = first, Met.nothing(len(rows)), 0
     brief = np.zeros(len(rows), bool)
     """Whether a repeat goes to where the run before failed, and no further."""
     while len(rows):
@@ -102,7 +104,7 @@ def _repeat(part: Part, rows: Array, first: Part, work: Work, name: str) -> None
         back = over & brief & ~true
         for here, kept in ((over & ~back, first if part.fixed else now), (back, before)):
             done = kept.take(here)
-            _conclude(done, take(met, here), true[here])
+            _conclude(done, take(met, here), take(met_before, here), true[here])
             rule = part.step_rule[rows[here]] if part.fixed else np.where(doubtful[here], MISSED, REPEAT)
             part.put(rows[here], done, np.where(halvings or doubtful[here], rule, part.step_rule[rows[here]]))
         brief = np.zeros(len(rows), bool) if part.fixed else long
@@ -118,6 +120,15 @@ class Met(NamedTuple):
     nothing, shape (cells,)."""
     time: Array
     """When, in sqrt(c/g), shape (cells,)."""
+    spin: Array
+    """The spin at that time, shape (cells,)."""
+    doubt: Array
+    """How much the spin may change in what the approach leaves of that time, shape (cells,)."""
+
+    @classmethod
+    def nothing(cls, cells: int) -> Met:
+        """What so many runs have met that did not fail."""
+        return cls(np.full(cells, RUNNING), *np.zeros((3, cells)))
 
     def agrees(self, other: Met, within: float | Array) -> Array:
         """Tell where both have met the same failure, at times that differ by at most `within`, shape (cells,)."""
@@ -125,16 +136,21 @@ class Met(NamedTuple):
         return np.asarray((self.kind != RUNNING) & (self.kind == other.kind) & near)
 
 
-def _conclude(part: Part, met: Met, true: Array) -> None:
-    """Give `part` statuses that are true, in place: a failure that is not `true` is one of the integration."""
-    table = part.kernel.table(part.images)
+def _conclude(part: Part, met: Met, met_before: Met, true: Array) -> None:
+    """Give `part` statuses that are true, in place: a failure that is not `true` is one of the integration.
+
+    `met_before` is what the runs in steps of twice the length have met.
+    """
+    table, method = part.kernel.table(part.images), METHODS[part.method]
+    error = np.maximum(np.abs(met.spin - met_before.spin) / (2**method.error_order - 1), met.doubt)
     table["status"] = np.where(true, met.kind, np.where(part.failed, DIVERGED, table["status"]))
-    table["failed_at"] = np.where(true, met.time, 0.0)
+    for name, values in zip(FAILURE, (met.time, met.spin, error), strict=True):
+        table[name] = np.where(true, values, 0.0)
 
 
 def _meet(part: Part, work: Work, name: str) -> Met:
     """Find what the failed cells of `part` have really met."""
-    met = Met(np.full(len(part.images), RUNNING), np.zeros(len(part.images)))
+    met = Met.nothing(len(part.images))
     rows = np.flatnonzero(part.failed)
     if not len(rows):
         return met
@@ -157,7 +173,9 @@ def _meet(part: Part, work: Work, name: str) -> Met:
     build([part.kernel], APPROACH)
     for first in range(0, len(rows), _AT_A_TIME):
         some = slice(first, first + _AT_A_TIME)
-        kind, passed = approach(model, states[:, some], take(constants, some), stretch[some])
-        met.kind[rows[some]], met.time[rows[some]] = kind, begin[some] + passed
+        here = rows[some]
+        ends = approach(model, states[:, some], take(constants, some), stretch[some])
+        met.kind[here], passed, met.spin[here], met.doubt[here] = ends
+        met.time[here] = begin[some] + passed
         work.after_chunk()
     return met

@@ -23,7 +23,7 @@ from sweep.models.model import Array, Model, stack
 _TOLERANCE, _SMALL = 1e-12, 1e-3
 
 # A step that fails although it is shorter than this, in sqrt(c/g), has met a true failure.
-_SHORTEST = 1e-10
+_SHORTEST = 1e-14
 
 # Where the states change too fast for any step, a failure this near, in sqrt(c/g), is the reason.
 _NEAR = 1e-6
@@ -36,7 +36,7 @@ _UPRIGHT = 1e-5
 _MOST_STEPS = 3_000_000
 
 
-def approach(model: Model, states: Array, constants, stretch: Array) -> tuple[Array, Array]:
+def approach(model: Model, states: Array, constants, stretch: Array) -> tuple[Array, Array, Array, Array]:
     """Find what happens to trajectories within a stretch of time.
 
     Parameters
@@ -48,18 +48,19 @@ def approach(model: Model, states: Array, constants, stretch: Array) -> tuple[Ar
     Returns
     -------
     The status of each trajectory, shape (cells,): `LIFT_OFF`, `PARADOX` or `TOPPLED`; `RUNNING` if it passes the
-    stretch; `DIVERGED` if the states cannot be followed.  And the time from the beginning of the stretch to this,
-    shape (cells,), in sqrt(c/g).
+    stretch; `DIVERGED` if the states cannot be followed.  The time from the beginning of the stretch to this,
+    shape (cells,), in sqrt(c/g).  The spin at that time, shape (cells,).  And how much
+    it may change in what remains of that time, shape (cells,): near a paradox it changes like the root of the time.
     """
-    status, time = np.empty(len(stretch)), np.empty(len(stretch))
+    status, time, spin, doubt = found = np.empty((4, len(stretch)))
     rows = np.ascontiguousarray(np.concatenate([stack(tuple(states)), stack(tuple(constants))]).T)
-    compiled_approach(model)(rows, np.ascontiguousarray(stretch, dtype=float), status, time)
-    return status, time
+    compiled_approach(model)(rows, np.ascontiguousarray(stretch, dtype=float), found)
+    return status, time, spin, doubt
 
 
 @cache
 def compiled_approach(model: Model) -> Cached:
-    """Compiled (rows, stretch, status, time) -> None: `approach` for the cells of `rows`, states and constants."""
+    """Compiled (rows, stretch, found) -> None: `approach` for `rows`, states and constants of the cells."""
     from numba import prange
 
     n, record = len(model.states), model.constants
@@ -67,15 +68,16 @@ def compiled_approach(model: Model) -> Cached:
     load_constants = make_gather("rows, i", (f"rows[i, {n + j}]" for j in range(len(record._fields))), record)
     follow = _make_follow(model)
 
-    def run(rows, stretch, status, time):
+    def run(rows, stretch, found):
         for i in prange(len(rows)):
-            status[i], time[i] = follow(load(rows, i), load_constants(rows, i), stretch[i])
+            ends = follow(load(rows, i), load_constants(rows, i), stretch[i])
+            found[0, i], found[1, i], found[2, i], found[3, i] = ends
 
-    return parallel(run, "(f8[:, ::1], f8[::1], f8[::1], f8[::1])", f"approach-{model.key}")
+    return parallel(run, "(f8[:, ::1], f8[::1], f8[:, ::1])", f"approach-{model.key}")
 
 
 def _make_follow(model: Model):
-    """Compiled (states, constants, stretch) -> (status, time): `approach` for one trajectory."""
+    """Compiled (states, constants, stretch) -> (status, time, spin, doubt): `approach` for one trajectory."""
     n, rhs, tilt = len(model.states), model.rhs, model.tilt
     # Not inlined: it would be compiled three times over.
     step = compiled(make_step(DOPRI5, model.rhs, n))
@@ -111,11 +113,16 @@ def _make_follow(model: Model):
         return DIVERGED
 
     @compiled
+    def spin(y, p):
+        _, (now, _, _, _) = rhs(y, p)
+        return now
+
+    @compiled
     def follow(y, p, stretch):
-        time, h, cosine = 0.0, stretch / 8.0, np.sqrt(1.0 - tilt(y))
+        time, h, cosine, last = 0.0, stretch / 8.0, np.sqrt(1.0 - tilt(y)), y
         for _ in range(_MOST_STEPS):
             if time >= stretch:
-                return RUNNING, stretch
+                return RUNNING, stretch, spin(y, p), 0.0
             h = min(h, stretch - time)
             one, _, _, sound1, airborne1, jammed1 = step(y, p, h)
             half, _, _, sound2, airborne2, jammed2 = step(y, p, 0.5 * h)
@@ -124,19 +131,20 @@ def _make_follow(model: Model):
                 h = 0.5 * h
                 if h < _SHORTEST:
                     met = airborne1 | jammed1 | airborne2 | jammed2 | airborne3 | jammed3
-                    return kind(y, p, not met), time
+                    return kind(y, p, not met), time, spin(y, p), abs(spin(y, p) - spin(last, p))
                 continue
             error = difference(one, two) / allowed
             if not error <= 1.0:
                 h = h * max(0.2, 0.9 * error**-0.2) if error < 1e30 else 0.2 * h
                 if h < _SHORTEST:
-                    return probe(y, p), time
+                    return probe(y, p), time, spin(y, p), abs(spin(y, p) - spin(last, p))
                 continue
-            y, time = two, time + h
+            last, y, time = y, two, time + h
             before, cosine = cosine, np.sqrt(1.0 - tilt(y))
             if (cosine < _UPRIGHT) & (cosine < before):
-                return TOPPLED, time + h * cosine / (before - cosine)
+                left = cosine / (before - cosine)
+                return TOPPLED, time + left * h, spin(y, p) + left * (spin(y, p) - spin(last, p)), 0.0
             h = h * min(2.0, 0.9 * error**-0.2) if error > 0.0 else 2.0 * h
-        return DIVERGED, time
+        return DIVERGED, time, spin(y, p), 0.0
 
     return follow

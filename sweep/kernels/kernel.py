@@ -21,9 +21,12 @@ from sweep.kernels.layout import Layout, Table, constants_of
 from sweep.kernels.measures.measurement import RIPPLE, Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
-_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", "failed_at", *STABLE)
-"""Quantities of every image.  `failed_at` is the time of a failure, which the engine finds out
-(`sweep.engine.repeats`); 0 if there is none."""
+FAILURE = ("failed_at", "failed_spin", "failed_error")
+"""Time of a failure, spin at that time, and its estimated error, which the engine finds out (`sweep.engine.repeats`); 0
+if there is none."""
+
+_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", *FAILURE, *STABLE)
+"""Quantities of every image."""
 
 STRETCH = 100.0
 """The length of a step divides this evenly if t_end is a multiple of it, in sqrt(c/g).  So it does not depend on t_end:
@@ -199,6 +202,13 @@ class Kernel:
     def model_states(self, images: Array) -> Array:
         """The states as the right-hand side of the model takes them, shape (states, cells)."""
         return self.stepper.model_states(*self.unpack(images))
+
+    def spins(self, images: Array) -> Array:
+        """Spins with which the images have ended, shape (cells,)."""
+        table = self.table(images)
+        with np.errstate(invalid="ignore"):  # the states of a run that failed
+            spin, _, _ = self.model.energy(*self.unpack(images))
+        return np.where(table["failed_at"] > 0, table["failed_spin"], spin)
 
     def times(self, images: Array, t_end: float | Array) -> Array:
         """Times at which the images have ended, in sqrt(c/g), shape (cells,)."""

@@ -11,18 +11,21 @@ from sweep.models.ladder import slip
 from sweep.models.model import Array, stack
 
 
-def met(body: dict[str, np.ndarray], stretch: float) -> tuple[Array, Array]:
+def met(body: dict[str, np.ndarray], stretch: float) -> tuple[Array, ...]:
     """What cells meet within so long a time from their start."""
     cells = len(body["a"])
     return approach(MODELS["slip"], stack(slip.start(body)), slip.Constants.of(body), np.full(cells, stretch))
 
 
 @pytest.mark.parametrize("kind", ENDS)
-def test_failures_and_their_times(kind: int) -> None:
-    (status,), (time,) = met(columns(**ENDS[kind]), 5.0)
-    expected, height, force, determinant = newton.end(**ENDS[kind], t_end=5.0)
+def test_failures_with_their_times_and_spins(kind: int) -> None:
+    body = columns(**ENDS[kind])
+    (status,), (time,), (spin,), (doubt,) = met(body, 5.0)
+    expected, expected_spin, height, force, determinant = newton.end(**ENDS[kind], t_end=5.0)
     assert status == kind
     assert time == pytest.approx(expected, abs=1e-7)
+    assert spin == pytest.approx(expected_spin, abs=3e-9 + 3 * doubt)
+    assert doubt < 1e-6
     # And SciPy ended there for the same reason.
     assert (height < 1e-6, abs(force) < 1e-6) == (kind == TOPPLED, kind == LIFT_OFF)
     assert (abs(determinant) < 1e-3 or force > 1e3) == (kind == PARADOX)
@@ -30,8 +33,8 @@ def test_failures_and_their_times(kind: int) -> None:
 
 def test_a_stretch_without_failure_is_passed() -> None:
     body = columns(**ENDS[LIFT_OFF])
-    _, (time,) = met(body, 5.0)
-    (status,), (passed,) = met(body, 0.999 * time)
+    _, (time,), *_ = met(body, 5.0)
+    (status,), (passed,), *_ = met(body, 0.999 * time)
     assert (status, passed) == (RUNNING, 0.999 * time)
     assert met(body, 1.001 * time)[0] == LIFT_OFF
 
@@ -39,7 +42,7 @@ def test_a_stretch_without_failure_is_passed() -> None:
 def test_the_paradox_may_have_a_finite_force() -> None:
     """Numerator and denominator of the force go to zero together: which sign a step meets first is chance."""
     body = {"a": 12.8, "b": 2.4, "c": 1.71, "delta": 0.16, "mu": 172.0, "n0": 1.0, "x0": 2.93, "y0": 0.241}
-    (status,), (time,) = met(columns(**body), 2.0)
+    (status,), (time,), *_ = met(columns(**body), 2.0)
     assert status == PARADOX
     assert time == pytest.approx(0.72344473, abs=1e-7)  # SciPy's DOP853 on the independent equations
 
@@ -48,7 +51,7 @@ def test_states_that_cannot_be_followed() -> None:
     body = columns()
     states = stack(slip.start(body))
     states[2] = np.nan
-    (status,), (time,) = approach(MODELS["slip"], states, slip.Constants.of(body), np.ones(1))
+    (status,), (time,), *_ = approach(MODELS["slip"], states, slip.Constants.of(body), np.ones(1))
     assert (status, time) == (DIVERGED, 0.0)
 
 

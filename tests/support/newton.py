@@ -199,8 +199,8 @@ def _unit(u: Vector) -> Vector:
     return u / np.sqrt(u @ u)
 
 
-def end(*, t_end: float, n0: float, x0: float, y0: float, **p: float) -> tuple[float, float, float, float]:
-    """When and how a trajectory of the paper's body ends: the time, and then u3², normal force and determinant.
+def end(*, t_end: float, n0: float, x0: float, y0: float, **p: float) -> tuple[float, float, float, float, float]:
+    """When and how a trajectory of the paper's body ends: time and spin, and then u3², normal force and determinant.
 
     It ends where one of these vanishes, or where the force grows beyond all bounds.  Force and determinant often vanish
     together, so that the force stays finite, and SciPy steps across.
@@ -225,7 +225,7 @@ def end(*, t_end: float, n0: float, x0: float, y0: float, **p: float) -> tuple[f
         return _solution(y, p, "viscous")[3]
 
     def jams(t: float, y: Vector) -> float:
-        return force(t, y) - 1e4
+        return force(t, y) - 1e6
 
     def topples(t: float, y: Vector) -> float:
         return height(t, y) - 1e-8
@@ -235,10 +235,12 @@ def end(*, t_end: float, n0: float, x0: float, y0: float, **p: float) -> tuple[f
         event.terminal = True  # type: ignore[attr-defined]
     with np.errstate(all="ignore"):
         solution = solve_ivp(
-            slopes, (0, t_end), [*u[:2], *(n0 * u), 0.0, 0.0], "DOP853", rtol=1e-9, atol=1e-12, events=events
+            slopes, (0, t_end), [*u[:2], *(n0 * u), 0.0, 0.0], "DOP853", rtol=1e-11, atol=1e-14, events=events
         )  # fmt: skip
     assert solution.status == 1
     y, time = solution.y[:, -1], solution.t[-1]
+    down, rates, left = np.array([*y[:2], -np.sqrt(height(time, y))]), slopes(time, y), 0.0
     if len(solution.t_events[2]):  # u3 vanishes linearly in time, so u3² does like its square
-        time += height(time, y) / (y[:2] @ slopes(time, y)[:2])
-    return time, height(time, y), force(time, y), determinant(time, y)
+        left = height(time, y) / (y[:2] @ rates[:2])
+    spin = y[2:5] @ down + left * rates[2:5] @ down
+    return time + left, spin, height(time, y), force(time, y), determinant(time, y)
