@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.model import Array, Columns, Model, Ripple
+from sweep.models.model import Array, Columns, Model, Ripple, never_upright
 
 STATES = ("u1", "u2", "M1", "M2", "M3", "v1", "v2")
 
@@ -117,7 +117,10 @@ def subset(constants: type[Any], p):
 
 
 def in_momentum(full: Model, constants: type[Any], momentum, slow, ripple: Ripple) -> Model:
-    """The model `full` in the variables `STATES`; the other arguments are as of `StiffForm` and `Model`."""
+    """The model `full` in the variables `STATES`, without the functions that take its own states.
+
+    The other arguments are as of `StiffForm` and `Model`.
+    """
 
     def start(columns: Columns) -> tuple[Array, ...]:
         states: tuple[Array, ...] = momentum(full.start(columns), constants.of(columns))
@@ -135,8 +138,14 @@ def in_momentum(full: Model, constants: type[Any], momentum, slow, ripple: Rippl
         return full_energy((u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2), p)
 
     return replace(
-        full, states=STATES, constants=constants, start=start, energy=energy, observe=observe, ripple=ripple
+        full, states=STATES, constants=constants, start=start, energy=energy, observe=observe, ripple=ripple,
+        rhs=no_rhs, upright=never_upright, path=None,
     )  # fmt: skip
+
+
+def no_rhs(y, p):
+    """Stand for the right-hand side that a model in `STATES` does not have."""
+    raise NotImplementedError("a stiff method takes `slow` and `newton`, not a right-hand side")
 
 
 def velocities(slow, y: Array, p) -> Array:
