@@ -12,6 +12,7 @@ from support.runs import Heard
 
 import sweep
 from sweep.config import load_config
+from sweep.kernels.status import DIVERGED
 from sweep.models.model import stack
 from sweep.plots.trajectories import reversal_times
 
@@ -116,6 +117,15 @@ def test_a_trajectory_goes_on_to_its_end_and_stays_where_a_sweep_says(n0: float,
 
 def test_a_trajectory_without_an_end_ends_when_it_has_settled(write: Write) -> None:
     assert float(sweep.trajectory(write(STANDARD), mu=75, n0=-0.006, t_end=float("inf")).t_stop[0]) < 20
+
+
+def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
+    """Its step is beyond the stability limit, about 2.8 over the fastest rate of friction, so that no step is whole."""
+    one = sweep.trajectory(write(STANDARD), mu=100, method="dopri5", step=0.15).isel(trajectory=0)
+    assert (one.sizes["time"], float(one.time[0]), float(one.t_stop)) == (1, 0, 0)
+    assert one.status == DIVERGED
+    assert float(one.spin[0]) == pytest.approx(0.05)
+    assert float(one.table_x[0]) == float(one.heading[0]) == 0
 
 
 def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
