@@ -119,6 +119,14 @@ def test_a_trajectory_without_an_end_ends_when_it_has_settled(write: Write) -> N
     assert float(sweep.trajectory(write(STANDARD), mu=75, n0=-0.006, t_end=float("inf")).t_stop[0]) < 20
 
 
+def test_more_samples_than_memory_holds_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.studies.trajectory.MAX_SAMPLES", 100)
+    config = load_config({"friction": {"mu": 60}}, {"t_end": 60.0})
+    with pytest.raises(sweep.ConfigError, match=r"every: the samples are too many .*; give 1\.2 "):
+        sweep.trajectory(config, b=[3, 4], every=1.1)
+    assert sweep.trajectory(config, b=[3, 4], every=1.2).sizes["time"] == 51
+
+
 def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
     """Its step is beyond the stability limit, about 2.8 over the fastest rate of friction, so that no step is whole."""
     one = sweep.trajectory(write(STANDARD), mu=100, method="dopri5", step=0.15).isel(trajectory=0)
