@@ -136,6 +136,24 @@ def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
     assert float(one.table_x[0]) == float(one.heading[0]) == 0
 
 
+def test_a_body_of_unknown_shape_is_not_drawn(write: Write) -> None:
+    """A user's model has the attitude of a rigid body, and dimensions of its own."""
+    other = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0).rename({"a": "a1"})
+    with pytest.raises(sweep.ConfigError, match="no a, b and c"):
+        sweep.animate(other)
+
+
+@pytest.mark.browser
+def test_the_explorer_shows_no_body_of_unknown_shape(write: Write) -> None:
+    from sweep.explorer.player import Player
+    from sweep.explorer.runner import Curve
+
+    one, player = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0).isel(trajectory=0), Player([])
+    for shown, dataset in ((True, one), (False, one.rename({"a": "a1"}))):
+        player.show(Curve(dataset, np.zeros(0), 0.0), "#000000", 60.0)
+        assert player.figure.visible == shown
+
+
 def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
     config = sweep.load_config(write(STANDARD), {"t_end": 8000.0})
     both = sweep.trajectory(config, n0=[0.001, 0.05], every=5.0, stop_when_settled=True)
