@@ -11,7 +11,7 @@ from typing import Any
 from bokeh.models import CustomJSTickFormatter, Row, Select, Slider, TextInput
 
 from sweep.explorer.slices import Source
-from sweep.explorer.state import LIMITS, Choice, State, choices, number
+from sweep.explorer.state import LIMITS, Choice, State, choices, limit
 
 WIDGETS = ":host { color: #1b2733; color-scheme: light; filter: var(--widgets) }"
 """Of the outermost widgets, which a dark page inverts."""
@@ -66,13 +66,13 @@ class MapControls:
             self._change(lambda state: choice.put(state, int(k)))
 
     def _limit(self, name: str, words: str) -> TextInput:
-        """The field of an end of the colour scale; what is no number leaves it to the values."""
+        """The field of an end of the colour scale; what is not one leaves it to the values."""
         field = TextInput(title=words, placeholder="least" if name == "low" else "most", width=80, name=name,
                           stylesheets=[BARE])  # fmt: skip
 
-        def put(state: State, limit: float) -> State:
-            limits = {**state.limits, name: limit}
+        def put(state: State, at: float) -> State:
+            limits = {**state.limits, name: at}
             return replace(state, limits={end: at for end, at in limits.items() if math.isfinite(at)})
 
-        on(field, "value", lambda text: self._change(partial(put, limit=number(text))))
+        on(field, "value", lambda text: self._change(partial(put, at=limit(text))))
         return field

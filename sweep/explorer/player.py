@@ -71,9 +71,9 @@ class Player:
         return models.Column(self._slider, row, sizing_mode="stretch_width", name="player", stylesheets=[WIDGETS])
 
     def show(self, curve: Curve | None, colour: str, end: float) -> None:
-        """Show the body of a curve, if it has the turns of the body; the slider goes to the time `end`."""
+        """Show the body of a curve, if its attitude and shape are known; the slider goes to the time `end`."""
         self._slider.update(end=end, step=end / 2000)
-        self.figure.visible = self.controls.visible = curve is not None and "heading" in curve.dataset
+        self.figure.visible = self.controls.visible = curve is not None and body.drawable(curve.dataset)
         if not curve or not self.figure.visible:
             self._motion.data = {"time": [], "turn": [], "contact": [], "path": []}
             return

@@ -14,6 +14,7 @@ import xarray as xr
 
 from sweep.config import ConfigError, Values
 from sweep.config.schema import FOREVER
+from sweep.engine.plan import steps_of
 from sweep.engine.reporter import Progress, Reporter
 from sweep.explorer.setup import Setup
 from sweep.explorer.state import MAX_CELLS, Cell
@@ -23,11 +24,16 @@ from sweep.jit import load_numba, showing
 from sweep.kernels import measures
 from sweep.kernels.status import FAILURES, RUNNING, TIME_LIMIT
 from sweep.plots.trajectories import lively_until, reversal_times
-from sweep.studies.trajectory import trajectory
+from sweep.studies.trajectory import choose, intervals, trajectory
 
 LONG = 30_000.0
-"""Time in sqrt(c/g) beyond which a trajectory is sampled more coarsely: 200 000 samples of the paper's body.  One
-without an end (`t_end: .inf`) ends here."""
+"""Time at which a trajectory without an end (`t_end: .inf`) ends."""
+
+MAX_STEPS = 1e8
+"""A trajectory that takes more steps ends with these: an address may name any friction, and so any length of steps."""
+
+MAX_SAMPLES = 200_000
+"""A trajectory that has more is sampled more coarsely; so many, of t = 30 000 of the paper's body, take 27 MB."""
 
 COMPILING = "compiling the simulation for this machine; later runs find it in the cache"
 
@@ -101,17 +107,18 @@ def run(setup: Setup, cell: Cell, job: Job | None = None) -> Iterator[Curve]:
     The last one goes to `t_end`, or to where the trajectory has settled and nothing is worth a look (`lively_until`).
     """
     parameters = {name: Values.one(value) for name, value in cell.items()}
-    t_end = setup.config.integrator.patient.t_end
-    t_end = LONG if t_end >= FOREVER else t_end
+    usual, seconds = measures.default(setup.config.equations), 0.0
+    config = choose(replace(setup.config, parameters=parameters, measure=usual), {})
+    columns, integrator = config.grid.columns(), config.integrator
+    t_end = LONG if integrator.t_end >= FOREVER else integrator.t_end
+    t_end = min(t_end, MAX_STEPS * float(steps_of(integrator.method, config, columns)[0].min()))
+    every = max(float(intervals(config.equations, columns).min()), t_end / MAX_SAMPLES)
     if job:
         job.t_end = t_end
-    usual, seconds = measures.default(setup.config.equations), 0.0
-    config = replace(setup.config, parameters=parameters, measure=usual)
-    every = t_end / (2 * LONG) if t_end > LONG else None
     for until in (share * t_end for share in _STRETCHES):
         began = time.perf_counter()
-        integrator = config.integrator.model_copy(update={"t_end": until})
-        one = trajectory(replace(config, integrator=integrator), every=every, reporter=job).isel(trajectory=0)
+        shorter = integrator.model_copy(update={"t_end": until})
+        one = trajectory(replace(config, integrator=shorter), every=every, reporter=job).isel(trajectory=0)
         lively, seconds = lively_until(one), seconds + time.perf_counter() - began
         still = one["status"] not in (RUNNING, TIME_LIMIT) and lively < one["time"][-1]
         whole = bool(until == t_end or still or one["status"] in FAILURES)

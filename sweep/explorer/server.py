@@ -11,7 +11,9 @@ import webbrowser
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 
+from bokeh.protocol.exceptions import ProtocolError
 from bokeh.server.server import Server
 
 from sweep.explorer import view
@@ -106,7 +108,11 @@ def _quieten() -> None:
     """Keep off the terminal what Bokeh and Tornado log of pages that close, and of files that browsers ask for."""
     for name in ("bokeh.server.views.ws", "tornado.access"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    # The last words of a page that closes under load find no session, which Bokeh asserts.
-    logging.getLogger("bokeh.server.protocol_handler").addFilter(
-        lambda record: not (record.exc_info and isinstance(record.exc_info[1], AssertionError))
-    )
+    # The last words of a page that closes under load find no session, which Bokeh asserts; and an address may name an
+    # empty session.
+    for name, fault in (("bokeh.server.protocol_handler", AssertionError), ("tornado.application", ProtocolError)):
+        logging.getLogger(name).addFilter(partial(_is_other, fault))
+
+
+def _is_other(fault: type[Exception], record: logging.LogRecord) -> bool:
+    return not (record.exc_info and isinstance(record.exc_info[1], fault))

@@ -24,6 +24,15 @@ MAX_CELLS = 6
 LIMITS = {"low": "from", "high": "to"}
 """The ends of the colour scale, and what the page calls them."""
 
+MAX_LIMIT = 1e15
+"""Of the size of a limit: up to here a float holds every count."""
+
+# Limits below this are zero: of smaller numbers a logarithmic scale overflows.
+_ZERO = 1e-100
+
+# Unknown keys of an address that are named.
+_NAMED = 5
+
 Cell = Mapping[str, float]
 """The parameters of a trajectory."""
 
@@ -138,7 +147,7 @@ def read(
     base : the parameters of a trajectory that a cell does not name; empty where none can be run
     known : what they are, by name
     """
-    state, faults, all_choices = first(source), list[str](), choices(source)
+    state, faults, unknown, all_choices = first(source), list[str](), list[str](), choices(source)
     # Limits come last, because another variable does away with them.
     for key, values in sorted(query.items(), key=lambda pair: pair[0] in LIMITS):
         choice = all_choices.get(key)
@@ -147,13 +156,19 @@ def read(
         elif choice:
             among = f"from {choice.options[0]} to {choice.options[-1]}" if choice.axis else ", ".join(choice.options)
             faults.append(f"{key}={brief(values[-1])} is not there; choose {among}")
-        elif key in LIMITS and math.isfinite(limit := number(values[-1])):
-            state = replace(state, limits={**state.limits, key: limit})
+        elif key in LIMITS and math.isfinite(at := limit(values[-1])):
+            state = replace(state, limits={**state.limits, key: at})
         elif key in LIMITS:
-            faults.append(f"{key}={brief(values[-1])} is no number")
+            faults.append(f"{key}={brief(values[-1])}: give a number from {-MAX_LIMIT:g} to {MAX_LIMIT:g}")
         elif key not in ("cell", *_ENDED):
-            expected = ", ".join([*all_choices, *LIMITS, "cell"])
-            faults.append(f"unknown URL parameter '{brief(key)}'; expected one of {expected}")
+            unknown.append(f"'{brief(key)}'")
+    if unknown:
+        expected = ", ".join([*all_choices, *LIMITS, "cell"])
+        those, more = ", ".join(unknown[:_NAMED]), " …" if len(unknown) > _NAMED else ""
+        faults.append(f"unknown URL parameter {those}{more}; expected one of {expected}")
+    if len(state.limits) == len(LIMITS) and not state.limits["low"] < state.limits["high"]:
+        faults.append("low is not below high; the values set the ends of the colours")
+        state = replace(state, limits={})
     asked, cells = query.get("cell", ()), list[Cell]()
     for text in asked[:MAX_CELLS]:
         try:
@@ -185,6 +200,12 @@ def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell:
         if fault := wrong_value(known[name], cell[name]):
             raise ValueError(fault)
     return cell
+
+
+def limit(text: str) -> float:
+    """An end of the colour scale as a text spells it; NaN if it is not a number, or farther out than `MAX_LIMIT`."""
+    at = number(text)
+    return math.nan if abs(at) > MAX_LIMIT else 0.0 if abs(at) < _ZERO else at
 
 
 def number(text: str) -> float:

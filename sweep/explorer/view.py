@@ -146,7 +146,10 @@ class View:
 
     def _tell(self, job: Job) -> None:
         """Take news of a run, on the thread of the trajectories."""
-        self._document.add_next_tick_callback(partial(self._hear, job))
+        try:
+            self._document.add_next_tick_callback(partial(self._hear, job))
+        except AttributeError:  # Bokeh takes the document of a closed page apart before it says so
+            job.dropped = True
 
     def _hear(self, job: Job) -> None:
         if not job.dropped:

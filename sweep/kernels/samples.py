@@ -46,8 +46,6 @@ def sampled(
     delay : from the start of each trajectory to `times` = 0, shape (cells,); by default there is none
     longest_delay : the number of steps of the delay follows from this, so that it does not depend on the delay
     """
-    if not len(step):
-        return np.empty((0, len(times)))
     zero, angle = np.zeros_like(step), model.turned(columns)
     early = zero if delay is None else longest_delay - delay
     motion = (*model.start(columns), zero) if what == "heading" else model.start(columns)
@@ -80,7 +78,7 @@ def in_lanes(rows: Array, needed: Array) -> tuple[Array, Array, Array]:
     filled = order[np.minimum(np.arange(groups * LANES), len(order) - 1)]
     steps = needed[filled].reshape(groups, LANES).max(axis=1)
     lanes = rows[:, filled].reshape(len(rows), groups, LANES).transpose(1, 0, 2)
-    return order, steps, np.ascontiguousarray(lanes).reshape(groups, -1)
+    return order, steps, np.ascontiguousarray(lanes).reshape(groups, len(rows) * LANES)
 
 
 @cache

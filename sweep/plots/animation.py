@@ -57,8 +57,8 @@ def animate(
     if speed is not None and not speed > 0:
         raise fault_of(f"{speed:g}; give a number above zero", "speed")
     found = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
-    if "heading" not in found:
-        raise fault_of("its bodies have no attitude; animate trajectories of the models slip or noslip")
+    if not body.drawable(found):
+        raise fault_of("its bodies have no attitude, or no a, b and c; animate trajectories of slip or noslip")
     if (bodies := found.sizes["trajectory"]) > MOST:
         raise fault_of(f"{bodies} bodies are too many to stand side by side; choose at most {MOST}")
     last = float(found["time"][-1])

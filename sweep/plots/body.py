@@ -66,6 +66,11 @@ class Moving:
         return np.asarray(1 - (1 - np.array(to_rgb(colour))) * halves)
 
 
+def drawable(dataset: xr.Dataset) -> bool:
+    """Tell whether trajectories have an attitude and a shape; a user's model may call its dimensions as it likes."""
+    return all(name in dataset for name in ("heading", "a", "b", "c"))
+
+
 def moving(one: xr.Dataset, times: Array) -> Moving:
     """The body of a trajectory at some times."""
     columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "offset") if name in one}

@@ -24,7 +24,10 @@ _OPEN: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "m
 def draw(dataset: xr.Dataset) -> Picture:
     """The curves of a dataset of `sweep boundaries`, each with the count that begins on it, and their open points."""
     x, y = dataset.attrs["x"], dataset.attrs["y"]
-    panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [("no count changes between the cells", dataset)]
+    nothing = (
+        "no boundary was searched" if dataset.attrs.get("pairs_not_searched") else "no count changes between the cells"
+    )
+    panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [(nothing, dataset)]
     rows, columns = arrangement(len(panels), 1)
     width = panel_width(columns, 5.2, 0.6)
     figure = Picture(width * columns + 0.6, 1.2 + width * RATIO * rows)
@@ -36,7 +39,8 @@ def draw(dataset: xr.Dataset) -> Picture:
         set_scale(axes, "y", _axis(dataset, y).values)
         drawn = list(curves(part, x, y))
         for level, xs, ys in drawn:
-            axes.plot(xs, ys, color=scale.rgba(np.array(level)).tolist(), linewidth=1.4, gid=f"level{level}")
+            colour, alone = scale.rgba(np.array(level)).tolist(), "." if len(xs) == 1 else None
+            axes.plot(xs, ys, marker=alone, color=colour, linewidth=1.4, gid=f"level{level}")
         each = [Line("boundary", "", [(xs, ys)], f"{level}") for level, xs, ys in drawn]
         lines.write(axes, places.words(each, _axis(dataset, x), _axis(dataset, y)))
         open_ = part.isel(point=(part["outcome"] == OPEN).values)

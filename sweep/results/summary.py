@@ -49,6 +49,10 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
         yield f"open {open_}: a cell near them failed, or did not end before the time limit"
     if off := int(dataset.attrs.get("middles_off", 0)):
         yield f"lost {off}: the boundary was not found halfway between two points; one curve ends there, another begins"
+    if early := int(dataset.attrs.get("cells_not_final", 0)):
+        yield f"not final {early}: counts of cells of the grid that are lower bounds; a longer t_end makes them final"
+    if pairs := int(dataset.attrs.get("pairs_not_searched", 0)):
+        yield f"not searched {pairs}: pairs of neighbours whose counts differ, where a count is not final or missing"
     if uncertain := int((dataset["outcome"] == UNCERTAIN).sum()):
         yield f"uncertain {uncertain}: the count of an end is not decided; it may be as near to the other as its error"
 

@@ -19,6 +19,7 @@ from sweep.axis import Axis, contours
 from sweep.config import Config, ConfigError
 from sweep.faults import fault_of
 from sweep.grid import Array
+from sweep.kernels.status import TIME_LIMIT
 from sweep.models.model import COUNT
 from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
@@ -26,6 +27,10 @@ from sweep.results.store import Store
 from sweep.studies.curve import Cell, Curve, Middle, Point
 from sweep.studies.kept import Task
 from sweep.studies.search import Search, measuring, require_certain
+
+# How far a place on an edge of the grid is from a whole index at most: that of rounding.  `_levelled` keeps places on
+# diagonals farther away.
+_ON = 1e-9
 
 Asked = tuple[Curve, Point | Middle, float]
 """A cell that is asked for: for which part of which curve, and its place along the line."""
@@ -66,6 +71,8 @@ class Boundaries(Search):
         self.across, self.deviation = across, deviation
         self.axes = {name: Axis(name, np.array(sorted(config.axes[name]))) for name in across}
         self.curves: list[Curve] = []
+        self._grid = {"cells_not_final": 0, "pairs_not_searched": 0}
+        """What of the grid was not searched, as attributes of the dataset."""
         self._asked: list[Asked] = []
         """The cells that were asked for last."""
         self._asking = self._search()
@@ -105,6 +112,7 @@ class Boundaries(Search):
     def learn(self, found: Mapping[str, Array]) -> None:
         counts = Counts.of(found)
         if len(self.rounds) == 1:
+            self._grid["cells_not_final"] = int((found["status"] == TIME_LIMIT).sum())
             self.curves = list(self._curves(counts))
             return
         sure = found.get("decided", counts.known)
@@ -118,7 +126,10 @@ class Boundaries(Search):
         columns = self._columns()
         head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.told()
         middles = [middle for curve in self.curves for middle in curve.middles.values()]
-        head |= {"deviation": self.deviation, "middles_off": sum(not middle.confirmed for middle in middles)}
+        head |= {
+            "deviation": self.deviation,
+            "middles_off": sum(not middle.confirmed for middle in middles),
+        } | self._grid
         title = f"{self.config.name}: boundaries ({self.config.model} model)"
         own = variables(POINTS, ["point"], columns)
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})
@@ -150,13 +161,14 @@ class Boundaries(Search):
         for at in product(*(range(len(self.config.axes[name])) for name in others)):
             cell = {name: self.config.axes[name][i] for name, i in zip(others, at, strict=True)}
             counts = Counts(*(_sorted(each[at], self.config.axes[y], self.config.axes[x]) for each in tables))
+            self._grid["pairs_not_searched"] += _not_searched(counts)
             rows, columns = (Axis(name, np.arange(len(self.config.axes[name]))) for name in (y, x))
             for level in counts.levels():
                 distance = counts.distance(level)
                 known = distance, counts.reversals, counts.known, counts.borders(level)
-                for xs, ys in contours(_levelled(distance), columns, rows):
-                    places = list(zip(xs.tolist(), ys.tolist(), strict=True))
-                    closed = places[0] == places[-1]
+                for xs, ys in contours(_levelled(distance), columns, rows, corners=True):
+                    places = [at for at in zip(xs.tolist(), ys.tolist(), strict=True) if _on_an_edge(at)]
+                    closed = len(places) > 1 and places[0] == places[-1]
                     points = [self._edge(known, place, cell) for place in places[: -1 if closed else None]]
                     yield Curve(level, closed, (self.axes[x], self.axes[y]), points)
 
@@ -177,6 +189,27 @@ class Boundaries(Search):
 
 def _sorted(table: Array, y: tuple[float, ...], x: tuple[float, ...]) -> Array:
     return np.asarray(table[np.ix_(np.argsort(y), np.argsort(x))])
+
+
+def _on_an_edge(at: tuple[float, float]) -> bool:
+    """Tell whether a place, in indices, lies between two neighbours, and not on a diagonal beside an unknown cell."""
+    return min(abs(index - round(index)) for index in at) < _ON
+
+
+def _not_searched(counts: Counts) -> int:
+    """Pairs of neighbours that count differently, and that no contour separates: too little is known around them."""
+    found = 0
+    for turned in (np.asarray, np.transpose):
+        reversals, known = turned(counts.reversals), turned(counts.known)
+        left_out = np.zeros((len(known), known.shape[1] - 1), bool)
+        for level in counts.levels():
+            finite, more = np.isfinite(turned(counts.distance(level))), reversals >= level
+            pairs = finite[:, 1:] & finite[:, :-1]
+            beside = np.pad(finite[:, 1:] | finite[:, :-1], ((1, 1), (0, 0)))
+            searched = pairs & (beside[:-2] | beside[2:])
+            left_out |= (more[:, 1:] != more[:, :-1]) & known[:, 1:] & known[:, :-1] & ~searched
+        found += int(left_out.sum())
+    return found
 
 
 def _levelled(distance: Array) -> Array:

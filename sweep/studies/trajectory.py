@@ -61,7 +61,10 @@ _SAME, _SAME_STEP = 1e-12, 1e-9
 _PASSES, _SAMPLE_SECONDS = 2, 2e-6
 
 MAX_TRAJECTORIES = 1000
-"""Every combination of the values asked for is a trajectory, and all its samples are held in memory."""
+"""Every combination of the values asked for is a trajectory."""
+
+MAX_SAMPLES = 10_000_000
+"""All samples are held in memory, a kilobyte each while they are taken."""
 
 # name: units, long_name, and perhaps a description
 SERIES: dict[str, tuple[Unit, str] | tuple[Unit, str, str]] = {
@@ -130,7 +133,7 @@ def trajectory(
     Raises
     ------
     ConfigError
-        if the model is a formula, or `at` picks cells that cannot be run.
+        if the model is a formula, `at` picks cells that cannot be run, or the samples do not fit into memory.
     """
     chosen = choose(config, at, samples)
     stops = stop_when_settled or chosen.integrator.t_end >= FOREVER
@@ -166,7 +169,7 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
         marks = _run(kernel, part.start().images, settles)
     _judge(kernel, images)
     final.settle(part)
-    times = _times(kernel, images, every or _intervals(kernel.model, columns).min())
+    times = _times(kernel, images, every or intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
     (found,) = job.by_grid(results(job, errors))
     made = provenance(chosen, time.perf_counter() - began, grid.size, of=TRAJECTORY)
@@ -191,7 +194,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
     chosen = choose(config, at, samples)
     columns, integrator = chosen.grid.columns(), chosen.integrator
     steps = integrator.t_end / steps_of(integrator.method, chosen, columns)[0]
-    samples = (integrator.t_end / _intervals(chosen.equations, columns)).sum()
+    samples = (integrator.t_end / intervals(chosen.equations, columns)).sum()
     seconds = _PASSES * nominal_seconds(steps) + samples * _SAMPLE_SECONDS
     return "\n".join(
         [
@@ -274,8 +277,11 @@ def _judge(kernel: Kernel, images: Array) -> None:
 
 def _times(kernel: Kernel, ends: Array, interval: float) -> Array:
     """The times of samples of all trajectories, shape (times,): no denser than steps, and also where one ends."""
-    last = _last(kernel, ends)
-    times = np.union1d(np.arange(0, last.max(), max(interval, kernel.table(ends)["step"].min())), last)
+    last, densest = _last(kernel, ends), max(interval, kernel.table(ends)["step"].min())
+    if len(ends) * last.max() > MAX_SAMPLES * densest:
+        least = len(ends) * last.max() / MAX_SAMPLES
+        raise fault_of(f"the samples are too many to be held in memory; give {least:.2g} or more", "every")
+    times = np.union1d(np.arange(0, last.max(), densest), last)
     different = np.diff(times, prepend=-1) > _SAME * last.max()  # not the same end, rounded in another way
     return np.asarray(times[different])
 
@@ -393,6 +399,6 @@ def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
     return series
 
 
-def _intervals(model: Model, columns: Columns) -> Array:
-    """Time between samples, shape (trajectories,)."""
+def intervals(model: Model, columns: Columns) -> Array:
+    """Time between samples by default, shape (trajectories,)."""
     return np.asarray(1 / (SAMPLES_A_RADIAN * np.maximum(fastest_motion(model, columns), 0.1)))

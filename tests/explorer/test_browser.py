@@ -375,6 +375,20 @@ def test_no_cell_is_told_along_other_axes(opened: xr.Dataset) -> None:
 # ---- trajectories
 
 
+def test_news_of_a_page_that_is_gone_end_its_run_alone(opened: xr.Dataset) -> None:
+    """Bokeh takes the document apart first; the thread of the trajectories, which all pages share, has to go on."""
+    from bokeh.document import Document
+
+    from sweep.explorer.runner import Job
+    from sweep.explorer.view import View
+
+    document, job = Document(), Job({}, lambda _: None)
+    view = View(document, Source(opened), None, None, {})
+    document.callbacks.destroy()
+    view._tell(job)
+    assert job.dropped
+
+
 def test_a_click_runs_the_cell(page: Page, opened: xr.Dataset) -> None:
     page.mouse.click(*place(page, 3, 2))
     wait_for_curves(page, 1)
@@ -651,6 +665,12 @@ def answer(place: str, path: str, headers: Mapping[str, str] | None = None) -> t
         connection.request("GET", path, headers=dict(headers or {}))
         with connection.getresponse() as response:
             return response.status, response.read().decode() if response.status == HTTPStatus.OK else ""
+
+
+def test_an_address_of_no_session_is_refused_without_a_word(served: str) -> None:
+    """`served` asks in the end what was said on the terminal."""
+    status, _ = answer(urlsplit(served).netloc, "/?bokeh-session-id=%00")
+    assert status == HTTPStatus.INTERNAL_SERVER_ERROR
 
 
 def test_only_this_machine_is_served(served: str) -> None:

@@ -76,6 +76,15 @@ def test_a_curve_ends_where_nothing_happens_any_more(opened: xr.Dataset) -> None
     assert curve.dataset["reversals"] == long["reversals"].item() > 0
 
 
+def test_a_curve_ends_with_the_steps_and_samples_of_a_long_one(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An address may name a friction whose steps are so short that the first stretch would take days."""
+    monkeypatch.setattr(runner, "MAX_STEPS", 1e5)
+    monkeypatch.setattr(runner, "MAX_SAMPLES", 500)
+    steep, usual = (whole(setup, {**setup.base, "mu": mu}).dataset for mu in (1e9, 60.0))
+    assert steep["t_stop"] == pytest.approx(1e5 * steep["step"].item(), rel=1e-4)
+    np.testing.assert_allclose(np.diff(usual["time"])[:-1], setup.config.integrator.t_end / 500)
+
+
 def test_short_stretches_go_first(setup: Setup) -> None:
     """A cell that is added is seen before those before it are run to their ends."""
     told = list[tuple[float, bool]]()

@@ -218,6 +218,42 @@ def test_what_does_not_end_is_open(tmp_path: Path) -> None:
     assert "did not end" in " ".join(entries(picture.plot(early)))
 
 
+def test_pairs_that_are_not_searched_are_counted(tmp_path: Path) -> None:
+    """The counts are 1 1 2 / 1 1 3 / 1 2 3, and those beyond the first column are not final.
+
+    Of the six pairs that differ only the lower left one has two known neighbours.
+    """
+    early = sweep.boundaries(
+        {"friction": {"mu": [60, 70, 80]}}, tmp_path, n0=[0.02, 0.04, 0.06], t_end=1000, bracket=0.05
+    )
+    assert early.sizes["point"] == 1
+    assert (float(early.mu[0]), int(early.level[0])) == (80, 2)
+    assert 0.02 < float(early.n0[0]) < 0.04
+    assert (early.cells_not_final, early.pairs_not_searched) == (6, 5)
+    said = invoke("info", tmp_path / "sweep_boundaries.nc").output
+    assert "not final 6: " in said
+    assert "not searched 5: " in said
+
+
+def test_a_picture_without_curves_tells_whether_counts_differ() -> None:
+    early = sweep.boundaries({"friction": {"mu": [60, 70]}}, n0=[0.04, 0.06], t_end=1000)
+    assert (early.sizes["point"], early.pairs_not_searched) == (0, 3)
+    assert picture.plot(early).axes[0].get_title() == "no boundary was searched"
+
+
+def test_a_cell_without_a_count_hides_its_own_pairs_alone() -> None:
+    """Counts begin at mu = 2; of nine cells the one in the middle has none, which is part of each square of four."""
+    axes = {"mu": [1.0, 1.5, 3.0], "b": [4.0, 5.0, 6.0]}
+    search, _ = searched(lambda mu, b: np.where((mu == 1.5) & (b == 5), np.nan, mu - 2), axes, 1e-3)
+    found = search.dataset()
+    assert sorted(found.b.values) == [4, 6]
+    np.testing.assert_allclose(found.mu, 2, rtol=1e-3)
+    assert found.pairs_not_searched == 1
+    lines = picture.plot(found.assign_attrs(sweep_kind="boundaries")).axes[0].lines
+    lone = [line for line in lines if line.get_gid() == "level1"]
+    assert [line.get_marker() for line in lone] == [".", "."]
+
+
 def test_a_map_without_boundaries_has_an_empty_picture(tmp_path: Path) -> None:
     none = sweep.boundaries(SCENE, output=tmp_path, **AXES, t_end=100.0)
     assert none.sizes["point"] == 0

@@ -12,6 +12,7 @@ from support.runs import Heard
 
 import sweep
 from sweep.config import load_config
+from sweep.kernels.status import DIVERGED
 from sweep.models.model import stack
 from sweep.plots.trajectories import reversal_times
 
@@ -116,6 +117,41 @@ def test_a_trajectory_goes_on_to_its_end_and_stays_where_a_sweep_says(n0: float,
 
 def test_a_trajectory_without_an_end_ends_when_it_has_settled(write: Write) -> None:
     assert float(sweep.trajectory(write(STANDARD), mu=75, n0=-0.006, t_end=float("inf")).t_stop[0]) < 20
+
+
+def test_more_samples_than_memory_holds_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.studies.trajectory.MAX_SAMPLES", 100)
+    config = load_config({"friction": {"mu": 60}}, {"t_end": 60.0})
+    with pytest.raises(sweep.ConfigError, match=r"every: the samples are too many .*; give 1\.2 "):
+        sweep.trajectory(config, b=[3, 4], every=1.1)
+    assert sweep.trajectory(config, b=[3, 4], every=1.2).sizes["time"] == 51
+
+
+def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
+    """Its step is beyond the stability limit, about 2.8 over the fastest rate of friction, so that no step is whole."""
+    one = sweep.trajectory(write(STANDARD), mu=100, method="dopri5", step=0.15).isel(trajectory=0)
+    assert (one.sizes["time"], float(one.time[0]), float(one.t_stop)) == (1, 0, 0)
+    assert one.status == DIVERGED
+    assert float(one.spin[0]) == pytest.approx(0.05)
+    assert float(one.table_x[0]) == float(one.heading[0]) == 0
+
+
+def test_a_body_of_unknown_shape_is_not_drawn(write: Write) -> None:
+    """A user's model has the attitude of a rigid body, and dimensions of its own."""
+    other = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0).rename({"a": "a1"})
+    with pytest.raises(sweep.ConfigError, match="no a, b and c"):
+        sweep.animate(other)
+
+
+@pytest.mark.browser
+def test_the_explorer_shows_no_body_of_unknown_shape(write: Write) -> None:
+    from sweep.explorer.player import Player
+    from sweep.explorer.runner import Curve
+
+    one, player = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0).isel(trajectory=0), Player([])
+    for shown, dataset in ((True, one), (False, one.rename({"a": "a1"}))):
+        player.show(Curve(dataset, np.zeros(0), 0.0), "#000000", 60.0)
+        assert player.figure.visible == shown
 
 
 def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
