@@ -156,12 +156,14 @@ def text_of(path: FilePath, error_of: Callable[[str], ConfigError] | None = None
     """
     try:
         data = path.read_bytes()
-        return data.decode("utf-16" if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
+        wide = data.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
+        reason = next((words for mark, words in _OTHER_FILES.items() if data.startswith(mark) and b"\0" in data), "")
+        if not reason:
+            return data.decode("utf-16" if wide else "utf-8-sig")
     except FileNotFoundError:
         reason = "no such file"
     except UnicodeDecodeError as error:
-        other = next((words for mark, words in _OTHER_FILES.items() if data.startswith(mark)), None)
-        reason = other or f"not UTF-8 text: byte {error.start}; save it as UTF-8"
+        reason = f"not UTF-8 text: byte {error.start}; save it as UTF-8"
     except (OSError, ValueError) as error:  # the name of a file may contain a NUL
         reason = f"cannot be read: {getattr(error, 'strerror', None) or error}"
     raise error_of(reason) if error_of else fault_of(reason, file=str(path))
