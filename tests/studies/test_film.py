@@ -1,11 +1,14 @@
 """Films as phones and trackers write them, and what is wrong with others."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support import Write
+from support.physics import STONE
 
+import sweep
 from sweep.config import ConfigError, film
 
 TIMES = np.arange(20) / 10
@@ -153,3 +156,33 @@ def test_repeated_instants_and_gaps_are_kept(write: Write) -> None:
     times = np.array([0, 0, 0.1, 0.2, 0.2, 3, 3.1, 3.2, 9])
     found = film.read(write(table("t,n", times, np.cos(times)), "film.csv"))
     np.testing.assert_array_equal(found.time, times)
+
+
+@pytest.mark.parametrize(
+    ("header", "clock", "words"),
+    [
+        (
+            "t,n",
+            1e9,
+            "the film lasts 1.9e+09, but trajectories 5; raise t_end, or cut the film; if its",
+        ),
+        ("t,n", 1e3, "name the unit in the header, such as 'time (ms)'"),
+        ("t (s),n", 1e3, "the film lasts 1900, but trajectories 5; raise t_end, or cut the film"),
+    ],
+)
+def test_a_film_in_another_unit_of_time_is_refused_before_it_is_followed(
+    write: Write, header: str, clock: float, words: str
+) -> None:
+    path = write(table(header, TIMES * clock, SPINS), "film.csv")
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        sweep.fit(write(STONE), path, ["mu"])
+    with pytest.raises(ConfigError, match="has rows 100 s apart if its times are in s; name the unit in the header"):
+        sweep.fit(
+            write(STONE.replace("t_end: 5", "t_end: 5000")), write(table("t,n", TIMES * 1e3, SPINS), "f.csv"), ["mu"]
+        )
+
+
+def test_a_film_in_seconds_is_none_of_a_body_in_the_paper_s_units(write: Write) -> None:
+    path = write(table("t (s),n", TIMES, SPINS), "film.csv")
+    with pytest.raises(ConfigError, match=r"the film gives times in s; set units: SI, or convert all to sqrt\(c/g\)"):
+        sweep.fit(write("friction: {mu: [30, 100]}\n"), path, ["mu"])
