@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 from math import pi
 
@@ -53,26 +54,60 @@ WRITTEN: dict[Unit, dict[str, float]] = {
     LENGTH: {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
     MASS: {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "oz": 0.028349523125, "lb": 0.45359237},
     MASS_DENSITY: {"kg/m3": 1.0, "g/cm3": 1e3},
+    INERTIA: {"kg m2": 1.0, "g cm2": 1e-7, "g mm2": 1e-9},
     ANGLE: {"rad": 1.0, "deg": _DEGREE, "°": _DEGREE},
-    TIME: {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    TIME: {"s": 1.0, "ms": 1e-3, "μs": 1e-6, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     SPIN: {"rad/s": 1.0, "1/s": 1.0, "deg/s": _DEGREE, "°/s": _DEGREE, "rpm": pi / 30},
+    SPEED: {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
+    SLOWNESS: {"s/m": 1.0, "s/cm": 1e2, "s/mm": 1e3},
+    ACCELERATION: {"m/s2": 1.0, "cm/s2": 1e-2},
+    DRAG: {"kg m2/s": 1.0, "N m s": 1.0, "g cm2/s": 1e-7},
 }
 """Units that users may write, in those of SI."""
 
-_NUMBER = r"[-+]?(?:\.\d+|\d+(?:\.\d*)?)(?:[eE][-+]?\d+)?"
-_QUANTITY = re.compile(rf"({_NUMBER}) *(?:(?:±|\+/?-) *({_NUMBER}))? *(\D.*)")
+NUMERAL = r"[-+−]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+−]?[0-9]+)?"
+"""Decimal digits, with a hyphen or a minus sign."""
+
+# A comma before three digits may set off thousands.
+_WITH_COMMA = r"(?![-+−]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9]))[-+−]?[0-9]+,[0-9]+"
+_QUANTITY = re.compile(rf"({_WITH_COMMA}|{NUMERAL}) *(?:(?:±|\+/?-) *({_WITH_COMMA}|{NUMERAL}))? *([^\d,.].*)")
+
+
+def number(text: str) -> float | None:
+    """The number that a text spells in decimal digits; None if it spells none."""
+    return float(text.replace("−", "-")) if re.fullmatch(NUMERAL, text) else None
 
 
 def factor(written: str, unit: Unit) -> float | None:
     """How many units of SI a unit is, such as 1000 for "g/cm3"; None if it is none, or one of something else."""
-    return WRITTEN[unit].get(written.replace("^", "").replace("³", "3"))
+    plain = re.sub(r"[ *·]+", " ", unicodedata.normalize("NFKC", written).replace("^", ""))
+    return WRITTEN.get(unit, {}).get(plain.strip())
 
 
 def quantity(text: str, unit: Unit) -> tuple[float, float] | None:
-    """A number and its error in SI, such as (0.12, 0.001) for "12.0+-0.1 cm"; None if the text is something else."""
+    """A number and its error in SI, such as (0.12, 0.001) for "12.0+-0.1 cm" or "12,0±0,1cm".
+
+    The result is None if the text is something else.
+    """
     found = _QUANTITY.fullmatch(text.strip())
     scale = factor(found[3], unit) if found else None
-    return (float(found[1]) * scale, float(found[2] or 0) * scale) if found and scale else None
+    if not found or not scale:
+        return None
+    value, error = (number((part or "0").replace(",", ".")) or 0.0 for part in (found[1], found[2]))
+    return value * scale, error * scale
+
+
+def unit_in(text: str) -> str:
+    """The unit that follows the number in a text, such as "cm" in "12 cm"; empty if there is none."""
+    found = _QUANTITY.fullmatch(text.strip())
+    return found[3].strip() if found else ""
+
+
+def unit_of(units: Unit | str) -> Unit | None:
+    """The unit itself where a user's model gives it as text, such as "radian" or "m/s"; None if that is none of SI."""
+    if isinstance(units, Unit):
+        return units
+    return next((unit for unit in WRITTEN if units == unit.si or factor(units, unit) == 1), None)
 
 
 def named(units: Unit | str, system: str) -> str:

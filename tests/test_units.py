@@ -51,7 +51,7 @@ def test_a_unit_has_its_dimension_in_both_systems(name: str) -> None:
 @pytest.mark.parametrize("unit", WRITTEN, ids=lambda unit: unit.si)
 def test_units_that_users_write_are_as_large_as_for_pint(unit: Unit) -> None:
     for written in WRITTEN[unit]:
-        size = PINT.Quantity(1.0, written.replace("3", "**3")).to_base_units()
+        size = PINT.Quantity(1.0, re.sub(r"([a-z])([23])", r"\1**\2", written)).to_base_units()
         assert size.dimensionality == as_pint(unit.si).dimensionality
         assert factor(written, unit) == pytest.approx(size.magnitude, rel=1e-15)
 
@@ -60,7 +60,22 @@ def test_a_quantity_is_a_number_with_its_error_and_its_unit() -> None:
     assert quantity(" 12.0+-0.1 cm", units.LENGTH) == (0.12, 0.001)
     assert quantity("1e3mm", units.LENGTH) == (1.0, 0.0)
     assert quantity("1.24±.02 g/cm³", units.MASS_DENSITY) == quantity("1.24+/-0.02g/cm^3", units.MASS_DENSITY)
-    for wrong in ("12", "cm", "12 c", "12 g", "1.2.3cm", "12 cm cm", "nan cm", "12+-cm"):
+    assert quantity("12,5cm", units.LENGTH) == quantity("12.5 cm", units.LENGTH)
+    assert quantity("−0,5±0,25 cm", units.LENGTH) == pytest.approx((-0.005, 0.0025), rel=1e-15)
+    assert quantity("2 kg·m²", units.INERTIA) == quantity("2 kg*m^2", units.INERTIA) == (2.0, 0.0)
+    for wrong in (
+        "1,250 cm",
+        "1,5,2 cm",
+        "12, cm",
+        "12",
+        "cm",
+        "12 c",
+        "12 g",
+        "1.2.3cm",
+        "12 cm cm",
+        "nan cm",
+        "12+-cm",
+    ):
         assert quantity(wrong, units.LENGTH) is None
 
 
@@ -68,6 +83,13 @@ PRINTED = {
     "kg m2 s-1": "kg m²/s", "radian s-1": "rad/s", "s m-1": "s/m", "m s-2": "m/s²", "s-1": "1/s", "m/s": "m/s", "": "",
     "W m-2 K-1": "W/(m² K)", "sqrt(g/c)": "√(g/c)", "m c2": "m c²", "m c sqrt(g c)": "m c √(g c)",
 }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*PARAMETERS, "density"])
+def test_every_parameter_with_a_unit_can_be_written_in_it(name: str) -> None:
+    unit = PARAMETERS[name].units if name in PARAMETERS else units.MASS_DENSITY
+    assert isinstance(unit, Unit)
+    assert (1.0 in WRITTEN.get(unit, {}).values()) == (unit != units.NUMBER)
 
 
 def test_figures_print_units_as_fractions_and_roots() -> None:

@@ -20,7 +20,7 @@ from sweep.models.model import Model
 from sweep.parameters import PARAMETERS, SI_ALONE, Parameter
 from sweep.results import dataset
 from sweep.results.probabilities import PROBABILITIES
-from sweep.units import PAPER_UNITS, SI, named, pretty
+from sweep.units import PAPER_UNITS, SI, WRITTEN, named, pretty
 from sweep.variables import Variable
 
 Row = tuple[str, ...]
@@ -43,6 +43,10 @@ def _parameters() -> tuple[Row, list[Row]]:
 def _unit(of: Parameter | Variable) -> str:
     """The paper's unit and that of SI, if they differ."""
     return " or ".join(dict.fromkeys(pretty(named(of.units, system)) for system in (PAPER_UNITS, SI)))
+
+
+def _units() -> tuple[Row, list[Row]]:
+    return ("in SI", "also written"), [(pretty(unit.si), ", ".join(names)) for unit, names in WRITTEN.items()]
 
 
 def _settings() -> tuple[Row, list[Row]]:
@@ -137,6 +141,7 @@ def _directive(make: Callable[[], tuple[Row, list[Row]]]) -> type[SphinxDirectiv
 def setup(app: Sphinx) -> dict[str, bool]:
     for name, make in (
         ("parameters", _parameters),
+        ("units", _units),
         ("settings", _settings),
         ("variables", _variables),
         ("statuses", _statuses),

@@ -13,13 +13,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from sweep import faults
 from sweep.config import cases, cross_checks, document, film, schema, user_models
 from sweep.config.configuration import FIRST_AXES, Config, film_in, model_of
 from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
 from sweep.config.messages import describe
 from sweep.config.schema import Integrator
-from sweep.config.values import Values
+from sweep.config.values import Values, in_si
 from sweep.faults import ConfigError, Fault
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
@@ -32,7 +33,7 @@ from sweep.models.model import MODES, Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.parameters import PARAMETERS, Parameter, sections
-from sweep.units import SI
+from sweep.units import SI, TIME
 
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 
@@ -118,7 +119,7 @@ def _source(config: ConfigLike) -> document.Document:
     known["model", config.model] = config.origin
     if config.cases and not config.samples:
         values["cases"] = config.cases_file or "cases"
-        known["cases", values["cases"]] = config.cases
+        known["cases", values["cases"]] = config.cases, {}
     return document.Document("", values, known=known)
 
 
@@ -134,8 +135,10 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     known = loading.table(origin)
     given = _given(values, source, known)
     columns: cases.Columns = {}
+    units_of_cases: dict[faults.Path, str] = {}
     if values.cases is not None:  # it may be ""
-        columns = source.once("cases", values.cases, lambda: cases.read(source, values.cases, known))
+        columns, units = source.once("cases", values.cases, lambda: cases.read(source, values.cases, known))
+        units_of_cases = {("cases", name): unit for name, unit in units.items() if unit}
     seen = film_in(values.measure or ())
     physics = _physics(values, origin, frozenset((*given, *columns)))
     _refuse(source, cross_checks.of_physics(values, physics, origin))
@@ -167,6 +170,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         origin=origin,
     )
     object.__setattr__(config, "source", source)
+    _refuse(source, cross_checks.of_units(config, _written(source, given, known) | units_of_cases))
     _refuse(source, cross_checks.of_values(config, given))
     user_models.try_out(config)
     _refuse(source, islice(cross_checks.of_all_cells(config), 1))
@@ -195,6 +199,15 @@ def _given(values: Any, source: document.Document, known: Mapping[str, Parameter
     if known is PARAMETERS and "offset" in found and found["offset"].spec == 0.0:
         del found["offset"]  # the default: it does not make a body other than the paper's
     return found
+
+
+def _written(
+    source: document.Document, given: Mapping[str, Values], known: Mapping[str, Parameter]
+) -> dict[faults.Path, str]:
+    """Collect the units that the document gives to values, by path."""
+    found = {known[name].place: value.unit for name, value in given.items() if value.unit}
+    settings = source.values.get("integrator", {}).items()
+    return found | {("integrator", name): unit for name, raw in settings if (unit := in_si(TIME, raw)[1])}
 
 
 def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physics:

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from sweep import faults
-from sweep.config.document import Document, is_number, number
-from sweep.config.values import MAX_AXIS
-from sweep.faults import ConfigError, Fault, brief, refusal, suggestion
+from sweep.config import tables
+from sweep.config.document import Document, is_number
+from sweep.config.values import MAX_AXIS, in_si, instead
+from sweep.faults import ConfigError, Fault, brief, fault_of, refusal, suggestion
 from sweep.parameters import Parameter
+from sweep.units import ANGLE, Unit
 
 Columns = dict[str, tuple[float, ...]]
 """The numbers of each parameter, by name."""
 
+Units = dict[str, str]
+"""The units that the table gives to columns, by name."""
+
 Place = Callable[[faults.Path, str], Fault]
 """Makes a fault of its path in a table, such as the name of a column and the number of a row, and of its words."""
 
-_Table = tuple[dict[str, list[Any]], Place, list[Fault]]
-"""The columns of a file, what makes faults in it, and those of its shape."""
 
-
-def read(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns:
+def read(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
     """Read the table `name`, a path relative to the configuration's folder, and check it cell by cell.
 
     Parameters
@@ -32,7 +32,7 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns
 
     Returns
     -------
-    The columns by name.
+    The columns in units of SI where the table gives units, and these units.
 
     Raises
     ------
@@ -42,56 +42,43 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> Columns
     if name.endswith(".parquet"):
         words = "Parquet files have ended; read it with pandas and pass the DataFrame, or save it as CSV"
         raise ConfigError([source.fault(("cases",), f"{brief(name)}: {words}")])
-    return _checked(*_of_csv(source, name), known)
-
-
-def of_columns(source: Document, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> Columns:
-    """Check a table that the configuration itself gives, by column; result and errors are as of `read`."""
-    return _checked(table, lambda path, words: source.fault(("cases", *path), words), [], known)
-
-
-def _of_csv(source: Document, name: str) -> _Table:
-    """The columns of a CSV file, of numbers where its cells spell such."""
     path, text = source.read_beside("cases", name)
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if row]
-    except csv.Error as error:
-        reason = f"{brief(str(path))}: not a readable CSV file: {error}"
-        raise ConfigError([source.fault(("cases",), reason)]) from None
-    (top, header), *rows = lines or [(1, [])]
-    misshapen = list(_misshapen(str(path), top, header, rows))
-    rows = [(line, row) for line, row in rows if len(row) == len(header)]
-    if not 0 < len(rows) <= MAX_AXIS:
-        raise ConfigError(misshapen)
-    cells = [[text if (value := number(text)) is None else value for text in row] for _, row in rows]
+    table = tables.read(str(path), text)
+    first = {each: i for i, each in reversed([*enumerate(table.names)])}
+    if again := [i for i, each in enumerate(table.names) if first[each] != i]:
+        raise ConfigError(table.fault("a second column of this name; remove one of the two", i) for i in again)
+    if not 0 < len(table.rows) <= MAX_AXIS:
+        words = f"must have 1 to {MAX_AXIS} rows under its first line, not {len(table.rows)}"
+        raise fault_of(words, file=table.file)
+    cells: dict[str, list[Any]] = {each: list(table.numbers(i)) for i, each in enumerate(table.names)}
+    units: Units = {}
+    for i, each in enumerate(table.names):
+        if table.units[i] and each in known:
+            scale, of = table.scale(i, known[each].units), known[each].units
+            units[each] = table.units[i] if isinstance(of, Unit) and of != ANGLE else ""
+            cells[each] = [cell * scale if is_number(cell) else cell for cell in cells[each]]
 
     def place(at: faults.Path, words: str) -> Fault:
         name, *row = at
-        line = rows[int(row[0])][0] if row else top
-        return Fault(str(path), line, header.index(str(name)) + 1, (name,), words)
+        return table.fault(words, table.names.index(str(name)), *map(int, row))
 
-    return {name: [row[i] for row in cells] for i, name in enumerate(header)}, place, misshapen
-
-
-def _misshapen(file: str, top: int, header: list[str], rows: list[tuple[int, list[str]]]) -> Iterator[Fault]:
-    if not header:
-        yield Fault(file, None, None, (), "empty; its first line has to name the columns, such as mu,n0")
-    elif not 0 < len(rows) <= MAX_AXIS:
-        yield Fault(file, None, None, (), f"must have 1 to {MAX_AXIS} rows under its first line, not {len(rows)}")
-    first: dict[str, int] = {}
-    for column, name in enumerate(header, start=1):
-        if first.setdefault(name, column) != column:
-            yield Fault(file, top, column, (name,), "a second column of this name; remove one of the two")
-    for line, row in rows:
-        if len(row) != len(header):
-            yield Fault(file, line, None, (), f"{len(row)} values, but {len(header)} columns in line {top}")
+    columns, more = _checked(cells, place, known)
+    return columns, more | units
 
 
-def _checked(table: Mapping[str, Any], place: Place, misshapen: list[Fault], known: Mapping[str, Parameter]) -> Columns:
-    if found := [*misshapen, *(place(path, words) for path, words in _wrong(table, known))]:
+def of_columns(source: Document, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
+    """Check a table that the configuration itself gives, by column; result and errors are as of `read`."""
+    return _checked(table, lambda path, words: source.fault(("cases", *path), words), known)
+
+
+def _checked(table: Mapping[str, Any], place: Place, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
+    read = {name: in_si(known[name].units if name in known else "", column) for name, column in table.items()}
+    columns = {name: column for name, (column, _) in read.items()}
+    if found := [place(path, words) for path, words in _wrong(columns, known)]:
         raise ConfigError(found)
-    return {name: tuple(map(float, column)) for name, column in table.items()}
+    return {name: tuple(map(float, column)) for name, column in columns.items()}, {
+        n: unit for n, (_, unit) in read.items()
+    }
 
 
 def _wrong(table: Mapping[str, Any], known: Mapping[str, Parameter]) -> Iterator[tuple[faults.Path, str]]:
@@ -107,4 +94,4 @@ def _wrong(table: Mapping[str, Any], known: Mapping[str, Parameter]) -> Iterator
         else:
             for i, each in enumerate(column):
                 if not is_number(each) or not known[name].allows(each):
-                    yield (name, i), refusal(each, known[name].allowed)
+                    yield (name, i), refusal(each, known[name].allowed) + instead(each, known[name])

@@ -29,7 +29,7 @@ from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.parameters import Parameter, sections
-from sweep.units import NUMBER, PAPER_UNITS
+from sweep.units import NUMBER, PAPER_UNITS, SI, TIME, named
 from sweep.variables import attributes
 
 # Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
@@ -174,6 +174,13 @@ class Config:
             parameter = replace(parameter, units=NUMBER, description="Coefficient of friction.")
         parameter = replace(parameter, **SURFACES[self.surface].meanings.get(name, {}))
         return {**attributes(parameter, self.units), **known}
+
+    def unitless(self, name: str, written: str) -> str:
+        """Say why a parameter, or a time of the integrator, cannot have the unit that is `written`; "" if it can."""
+        own = self.described(name).get("units", "") if name in self.table else named(TIME, self.units)
+        if not own:
+            return f"is a pure number here; leave out {written}"
+        return "" if self.units == SI else f"is in {own} here; give the number without {written}, or set units: SI"
 
     def document(self) -> dict[str, Any]:
         """The whole configuration, defaults included, as plain data."""

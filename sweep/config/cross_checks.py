@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from sweep.config.configuration import Config
+from sweep.config.film import Film
 from sweep.config.schema import MAX_CELLS_IN_MEMORY
 from sweep.config.values import Values
 from sweep.faults import Path, either
@@ -27,6 +28,7 @@ from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.parameters import PARAMETERS
+from sweep.units import SI, TIME, named
 
 MAX_CELLS = 1_000_000_000
 MAX_STEPS = 1e15
@@ -57,6 +59,13 @@ def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
         yield from _of_refinement(config)
     for i, spec in enumerate(config.measure):
         yield from ((("measure", i), reason) for reason in _unmeasurable(spec.partition("=")[0], config))
+
+
+def of_units(config: Config, written: Mapping[Path, str]) -> Iterator[Misfit]:
+    """Check that values with units, which are `written` by path, can have such in the units of the configuration."""
+    for path, unit in written.items():
+        if reason := config.unitless(str(path[-1]), unit):
+            yield path, reason
 
 
 def of_all_cells(config: Config) -> Iterator[Misfit]:
@@ -137,13 +146,35 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
         able = either(each for each, found in methods.METHODS.items() if found.takes_every_step)
         yield f"{name} cannot be measured with method: {method.name}; choose {able}"
     elif kind is misfit.Misfit and config.film:
-        last, end = config.film.time[-1], config.integrator.patient.t_end
         if config.film.what != "spin":
             yield f"the film {config.film_file} is of a {config.film.what}, and a misfit one of spins; use sweep fit"
-        if last > end:
-            yield f"the film {config.film_file} lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
+        if reason := unlike(config, config.film):
+            yield f"the film {config.film_file} {reason}"
     elif TANGENT in kind.follows and isinstance(model, Model) and (reason := undifferentiable(model)):
         yield f"{name} cannot be measured on the {model.name} model: {reason}; leave it out"
+
+
+def unlike(config: Config, film: Film) -> str:
+    """Say why a film cannot be one of trajectories of `config`; "" if it can.
+
+    A film in another unit than it seems is a million times too long, and takes as much longer to follow.
+    """
+    last, end = float(film.time[-1]), config.integrator.patient.t_end
+    given = "name the unit in the header, such as 'time (ms)'"
+    if film.clock and config.units != SI:
+        other = named(TIME, config.units) or "those of the model"
+        return f"gives times in {film.clock}; set units: SI, or convert all to {other} and name no unit"
+    if last > end:
+        words = f"lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
+        return f"{words}; if its times are in a unit such as ms, {given}" if film.clock == "" else words
+    gap = float(np.median(np.diff(film.time)))
+    if film.clock == "" and config.units == SI and gap >= _SLOW:
+        return f"has rows {gap:g} s apart if its times are in s; {given}"
+    return ""
+
+
+_SLOW = 1.0
+"""Seconds between rows, beyond which the unit of time has to be named: a film shows no rattle then."""
 
 
 def _unusable_step(config: Config) -> str:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import os
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from math import inf, nan
 from pathlib import Path as FilePath
 from typing import Any, TypeGuard
@@ -21,10 +22,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from sweep.faults import ConfigError, Fault, Path, brief, fault_of
+from sweep.units import NUMERAL
+from sweep.units import number as number
 
-_NUMBER = r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
-_FLOAT = re.compile(_NUMBER)
-_RANGE = re.compile(rf"(?P<start>{_NUMBER})\.\.(?P<stop>{_NUMBER}):(?P<num>{_NUMBER})")
+_RANGE = re.compile(rf"({NUMERAL}[^.:]*)\.\.({NUMERAL}[^.:]*):({NUMERAL})")
 _WORDS = {"true": True, "false": False, "null": None, "~": None, "": None, ".inf": inf, "-.inf": -inf, ".nan": nan}
 
 _DEEPEST = 100
@@ -63,7 +64,7 @@ class Document:
             if the file cannot be read.
         """
         path = FilePath(self.file).parent / name
-        return path, _read(path, lambda reason: ConfigError([self.fault((key,), f"{brief(str(path))}: {reason}")]))
+        return path, text_of(path, lambda reason: ConfigError([self.fault((key,), f"{brief(str(path))}: {reason}")]))
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
         """A fault at `path`; it is placed at the nearest section above if the document lacks that path."""
@@ -114,7 +115,7 @@ def plain_data(value: Any) -> Any:
 
 def read(path: FilePath) -> Document:
     """Read a YAML file; a `ConfigError` says what is wrong with it and where."""
-    text = _read(path, lambda reason: fault_of(reason, file=str(path)))
+    text = text_of(path)
     node = _compose(text, str(path))
     if not isinstance(node, MappingNode):
         raise ConfigError([Fault(str(path), 1, 1, (), "a configuration is a mapping of keys to values")])
@@ -126,7 +127,8 @@ def read(path: FilePath) -> Document:
 def parse_value(text: str, source: str) -> Any:
     """The value of a command line's text: START..STOP:NUM as a range, else YAML; a `ConfigError` names `source`."""
     if span := _RANGE.fullmatch(text):
-        return {"start": float(span["start"]), "stop": float(span["stop"]), "num": float(span["num"])}
+        start, stop, num = (text.strip() if (value := number(text)) is None else value for text in span.groups())
+        return {"start": start, "stop": stop, "num": num}
     node = _compose(text, source)
     return None if node is None else _values(node, Document(source))
 
@@ -136,22 +138,35 @@ def is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def number(text: str) -> float | None:
-    """The number that `text` spells in decimal digits; None if it does not spell one."""
-    return float(text) if _FLOAT.fullmatch(text) else None
+_OTHER_FILES = {
+    b"\x89HDF": "a dataset, not text; its attribute `config` holds the configuration, and `sweep info` describes it",
+    b"CDF": "a dataset, not text; its attribute `config` holds the configuration, and `sweep info` describes it",
+    b"PK": "a spreadsheet or another archive, not text; save it as CSV (UTF-8)",
+}
+"""What files are that begin with these bytes, and what to do."""
 
 
-def _read(path: FilePath, error_of: Callable[[str], ConfigError]) -> str:
-    """The text of a file; if it cannot be read, what `error_of` makes of the reason is raised."""
+def text_of(path: FilePath, error_of: Callable[[str], ConfigError] | None = None) -> str:
+    """The text of a file, in UTF-8, or in UTF-16 if it begins with a mark of that.
+
+    Raises
+    ------
+    ConfigError
+        if the file cannot be read: what `error_of` makes of the reason, by default a fault of the file.
+    """
     try:
-        return path.read_text(encoding="utf-8-sig")
+        data = path.read_bytes()
+        wide = data.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
+        reason = next((words for mark, words in _OTHER_FILES.items() if data.startswith(mark) and b"\0" in data), "")
+        if not reason:
+            return data.decode("utf-16" if wide else "utf-8-sig")
     except FileNotFoundError:
         reason = "no such file"
     except UnicodeDecodeError as error:
-        reason = f"not UTF-8 text: byte {error.start}"
+        reason = f"not UTF-8 text: byte {error.start}; save it as UTF-8"
     except (OSError, ValueError) as error:  # the name of a file may contain a NUL
         reason = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-    raise error_of(reason)
+    raise error_of(reason) if error_of else fault_of(reason, file=str(path))
 
 
 def _compose(text: str, file: str) -> Node | None:
@@ -184,23 +199,39 @@ def _values(root: Node, document: Document) -> Any:
         if isinstance(node, ScalarNode):
             return _scalar(node)
         if isinstance(node, SequenceNode):
+            for before, item in pairwise(node.value):
+                if (whole := _cut(before, item)) and number(whole) is None:
+                    words = f"a comma ends an item of a list; write {whole}, or put a space after the comma"
+                    faults.append(document.fault(path, words))
             return [convert(item, (*path, i)) for i, item in enumerate(node.value)]
         result: dict[str, Any] = {}
+        last, at = node, path
         for name, value in node.value:
             inner = (*path, name.value) if isinstance(name, ScalarNode) else path
             if inner == path:
                 faults.append(Fault(document.file, *_place(name), path, "a key must be a word"))
+            elif (whole := _cut(last, name)) and value.value == "":
+                words = f"a comma ends a value in braces; write {whole} for one number, [{last.value}, …] for a list"
+                faults.append(Fault(document.file, *_place(last), at, words))
             elif name.value in result:
                 (line, _), _ = document.places[inner]
                 faults.append(Fault(document.file, *_place(name), inner, f"duplicate key, first on line {line}"))
             else:
                 result[name.value] = convert(value, inner, _place(name))
+            last, at = value, inner
         return result
 
     values = convert(root, ())
     if faults:
         raise ConfigError(faults)
     return values
+
+
+def _cut(before: Node, after: Node) -> str:
+    """The number, perhaps with a unit, that a decimal comma between two nodes has cut into these; "" if none has."""
+    texts = [node.value if isinstance(node, ScalarNode) and node.style is None else "" for node in (before, after)]
+    close = after.start_mark.index == before.end_mark.index + 1
+    return ".".join(texts) if close and re.fullmatch(r"[-+−]?[0-9]+,[0-9]+[^0-9]*", ",".join(texts)) else ""
 
 
 def _place(node: Node) -> Place:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,15 +12,16 @@ from typing import get_args
 
 import numpy as np
 
-from sweep.faults import ConfigError, Fault, brief, either
+from sweep.config import tables
+from sweep.config.document import text_of
+from sweep.config.tables import GAPS, SEPARATORS, Table
+from sweep.faults import ConfigError, brief, either, fault_of
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
-from sweep.units import ANGLE, SPIN, TIME, WRITTEN, Unit, factor
+from sweep.units import ANGLE, SPIN, TIME, Unit
 
 MOST_ROWS = 20_000
 """Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
-
-_NO_TABLE = "no table; the first line must name all columns, with semicolons between them if numbers have commas"
 
 # What trackers and phones (phyphox) call their columns, without the unit in parentheses.
 _NAMES: dict[str, tuple[str, ...]] = {
@@ -45,6 +47,10 @@ class Film:
     the angle in radian, without wraps, by which the body's x axis has turned, seen from above."""
     left_out: int = 0
     """Rows that hold no number, or that are too many."""
+    why: str = ""
+    """Which these are, in words."""
+    clock: str | None = None
+    """The unit of time that the table gives, or "" if it gives none; None for a film that is no table."""
 
     @property
     def errors(self) -> Array:
@@ -67,76 +73,81 @@ def read(path: str | Path) -> Film:
     Raises
     ------
     ConfigError
-        if there is no such file, or it has no time, nothing that is seen, an unknown unit, a time that goes back, or
-        too few rows.
+        if there is no such file, or it has no time, nothing that is seen, an unknown unit, a time that goes back, too
+        few rows, or text instead of numbers.
     """
-    path = Path(path)
-    header, rows = _rows(path)
-    found = _columns(header)
+    table = tables.read(str(path), text_of(Path(path)))
+    found = _columns(table.names)
     what = next((each for each in get_args(Seen) if each in found), None)
     if "time" not in found or not what:
         names = either(f"'{name}'" for name in ("spin (rad/s)", "gyroscope z (rad/s)", "heading (deg)"))
-        raise _fault(path, 1, f"needs a column 'time (s)' and one {names}; it has {brief(', '.join(header))}")
-
-    def column(name: str, unit: Unit) -> Array:
-        """The column in SI; without a unit it is in SI already, and an error in the unit of what is seen."""
-        place, written = found[name]
-        written = written or (found[what][1] if name == "error" else "")
-        if (scale := factor(written, unit) if written else 1.0) is None:
-            raise _fault(path, 1, f"{name} is in '{brief(written, 20)}'; its unit must be {either(WRITTEN[unit])}")
-        return np.asarray(rows[:, place] * scale)
-
-    unit = ANGLE if what == "heading" else SPIN
-    time, value = column("time", TIME), column(what, unit)
-    error = column("error", unit) if "error" in found else None
-    whole = np.isfinite(time) & np.isfinite(value)
-    back = np.flatnonzero(np.diff(time[whole]) < 0)
-    if len(back):
-        raise _fault(path, int(np.flatnonzero(whole)[back[0] + 1]) + 2, "the time goes back; sort the rows by time")
-    if error is not None and not np.all(error[whole] > 0):
-        raise _fault(path, int(np.flatnonzero(whole & ~(error > 0))[0]) + 2, "the error must be a number > 0")
-    kept = np.flatnonzero(whole)
+        words = f"needs a column 'time (s)' and one {names}; it has {brief(', '.join(table.names))}"
+        words += "" if len(table.names) > 1 else f", with no {either(SEPARATORS.values())} in the line"
+        raise fault_of(words, file=str(path), line=table.top)
+    if "error" in found and not table.units[found["error"]]:
+        table.units[found["error"]] = table.units[found[what]]
+    gaps: dict[int, str] = {}
+    units = {"time": TIME, "error": ANGLE if what == "heading" else SPIN}
+    time, value, error = (
+        _column(table, found[name], units.get(name, units["error"]), gaps) if name in found else None
+        for name in ("time", what, "error")
+    )
+    assert time is not None
+    assert value is not None
+    whole = np.flatnonzero(np.isfinite(time) & np.isfinite(value))
+    if len(back := np.flatnonzero(np.diff(time[whole]) < 0)):
+        words = "the time goes back; sort the rows by time"
+        raise ConfigError([table.fault(words, found["time"], int(whole[back[0] + 1]))])
+    if error is not None and len(wrong := whole[~(error[whole] > 0)]):
+        raise ConfigError([table.fault("the error must be a number > 0", found["error"], int(wrong[0]))])
     if what == "heading":
-        value[kept] = np.unwrap(value[kept])
-    kept = kept[:: -(-len(kept) // MOST_ROWS)] if len(kept) else kept
+        value[whole] = np.unwrap(value[whole])
+    every = -(-len(whole) // MOST_ROWS) or 1
+    kept = whole[::every]
     if len(kept) < 8 or time[kept[-1]] == time[kept[0]]:
         need = "a fit needs at least 8, not all at one time"
-        raise _fault(path, None, f"has {len(kept)} rows with a time and a {what}; {need}")
-    error = None if error is None else error[kept]
-    return Film(time[kept] - time[kept[0]], value[kept], error, what, len(rows) - len(kept))
+        raise fault_of(f"has {len(kept)} rows with a time and a {what}; {need}", file=str(path))
+    return Film(
+        time[kept] - time[kept[0]], value[kept], None if error is None else error[kept], what,
+        left_out=len(time) - len(kept), why=_why(len(time) - len(whole), gaps, len(whole), every),
+        clock=table.units[found["time"]],
+    )  # fmt: skip
 
 
-def _rows(path: Path) -> tuple[list[str], Array]:
-    """The header, and the numbers below it; NaN where there is none."""
-    import pandas
-
-    try:
-        with path.open(encoding="utf-8-sig") as stream:
-            first = stream.readline()
-        mark = max(",;\t", key=first.count)
-        table = pandas.read_csv(
-            path, sep=mark, encoding="utf-8-sig", dtype=str, keep_default_na=False, skip_blank_lines=False
-        )
-    except (OSError, ValueError) as error:
-        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", _NO_TABLE)
-        raise _fault(path, None, f"cannot be read: {reason}") from None
-    if not isinstance(table.index, pandas.RangeIndex):  # of columns without a name, to their left for pandas
-        raise _fault(path, 2, _NO_TABLE)
-    points = table.apply(lambda column: column.str.replace(",", "."))  # of numbers with decimal commas
-    return list(map(str.strip, table)), points.apply(pandas.to_numeric, errors="coerce").to_numpy(float)
-
-
-def _columns(header: list[str]) -> dict[str, tuple[int, str]]:
-    """The place and the unit of each known column."""
-    found: dict[str, tuple[int, str]] = {}
-    for place, written in enumerate(header):
-        name, _, unit = (part.strip() for part in re.sub(r"[)\]]\s*$", "", written).replace("[", "(").partition("("))
-        plain = re.sub(r"[_\s]+", " ", name).lower()
-        for what, names in _NAMES.items():
-            if plain in names:
-                found.setdefault(what, (place, unit))
+def _columns(names: Sequence[str]) -> dict[str, int]:
+    """The place of each known column."""
+    found: dict[str, int] = {}
+    for place, written in enumerate(names):
+        plain = re.sub(r"[_\s]+", " ", written).lower()
+        for what, known in _NAMES.items():
+            if plain in known:
+                found.setdefault(what, place)
     return found
 
 
-def _fault(path: Path, line: int | None, message: str) -> ConfigError:
-    return ConfigError([Fault(str(path), line, None, (), message)])
+def _column(table: Table, place: int, unit: Unit, gaps: dict[int, str]) -> Array:
+    """A column in SI, with NaN for cells without a number, which are noted in `gaps` by row; shape (rows,).
+
+    A spelling of numbers that is not understood would leave out one half of a motion, such as all that is negative.
+    """
+    scale, cells = table.scale(place, unit), table.numbers(place)
+    texts = {row: cell for row, cell in enumerate(cells) if isinstance(cell, str)}
+    gaps |= texts
+    odd = [row for row, cell in texts.items() if cell.lower() not in GAPS]
+    if strange := [row for row in odd if not re.search("[^\\W\\d_]", texts[row])] or odd[: len(odd) * 10 // len(cells)]:
+        words = f"'{brief(texts[strange[0]], 40)}' is no number, as are {len(odd)} of {len(cells)} cells"
+        words += "; write numbers alone, with the unit in the header, and leave cells without one empty"
+        raise ConfigError([table.fault(words, place, strange[0])])
+    return np.array([np.nan if isinstance(cell, str) else cell * scale for cell in cells])
+
+
+def _why(missing: int, gaps: Mapping[int, str], whole: int, every: int) -> str:
+    """Say which rows of a film are left out: those of `gaps`, and all but `every` so-manieth of the `whole` ones."""
+    example = next((text for text in gaps.values() if text.lower() not in GAPS), "")
+    words = (
+        [f"{missing} rows without a number" + (f" (one has '{brief(example, 40)}')" if example else "")]
+        if missing
+        else []
+    )
+    words += [f"all but each {every}th of {whole} rows, as more would hardly add knowledge"] if every > 1 else []
+    return " and ".join(words)

@@ -6,12 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from sweep.config.values import instead
 from sweep.faults import either, fault_of, printable, refusal
 from sweep.models.general import meshes, solids
 from sweep.parameters import PARAMETERS, Parameter
-from sweep.units import SI, WRITTEN, Unit, named, quantity
+from sweep.units import SI, WRITTEN, Unit, named, quantity, unit_in
 
 _MILLIMETRE = 1e-3
+_LEAST = 1.0
+"""Longest size in millimetres below which a shape must be in another unit."""
 _MASS = ("mass", "density")
 _AXES = [[size, *filter(None, [solids.RADII.get(axis)]), axis] for axis, size in solids.SIZES.items()]
 """For each semi-axis, the names of the measurements that tell it."""
@@ -24,7 +29,7 @@ _SOLID = """\
 # The axes of inertia are then turned by the angle; without one, nothing tells one sense of spin from the other.
 """
 _SHAPE = """\
-# A homogeneous solid of the shape {file}, in millimetres and z up, by `python -m sweep body` from
+# A homogeneous solid of the shape {file}, in millimetres ({sizes}) and z up, by `python -m sweep body` from
 #   {said}.
 # Its inertia is an integral over the tetrahedra of its triangles and a point, by the divergence theorem.  The ellipsoid
 # of a, b and c is fitted to the lowest tenth of its height, within {misfit:.2g} m.
@@ -69,7 +74,8 @@ def measured(name: str, text: str, parameter: Parameter) -> Measured:
     option, unit = _option(name), parameter.units
     assert isinstance(unit, Unit)
     if not (found := quantity(text, unit)):
-        raise fault_of(refusal(text, f"a number with its unit ({either(WRITTEN[unit])})"), file=option)
+        words = refusal(text, f"a number with its unit ({either(WRITTEN[unit])})")
+        raise fault_of(words + ("" if unit_in(text) else instead(text, parameter)), file=option)
     value, error = found
     if not (parameter.allows(value) and 0 <= error < float("inf")):
         raise fault_of(refusal(text, f"{parameter.allowed}, in {unit.si}, with an error >= 0"), file=option)
@@ -107,10 +113,14 @@ def of_shape(given: Given, file: Path) -> str:
     for name in [each for each in given if each not in _MASS]:
         raise fault_of("cannot be combined with --stl; leave out one of the two", file=_option(name))
     try:
-        solid = meshes.mesh(meshes.triangles(file.read_bytes()) * _MILLIMETRE)
+        corners = meshes.triangles(file.read_bytes())
+        sizes = " x ".join(f"{size:.4g}" for size in np.ptp(corners, axis=(0, 1)))
+        if np.ptp(corners, axis=(0, 1)).max() < _LEAST:
+            raise ValueError(f"read in millimetres, the shape is {sizes}; scale it, by 1000 if it is in metres")
+        solid = meshes.mesh(corners * _MILLIMETRE)
     except ValueError as error:
         raise fault_of(str(error), file=f"--stl {file}") from None
-    head = _SHAPE.format(file=printable(file.name), said=_said(given), misfit=solid.misfit)
+    head = _SHAPE.format(file=printable(file.name), sizes=sizes, said=_said(given), misfit=solid.misfit)
     return head + _body(lambda numbers: meshes.body(solid, numbers), given)
 
 
@@ -138,7 +148,7 @@ def _check_names(given: Given, needed: Sequence[Sequence[str]]) -> None:
     """Refuse that all names of a group are missing, and two that tell the same."""
     for names in needed:
         if not given.keys() & {*names}:
-            raise fault_of(f"not all is known; give {either(map(_option, names))} as well", file="body")
+            raise fault_of(f"a measurement is missing; add {either(map(_option, names))}", file="body")
     for twice in (_MASS, *solids.RADII.items()):
         if {*twice} <= given.keys():
             one, other = map(_option, twice)

@@ -5,6 +5,7 @@ Of pydantic's errors only the type and the place are used, never the text.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from types import NoneType
 from typing import Any, Literal, get_args, get_origin
@@ -15,6 +16,12 @@ from pydantic_core import PydanticCustomError
 
 from sweep.ended import ended
 from sweep.faults import Path, either, refusal, suggestion
+
+_SIDEWAYS = re.compile(r"(?:offset|com|cm|cent(?:re|er)(?:_of_(?:mass|gravity))?)_?[xy12]|[xy]_?(?:offset|com|cm|s|g)")
+_OFF_AXIS = (
+    ": the centre of mass lies on the axis through the surface's centre and lowest point, offset below that centre; "
+    "no model has it off this axis"
+)
 
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _KINDS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a word"}
@@ -41,8 +48,9 @@ def describe(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple
         if not path:
             found[path] = "a key that is no text; correct its spelling", False
         elif kind == "extra_forbidden":
-            meant = _other_key(path[-1], section, sections)
-            unknown = f"unknown key{meant}; the keys here are {', '.join(section.model_fields)}"
+            key = str(path[-1])
+            more = _OFF_AXIS if _SIDEWAYS.fullmatch(key) else _other_key(key, section, sections)
+            unknown = f"unknown key{more}; the keys here are {', '.join(section.model_fields)}"
             found[path] = ended(".".join(map(str, path))) or unknown, True
         elif kind == "value":
             found[*path, *error["ctx"]["at"]] = error["ctx"]["reason"], False

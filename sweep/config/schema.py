@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
 
 from sweep.config.messages import Allowed, wrong
-from sweep.config.values import MAX_AXIS, Strict, Whole, parse_values, whole
+from sweep.config.values import MAX_AXIS, Strict, Whole, in_si, parse_values, whole
 from sweep.ended import ended
 from sweep.faults import either, refusal
 from sweep.kernels.measures import MEASURES
@@ -25,7 +25,7 @@ from sweep.models.general.variants import PAPER_LAW
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.parameters import PARAMETERS, Parameter, sections
-from sweep.units import PAPER_UNITS, SI
+from sweep.units import PAPER_UNITS, SI, TIME
 
 
 def _measures(raw: Any) -> Any:
@@ -87,15 +87,20 @@ MAX_CELLS_IN_MEMORY = 2**24
 """Most cells of a run of samples or of a refined one, which hold all their arrays in memory."""
 
 
+def _in_si(raw: Any) -> Any:
+    """A time such as "2 min" in s."""
+    return in_si(TIME, raw)[0]
+
+
 class Integrator(Strict):
     method: Literal[(*METHODS, AUTO)] = Field(  # type: ignore[valid-type]
         default=AUTO, description="integration method; `auto` chooses the faster one for each cell"
     )
     """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time.  With a number
     for `step`, and for a model that only one method can integrate, that is the default."""
-    step: Annotated[Annotated[float, Field(gt=0)] | Literal["auto"], Allowed("auto or a finite number > 0")] = Field(
-        default="auto", description="fixed step in sqrt(c/g) or, with `units: SI`, in s; or `auto`"
-    )
+    step: Annotated[
+        Annotated[float, Field(gt=0)] | Literal["auto"], BeforeValidator(_in_si), Allowed("auto or a finite number > 0")
+    ] = Field(default="auto", description="fixed step in sqrt(c/g) or, with `units: SI`, in s; or `auto`")
     tolerance: float = Field(
         default=TOLERANCE, ge=1e-14, lt=1,
         description="error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep",
@@ -107,7 +112,7 @@ class Integrator(Strict):
     )
     t_end: Annotated[
         float,
-        BeforeValidator(lambda raw: FOREVER if raw == inf else raw),
+        BeforeValidator(lambda raw: FOREVER if raw == inf else _in_si(raw)),
         Allowed(f".inf or a number > 0 and <= {LATEST:g}"),
     ] = Field(
         default=T_END, gt=0, le=LATEST,
@@ -115,7 +120,7 @@ class Integrator(Strict):
         f"with `units: SI` in s, by default {T_END:g} sqrt(c/g) of the largest c and the least gravity, rounded up to "
         f"hundreds, and {LATER:g} sqrt(c/g) where `patience` has a meaning",
     )  # fmt: skip
-    patience: Annotated[float | None, Allowed("null or a finite number > 0")] = Field(
+    patience: Annotated[float | None, BeforeValidator(_in_si), Allowed("null or a finite number > 0")] = Field(
         default=None, gt=0,
         description="time after which a trajectory of `slip` goes on to `t_end` only if it can be foreseen that its "
         "spin reverses once more, or that its rattle has wound down by then, in sqrt(c/g); null for all that have not "

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -13,11 +14,11 @@ from pydantic_core import PydanticCustomError
 from sweep.config.distributions import FAMILIES, Distribution
 from sweep.config.document import is_number, number, plain_data
 from sweep.config.messages import describe, wrong
-from sweep.faults import fault_of, refusal
+from sweep.faults import either, fault_of, refusal
 from sweep.parameters import Parameter
-from sweep.units import SI, named
+from sweep.units import ANGLE, NUMERAL, WRITTEN, Unit, quantity, unit_in, unit_of
 
-_MORE = ", a list of such, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}"
+_MORE = ", a list of numbers, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}"
 
 MAX_AXIS = 1_000_000
 """Most values of one axis and most rows of a table of cases: they are held in memory as Python numbers."""
@@ -75,6 +76,8 @@ class Values:
     spec: float | list[float] | dict[str, Any]
     """The value as it stands in the configuration."""
     distribution: Distribution | None = None
+    unit: str = field(default="", compare=False)
+    """The unit other than an angle's in which the configuration has it; "" if it has none."""
 
     @classmethod
     def one(cls, number: float) -> Values:
@@ -84,38 +87,62 @@ class Values:
 
 def parse_values(parameter: Parameter, raw: Any) -> Values:
     """The value of a parameter from what a configuration says; `wrong` tells what is wrong with it."""
-    if named(parameter.units, SI) == "radian":
-        raw = _in_radians(raw)
+    raw, written = in_si(parameter.units, raw)
+    return replace(_parse(parameter, raw), unit=written)
+
+
+def _parse(parameter: Parameter, raw: Any) -> Values:
     if isinstance(raw, dict):
         return _parse_distribution(parameter, raw) if raw.keys() & FAMILIES.keys() else _parse_range(parameter, raw)
     if not isinstance(raw, list):
         _check_number(raw, parameter)
         return Values.one(float(raw))
     if not raw:
-        raise wrong("an empty axis; give it one number or more")
+        raise wrong("axis is empty; give at least one value")
     for i, item in enumerate(raw):
         _check_number(item, parameter, i)
     return _axis([float(item) for item in raw])
 
 
-def numbers_of(parameter: Parameter, raw: Any) -> tuple[float, ...]:
-    """The numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter."""
+def numbers_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], str]) -> tuple[float, ...]:
+    """The numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter.
+
+    `unitless`, such as `Config.unitless`, says why it cannot have a unit.
+    """
     try:
-        return parse_values(parameter, plain_data(raw)).numbers
+        values = parse_values(parameter, plain_data(raw))
     except PydanticCustomError as error:
         context = error.context or {}
         raise fault_of(context["reason"], parameter.name, *context["at"]) from None
+    if values.unit and (reason := unitless(parameter.name, values.unit)):
+        raise fault_of(reason, parameter.name)
+    return values.numbers
 
 
-def _in_radians(raw: Any) -> Any:
-    """`raw` with "0.5 deg" as a number of radians, also in a list or a range."""
-    if isinstance(raw, list):
-        return [_in_radians(item) for item in raw]
-    if isinstance(raw, dict):
-        return {key: _in_radians(item) for key, item in raw.items()}
-    spelled = re.fullmatch(r"\s*(\S+)\s+deg\s*", raw) if isinstance(raw, str) else None
-    degrees = number(spelled[1]) if spelled else None
-    return raw if degrees is None else math.radians(degrees)
+def in_si(units: Unit | str, raw: Any) -> tuple[Any, str]:
+    """`raw` with numbers of SI for texts such as "0.5 deg", also in a list, a range or a distribution.
+
+    Returns
+    -------
+    Second, a unit that is no angle's and was converted, as the user wrote it; "" if there is none, or if a user's model
+    gives `units` as text, which are the same in all systems.
+    """
+    unit = unit_of(units)
+    seen: list[str] = []
+
+    def convert(part: Any, key: str = "") -> Any:
+        if isinstance(part, list):  # of a lognormal distribution the second is a pure number
+            return [item if key == "lognormal" and i else convert(item) for i, item in enumerate(part)]
+        if isinstance(part, dict):
+            return {key: convert(item, key) for key, item in part.items()}
+        found = quantity(part, unit) if unit and isinstance(part, str) else None
+        if not found or found[1]:  # an error is for a distribution
+            return part
+        if unit != ANGLE and units is unit:
+            seen.append(unit_in(part))
+        return found[0]
+
+    return convert(raw), "".join(seen[:1])
 
 
 def _parse_range(parameter: Parameter, raw: dict[str, Any]) -> Values:
@@ -146,4 +173,31 @@ def _axis(numbers: list[float], spec: Any = None) -> Values:
 
 def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
     if not is_number(raw) or not parameter.allows(raw):
-        raise wrong(refusal(raw, parameter.allowed + ("" if is_number(raw) or at else _MORE)), *at)
+        hint = instead(raw, parameter)
+        more = "" if is_number(raw) or at or hint else _MORE
+        raise wrong(refusal(raw, parameter.allowed + more) + hint, *at)
+
+
+_PART = rf"{NUMERAL}[^-.:,…–—]*?"
+_SPAN = re.compile(rf" *({_PART}) *(?:\.\.\.?|…|:|–|—|to|-) *({_PART})(?: *(?::|\.\.) *([0-9]+))? *")
+_COMMA = re.compile(r" *([-+−]?[0-9]*),([0-9]+)(.*)")
+
+
+def instead(raw: Any, parameter: Parameter) -> str:
+    """Words to add to the refusal of a text that is nearly a number, a range or a quantity; "" if it is none."""
+    if not isinstance(raw, str):
+        return ""
+    if (unit := unit_of(parameter.units)) and quantity(raw, unit):
+        return "; an error belongs into {normal: [value, error]}"
+    if span := _SPAN.fullmatch(raw):
+        start, stop, num = span[1], span[2], span[3] or "41"
+        needed = "" if span[3] else " and needs the number of its values"
+        return f"; a range is written {{start: {start}, stop: {stop}, num: {num}}}{needed}"
+    if comma := _COMMA.fullmatch(raw):
+        whole, part, rest = comma.groups()
+        other = f"{whole}{part}{rest}" if len(part) == 3 else f"[{whole or 0}, {part}{rest}]"
+        return f"; write {whole or 0}.{part}{rest} or {other}"
+    if number(raw.strip()) is not None:
+        return "; leave out the quotes"
+    known = WRITTEN.get(unit) if unit and unit_in(raw) else None
+    return f"; its unit must be {either(known)}" if known else ""

@@ -20,7 +20,7 @@ import xarray as xr
 from scipy.stats import qmc
 
 from sweep.config import Config, ConfigError, Values
-from sweep.config.cross_checks import misplaced
+from sweep.config.cross_checks import misplaced, unlike
 from sweep.config.film import Film
 from sweep.ended import ended
 from sweep.faults import brief, fault_of, suggestion
@@ -76,9 +76,11 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
         raise fault_of("the film holds a value that is no number; leave out such instants")
     theirs = _of_film(film)
     config = _one_body(config, free, theirs)
+    if reason := unlike(config, film):
+        raise fault_of(f"the film {reason}")
     began = time.perf_counter()
     if film.left_out:
-        note(f"{film.left_out} rows of the film are left out: they hold no number, or are more than a fit needs")
+        note(f"{film.left_out} rows of the film are left out: {film.why}")
     ranges = {name: theirs.get(name) or _range(config, name) for name in free}
     if len(ranges) >= len(film.time):
         raise fault_of(f"{len(ranges)} parameters are free, and the film has {len(film.time)} rows; free fewer")

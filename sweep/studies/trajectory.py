@@ -241,7 +241,7 @@ def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, Array]:
     if unknown := next((name for name in at if name not in model.parameters), ""):
         message = f"is no parameter of the {model.name} model{suggestion(unknown, model.parameters)}"
         raise fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", unknown)
-    return {name: np.array(numbers_of(config.table[name], value)) for name, value in at.items()}
+    return {name: np.array(numbers_of(config.table[name], value, config.unitless)) for name, value in at.items()}
 
 
 Marks = list[Array]

@@ -49,14 +49,14 @@ def test_a_measured_body_runs_and_turns_back_from_one_spin_alone(tmp_path: Path)
     assert (found["reversals"] > 0).values.tolist() == [False, True]
 
 
-def half_ellipsoid(directions: int = 80, rings: int = 40) -> str:
-    """The triangles of the lower half of an ellipsoid of 60, 15 and 15 mm as ASCII STL, z up."""
+def half_ellipsoid(directions: int = 80, rings: int = 40, missing: int = 0, scale: float = 1.0) -> str:
+    """The triangles of the lower half of an ellipsoid of 60, 15 and 15 mm as ASCII STL, z up, but the last ones."""
     phi, theta = np.arange(directions + 1) * 2 * np.pi / directions, np.linspace(0, np.pi / 2, rings + 1)[:, None]
     unit = np.broadcast_arrays(np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), -np.cos(theta))
     sheet = np.concatenate([np.stack(unit, -1) * [60, 15, 15], np.zeros((1, directions + 1, 3))])
     one, across = sheet[:-1, :-1], sheet[1:, 1:]
     halves = ((one, sheet[1:, :-1], across), (one, across, sheet[:-1, 1:]))
-    corners = np.concatenate([np.stack(half, 2).reshape(-1, 3) for half in halves])
+    corners = np.concatenate([np.stack(half, 2).reshape(-1, 3) for half in halves])[: -3 * missing or None] * scale
     return "".join("vertex {:.9g} {:.9g} {:.9g}\n".format(*corner) for corner in corners)
 
 
@@ -67,24 +67,29 @@ def test_a_shape_of_an_ellipsoid_is_the_body_of_its_sizes(tmp_path: Path) -> Non
     sizes = printed("--density", "1240 kg/m^3", "--length", "12cm", "--width", "3cm", "--height", "15mm")
     for name, value in loaded(sizes, tmp_path).items():
         assert found.get(name, 0.0) == pytest.approx(value, rel=3e-3), name
-    assert "toy.stl, in millimetres" in text
+    assert "toy.stl, in millimetres (120 x 30 x 15)" in text
     assert re.search(r"mass: 0.0350?\d+  # ± 0.0028 kg", text)
 
 
 def test_a_shape_takes_a_mass_or_a_density_alone(tmp_path: Path) -> None:
     file = tmp_path / "toy.stl"
     refused(invoke("body", "--stl", file, "--mass", "30g"), f"{file}: No such file")
+    file.write_text(half_ellipsoid(missing=81), encoding="utf-8")
+    refused(invoke("body", "--stl", file, "--mass", "30g"), f"--stl {file}: the triangles leave holes: 83 edges have")
+    file.write_text(half_ellipsoid(scale=1e-3), encoding="utf-8")
+    refused(invoke("body", "--stl", file, "--mass", "30g"), "the shape is 0.12 x 0.03 x 0.015; scale it, by 1000 if")
     file.write_text("solid", encoding="utf-8")
     refused(invoke("body", "--stl", file, "--mass", "30g"), f"--stl {file}: not an STL file")
-    refused(invoke("body", "--stl", file), "body: not all is known; give --mass or --density as well")
+    refused(invoke("body", "--stl", file), "body: a measurement is missing; add --mass or --density")
     refused(invoke("body", "--stl", file, "--mass", "30g", "--angle", "2deg"), "--angle: cannot be combined with --stl")
     refused(invoke("body", "--stl", file, "--mass", "30g", "--whole"), "--whole: cannot be combined with --stl")
 
 
 REFUSED = {
-    "": "body: not all is known; give --mass or --density as well",
-    "--mass 30g --width 3cm --height 1cm": "give --length, --radius-long or --a as well",
-    "--mass 30g --length 12cm --width 3cm": "give --height or --c as well",
+    "": "body: a measurement is missing; add --mass or --density",
+    "--mass 30g --width 3cm --height 1cm": "add --length, --radius-long or --a",
+    "--mass 30g --length 12cm --width 3cm": "add --height or --c",
+    "--length 1,250mm": "not '1,250mm'; write 1.250mm or 1250mm",
     "--mass 30": "--mass: must be a number with its unit (kg, g, mg, oz or lb), not '30'",
     "--length 12c": "--length: must be a number with its unit (m, cm, mm, in or ft)",
     "--length -12cm": "--length: must be a finite number > 0 and < 1e+06, in m, with an error >= 0, not '-12cm'",

@@ -38,10 +38,15 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (small("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); the keys here are surface, a, b, c, delta"),
     ("mu: 60\n", 1, "mu", "unknown key (did you mean friction.mu?); the keys here are name"),
     ("friction: {mu: 60}\nt_end: 3\n", 2, "t_end", "unknown key (did you mean integrator.t_end?)"),
+    *(
+        (small("delta:", f"{key}: 0.1, delta:"), 2, f"body.{key}", "unknown key: the centre of mass lies on the axis through the surface's centre and lowest point, offset below that centre; no model")
+        for key in ("offset_x", "offsety", "x_offset", "com_y", "centre_of_mass_x")
+    ),
+    (small("delta:", "ofset: 0.1, delta:"), 2, "body.ofset", "unknown key (did you mean offset?)"),
     (SMALL + "name: again\n", 6, "name", "duplicate key, first on line 1"),
-    (mu("[]"), 3, "friction.mu", "an empty axis; give it one number or more"),
+    (mu("[]"), 3, "friction.mu", "axis is empty; give at least one value"),
     (mu(".nan"), 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, not nan"),
-    (small("10.0", "ten"), 2, "body.a", "a list of such, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}, not 'ten'"),
+    (small("10.0", "ten"), 2, "body.a", "a list of numbers, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}, not 'ten'"),
     (small("a: 10.0", "a: "), 2, "body.a", "not nothing"),
     (mu("{start: 1, num: 3}"), 3, "friction.mu.stop", "missing; give a finite number"),
     (mu("{start: 1, stop: 2, num: 2, spacing: cubic}"), 3, "friction.mu.spacing", "must be linear or log, not 'cubic'"),
@@ -182,6 +187,18 @@ def test_a_file_that_cannot_be_read(name: str, said: str, tmp_path: Path) -> Non
     assert invoke("run", tmp_path / name).stderr == f"{tmp_path / name}: {said}\n"
 
 
+@pytest.mark.parametrize("mark", [b"\x89HDF\r\n\x1a\n", b"CDF\x02"])
+def test_a_dataset_is_no_configuration(mark: bytes, tmp_path: Path) -> None:
+    (tmp_path / "x.nc").write_bytes(mark + bytes(100))
+    said = "x.nc: a dataset, not text; its attribute `config` holds the configuration, and `sweep info` describes it"
+    refused(invoke("run", tmp_path / "x.nc"), said)
+
+
+def test_a_spreadsheet_is_no_table(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "cells.xlsx").write_bytes(b"PK\x03\x04\0")
+    refused(invoke("run", write("cases: cells.xlsx\n")), "a spreadsheet or another archive, not text; save it as CSV")
+
+
 CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
 
 
@@ -197,7 +214,7 @@ CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
         ("mu\n", "cells.csv", "must have 1 to 1000000 rows under its first line, not 0"),
         ("", "cells.csv", "empty; its first line has to name the columns"),
         ("mu,x0\n60,0.01\n", "small.yaml:3:9: start.x0", "is also a column of cells.csv; remove one of the two"),
-        ('mu\n"60', "small.yaml:2:8: cases", "cells.csv: not a readable CSV file"),
+        ('mu\n"60', "cells.csv", "not a readable CSV file"),
         ("b\n2\n", "small.yaml:1:1: friction.mu", "missing"),
     ],
 )

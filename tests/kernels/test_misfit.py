@@ -105,7 +105,7 @@ def test_it_is_drawn_told_and_explored(config: Path, tmp_path: Path) -> None:
     [
         (TEXT.replace("t_end: 150", "t_end: 100"), "the film film.csv lasts 150, but trajectories 100; raise t_end"),
         (TEXT.replace("{misfit: film.csv}", "misfit"), "misfit needs a film; write {misfit: film.csv}"),
-        (TEXT.replace("film.csv", "none.csv"), "none.csv: cannot be read: No such file"),
+        (TEXT.replace("film.csv", "none.csv"), "none.csv: no such file"),
     ],
 )
 @pytest.mark.usefixtures("config")

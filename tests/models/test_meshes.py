@@ -65,8 +65,40 @@ def test_both_kinds_of_files_are_read(written: Callable[[np.ndarray], bytes]) ->
     np.testing.assert_allclose(meshes.triangles(written(corners)), corners, rtol=1e-6)
 
 
+def box(sizes: tuple[float, float, float], middle: tuple[float, float, float]) -> np.ndarray:
+    """The triangles of a box, which face outwards."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2 * sizes + middle
+    faces = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    return np.array([[corners[i] for i in each] for p, q, r, s in faces for each in ((p, q, r), (p, r, s))])
+
+
+OUT = pebble()[:, ::-1]
+"""The pebble with triangles that face outwards; those of `pebble` all face inwards."""
+CORE, MIDDLE = (0.02, 0.01, 0.005), (0.3, -0.2, 0.983)
+
+
+def test_a_hollow_is_no_mass_and_triangles_that_all_face_inwards_are_turned() -> None:
+    whole, other, hollow = map(meshes.mesh, (OUT, pebble(), np.concatenate([OUT, box(CORE, MIDDLE)[:, ::-1]])))
+    assert other.volume == pytest.approx(whole.volume, rel=1e-12)
+    assert whole.volume - hollow.volume == pytest.approx(1e-6, rel=1e-9)
+
+
+@pytest.mark.parametrize("digits", [5, 9])
+def test_corners_may_be_rounded(digits: int) -> None:
+    """Also where roundings of one corner differ, as at the seam of a sheet that a program has closed."""
+    corners = np.round(OUT, digits)
+    noise = np.random.default_rng(0).choice([-1e-9, 0.0, 1e-9], (50, 3, 3))
+    corners[:50] += noise
+    assert meshes.mesh(corners).volume == pytest.approx(meshes.mesh(OUT).volume, rel=1e-3)
+
+
 WRONG = {
-    "leave holes": pebble()[:-200],
+    "leave holes: 280 edges have one triangle; repair": pebble()[:-200],
+    "leave holes: 3 edges": pebble()[1:],
+    "meet more than in twos at 57600 edges": np.concatenate([OUT, OUT]),
+    "face inwards at 3 edges": np.concatenate([OUT[:1, ::-1], OUT[1:]]),
+    "overlap or are inside out in 1.. % of the volume": np.concatenate([OUT, box(CORE, MIDDLE)]),
+    "are inside out in": np.concatenate([OUT, box(CORE, (0.3, -0.2, 1.1))[:, ::-1]]),
     "hold no volume": pebble() * [1, 1, 0],
     "no rounded lowest point": np.maximum(pebble(), [-1, -1, 0.975]),
     "centre of mass not above": pebble() @ np.array([[0.995, 0, 0.0998], [0, 1, 0], [-0.0998, 0, 0.995]]),

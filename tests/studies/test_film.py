@@ -1,11 +1,14 @@
 """Films as phones and trackers write them, and what is wrong with others."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support import Write
+from support.physics import STONE
 
+import sweep
 from sweep.config import ConfigError, film
 
 TIMES = np.arange(20) / 10
@@ -36,6 +39,36 @@ def test_spins_come_in_their_units(write: Write, header: str, mark: str, unit: f
     assert found.what == ("spin" if "spin" in header else "gyroscope")
 
 
+@pytest.mark.parametrize(("time", "spin"), [("ms", "deg/s"), ("[ms]", "(°/s)"), ("ms", "")])
+def test_a_row_of_units_below_the_header_is_honoured(write: Write, time: str, spin: str) -> None:
+    header = f"time,spin{'' if spin else ' (deg/s)'},note\n{time},{spin},"
+    found = film.read(write(table(header, TIMES * 1e3, np.degrees(SPINS), SPINS), "film.csv"))
+    np.testing.assert_allclose([found.time, found.value], [TIMES, SPINS], rtol=1e-12, atol=1e-12)
+    assert (found.left_out, found.clock) == (0, "ms")
+
+
+def test_a_minus_sign_is_a_minus_sign(write: Write) -> None:
+    text = table("t,n", TIMES, SPINS - 0.5).replace("-", "−")
+    assert "−" in text
+    found = film.read(write(text, "film.csv"))
+    np.testing.assert_allclose(found.value, SPINS - 0.5, rtol=1e-12)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_film_may_come_from_a_spreadsheet(tmp_path: Path, encoding: str) -> None:
+    (tmp_path / "film.txt").write_text(table("t\tn", TIMES, SPINS, mark="\t"), encoding=encoding)
+    np.testing.assert_allclose(film.read(tmp_path / "film.txt").value, SPINS, rtol=1e-12)
+
+
+def quoted(*spins: str) -> str:
+    return "t,n\n" + "".join(f'{i},"{spin}"\n' for i, spin in enumerate(spins * 4))
+
+
+def test_quoted_decimal_commas_are_read_where_the_column_shows_that_they_are_decimal(write: Write) -> None:
+    found = film.read(write(quoted("-1,442", "0,5", "3"), "film.csv"))
+    np.testing.assert_array_equal(found.value[:3], [-1.442, 0.5, 3.0])
+
+
 @pytest.mark.parametrize("mark", [";", "\t"])
 def test_numbers_may_have_decimal_commas(write: Write, mark: str) -> None:
     text = table("t;n", TIMES, SPINS, mark=";").replace(".", ",").replace(";", mark)
@@ -64,6 +97,7 @@ def test_rows_without_a_number_are_left_out(write: Write) -> None:
     text = table("time,spin", TIMES, spins).replace("1.3,", "1.3,lost")
     found = film.read(write(text, "film.csv"))
     assert found.left_out == 3
+    assert found.why == "3 rows without a number (one has 'lost0.26749882862458735')"
     np.testing.assert_allclose(found.value, np.delete(SPINS, [3, 7, 13]), rtol=1e-12)
 
 
@@ -71,6 +105,7 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
     times = np.arange(5 * film.MOST_ROWS) * 1e-4
     found = film.read(write(table("time,spin", times, np.cos(times)), "film.csv"))
     assert len(found.time) == film.MOST_ROWS
+    assert found.why == "all but each 5th of 100000 rows, as more would hardly add knowledge"
     np.testing.assert_allclose(found.value, np.cos(found.time), rtol=1e-12)
     turned = film.read(write(table("time,heading", times, np.mod(1e4 * times, 2 * np.pi)), "film.csv"))
     np.testing.assert_allclose(turned.value, 1e4 * turned.time, rtol=1e-9)
@@ -80,17 +115,25 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
     ("text", "line", "words"),
     [
         ("time\n1\n2\n", ":1:", "'spin (rad/s)', 'gyroscope z (rad/s)' or 'heading (deg)'; it has time"),
-        ("spin (m/s),time\n1,2\n", ":1:", "spin is in 'm/s'; its unit must be rad/s, 1/s, deg/s, °/s or rpm"),
+        ("spin (m/s),time\n1,2\n", ":1:", "spin: is in 'm/s'; its unit must be rad/s, 1/s, deg/s, °/s or rpm"),
         (table("t,spin", TIMES[::-1], SPINS), ":3:", "the time goes back; sort the rows by time"),
         ("t,spin\n\n0,1\n2,1\n1,1\n", ":5:", "the time goes back; sort the rows by time"),
-        (table("t,spin (1/s),error (rad)", TIMES, SPINS, 1 + TIMES), ":1:", "error is in 'rad'; its unit must be"),
+        (table("t,spin (1/s),error (rad)", TIMES, SPINS, 1 + TIMES), ":1:", "error: is in 'rad'; its unit must be"),
         (table("t,spin,error", TIMES, SPINS, TIMES), ":2:", "the error must be a number > 0"),
         (table("t,spin", TIMES[:5], SPINS[:5]), ":", "has 5 rows with a time and a spin; a fit needs at least 8"),
         (table("t,spin", 0 * TIMES, SPINS), ":", "a fit needs at least 8, not all at one time"),
-        ("", ":", "cannot be read"),
-        ("t,spin\n0,1\n1,2,3\n", ":", "cannot be read: no table; the first line must name all columns"),
-        (table("t,spin", TIMES, TIMES, SPINS), ":2:", "no table; the first line must name all columns"),
+        ("", ":", "empty; its first line has to name the columns"),
+        ("t,spin\n0,1\n1,2,3\n", ":3:", "3 values, but 2 columns in line 1, with commas between them; put semicolons"),
+        (table("t,spin", TIMES, TIMES, SPINS), ":2:", "with commas between them; so it is in 20 of 20 rows; put semi"),
         ("\0\0\1", ":", "film.csv"),
+        ("t n\n0 1\n", ":1:", "it has t n, with no commas, semicolons or tabs in the line"),
+        (table("t,n\ns,m/s", TIMES, SPINS), ":2:", "n: is in 'm/s'; its unit must be rad/s"),
+        (table("t,n (rad/s)\ns,deg/s", TIMES, SPINS), ":2:", "n: is in 'rad/s' in line 1, and in 'deg/s' here; give"),
+        (quoted("-1,442"), ":2:", "n: '-1,442' may be -1.442 or -1442; write one of these, or semicolons"),
+        (quoted("-1,442", "0.5"), ":1:", "n: has '-1,442' and '0.5'; write decimal points alone"),
+        (table("t,n", TIMES, SPINS).replace("1.3,0.26", "1.3,(0.26)"), ":15:", "is no number, as are 1 of 20 cells"),
+        (table("t,n", TIMES, SPINS).replace(",0.", ",~0."), ":3:", "is no number, as are 15 of 20 cells; write"),
+        (table("t,n", TIMES, SPINS).replace("\n1.", "\nlost 1."), ":13:", "as are 9 of 20 cells; write numbers alone"),
     ],
 )  # fmt: skip
 def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, line: str, words: str) -> None:
@@ -104,8 +147,8 @@ def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, lin
 
 def test_a_film_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     (tmp_path / "film.csv").write_bytes("t,spin (°/s)\n".encode("cp1252"))
-    for name, words in (("none.csv", "No such file"), ("film.csv", "not UTF-8 text")):
-        with pytest.raises(ConfigError, match=rf"{name}: cannot be read: {words}"):
+    for name, words in (("none.csv", "no such file"), ("film.csv", "not UTF-8 text")):
+        with pytest.raises(ConfigError, match=rf"{name}: {words}"):
             film.read(tmp_path / name)
 
 
@@ -113,3 +156,33 @@ def test_repeated_instants_and_gaps_are_kept(write: Write) -> None:
     times = np.array([0, 0, 0.1, 0.2, 0.2, 3, 3.1, 3.2, 9])
     found = film.read(write(table("t,n", times, np.cos(times)), "film.csv"))
     np.testing.assert_array_equal(found.time, times)
+
+
+@pytest.mark.parametrize(
+    ("header", "clock", "words"),
+    [
+        (
+            "t,n",
+            1e9,
+            "the film lasts 1.9e+09, but trajectories 5; raise t_end, or cut the film; if its",
+        ),
+        ("t,n", 1e3, "name the unit in the header, such as 'time (ms)'"),
+        ("t (s),n", 1e3, "the film lasts 1900, but trajectories 5; raise t_end, or cut the film"),
+    ],
+)
+def test_a_film_in_another_unit_of_time_is_refused_before_it_is_followed(
+    write: Write, header: str, clock: float, words: str
+) -> None:
+    path = write(table(header, TIMES * clock, SPINS), "film.csv")
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        sweep.fit(write(STONE), path, ["mu"])
+    with pytest.raises(ConfigError, match="has rows 100 s apart if its times are in s; name the unit in the header"):
+        sweep.fit(
+            write(STONE.replace("t_end: 5", "t_end: 5000")), write(table("t,n", TIMES * 1e3, SPINS), "f.csv"), ["mu"]
+        )
+
+
+def test_a_film_in_seconds_is_none_of_a_body_in_the_paper_s_units(write: Write) -> None:
+    path = write(table("t (s),n", TIMES, SPINS), "film.csv")
+    with pytest.raises(ConfigError, match=r"the film gives times in s; set units: SI, or convert all to sqrt\(c/g\)"):
+        sweep.fit(write("friction: {mu: [30, 100]}\n"), path, ["mu"])

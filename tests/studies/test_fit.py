@@ -167,7 +167,7 @@ def test_the_command_writes_what_runs_the_fitted_body(
 ) -> None:
     times, spins, _ = seen
     rows = "".join(f"{time},{spin}\n" for time, spin in zip(times, spins, strict=True))
-    film = write("Time (s),spin (rad/s)\n" + rows, "film.csv")
+    film = write("time,spin\n" + rows, "film.csv")
     said = invoke("fit", write(SCENE), film, "--free", "mu,n0", "--output", tmp_path / "out")
     assert said.exit_code == 0, said.output
     assert "95 %" in said.stdout

@@ -16,6 +16,10 @@ _HEADER = 84
 _LARGEST = 1e9
 _LOWEST = 0.1
 """The share of the height in which the surface is fitted."""
+_SAME = 1e-6
+"""Distance at which corners are the same, as a share of the longest size."""
+_LINES, _OVERLAP = 400, 1e-3
+"""Lines along which shells are counted, and the share of the volume in which they may overlap."""
 
 
 def triangles(stl: bytes) -> NDArray[np.float64]:
@@ -56,19 +60,81 @@ def mesh(corners: NDArray[np.float64]) -> Mesh:
     Raises
     ------
     ValueError
-        in words if the triangles leave holes, or if the solid does not stand on a rounded lowest point.
+        in words if the surface is not closed, if shells overlap, or if the solid does not stand on a rounded lowest
+        point.
     """
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    if np.abs(areas.sum(0)).max() > 1e-4 * np.abs(areas).sum():
-        raise ValueError("the triangles leave holes; repair the shape")
     corners = corners - corners.mean((0, 1))
     volumes, sums = np.linalg.det(corners) / 6, corners.sum(1)
     volume = volumes.sum()
     if not abs(volume) > 1e-9 * np.ptp(corners, axis=(0, 1)).prod():
         raise ValueError("the triangles hold no volume")
+    _check_closed(corners)
+    _check_shells(corners if volume > 0 else corners[:, ::-1])
     centre = volumes @ sums / 4 / volume
     second = np.einsum("t,tki,tkj->ij", volumes, corners, corners) + (volumes * sums.T) @ sums
     return _standing(abs(volume), second / 20 / volume - np.outer(centre, centre), corners.reshape(-1, 3) - centre)
+
+
+def _check_closed(corners: NDArray[np.float64]) -> None:
+    """Raise a ValueError unless each edge belongs to two triangles, in opposite senses.
+
+    Corners of one place may differ in their last digits.  They are the same where they round to one place of a grid,
+    or else of one that is shifted, since few lie where both part.
+    """
+    places = corners.reshape(-1, 3) / (_SAME * np.ptp(corners, axis=(0, 1)).max())
+    for shift in (0, 1 / 3, 2 / 3):
+        _, first, corner = np.unique(np.round(places + shift), axis=0, return_index=True, return_inverse=True)
+        places = places[first][corner]
+    found = _open_edges(corner.reshape(-1, 3))
+    words = (
+        "leave holes: {} edges have one triangle",
+        "meet more than in twos at {} edges",
+        "face inwards at {} edges",
+    )
+    if any(found):
+        wrong = ", ".join(each.format(count) for each, count in zip(words, found, strict=True) if count)
+        raise ValueError(f"the triangles {wrong}; repair the shape in the program that drew it")
+
+
+def _open_edges(corner: NDArray[np.int64]) -> tuple[int, int, int]:
+    """Count the edges of triangles, whose corners are numbers, that are not of two triangles in opposite senses.
+
+    They are of one triangle alone, of more than two, or of two that run through it in the same sense.
+    """
+    corner = corner[(corner != np.roll(corner, 1, 1)).all(1)]  # of which two are the same, they have no area
+    edges = np.stack([corner, np.roll(corner, -1, 1)], -1).reshape(-1, 2)
+    forward = edges[:, 0] < edges[:, 1]
+    _, which = np.unique(np.sort(edges, 1), axis=0, return_inverse=True)
+    all_, ahead = np.bincount(which), np.bincount(which, forward)
+    return int((all_ == 1).sum()), int((all_ > 2).sum()), int(((all_ == 2) & (ahead != 1)).sum())
+
+
+def _check_shells(corners: NDArray[np.float64]) -> None:
+    """Raise a ValueError if shells overlap, or are inside out without being a hollow.
+
+    Along upright lines all over the shape, the number of shells around a point has to be zero or one.
+    """
+    low, high = corners[..., :2].min((0, 1)), corners[..., :2].max((0, 1))
+    least, most = corners[..., :2].min(1), corners[..., :2].max(1)
+    inside = wrong = 0.0
+    for line in np.random.default_rng(0).uniform(low, high, (_LINES, 2)):
+        some = corners[((least < line) & (line < most)).all(1)]
+        one, two, three = (some[:, i, :2] - line for i in range(3))
+        areas = np.array([_cross(two, three), _cross(three, one), _cross(one, two)])
+        hit = (areas > 0).all(0) | (areas < 0).all(0)
+        areas, some = areas[:, hit], some[hit]
+        height, way = (areas * some[:, :, 2].T).sum(0) / areas.sum(0), -np.sign(areas.sum(0))
+        order = np.argsort(height)
+        around, lengths = np.cumsum(way[order])[:-1], np.diff(height[order])
+        inside += lengths[around == 1].sum()
+        wrong += lengths[(around != 0) & (around != 1)].sum()
+    if wrong > _OVERLAP * (inside + wrong):
+        share = 100 * wrong / (inside + wrong)
+        raise ValueError(f"shells overlap or are inside out in {share:.2g} % of the volume; unite them to one surface")
+
+
+def _cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
 
 
 def _standing(volume: float, second: NDArray[np.float64], points: NDArray[np.float64]) -> Mesh:

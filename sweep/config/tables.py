@@ -1,0 +1,145 @@
+"""Tables of numbers as spreadsheets, phones and trackers write them: tables of cases, and films."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import dataclass, replace
+
+from sweep.faults import ConfigError, Fault, brief, either, fault_of
+from sweep.units import WRITTEN, Unit, factor, number, unit_of
+
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+"""What may stand between columns."""
+
+GAPS = frozenset({"", "-", "nan", "na", "n/a", "null", "none"})
+"""What cells without a number hold, in lower case."""
+
+_ENOUGH = 100_000
+"""Characters of a line in which separators are looked for."""
+
+_COMMA = re.compile(r"[-+−]?[0-9]*(?:,[0-9]+)+(?:[eE][-+−]?[0-9]+)?")
+_THOUSANDS = re.compile(r"[-+−]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
+
+
+@dataclass(frozen=True)
+class Table:
+    """The text of the cells of a table, of which all rows have as many as its header."""
+
+    file: str
+    separator: str
+    top: int
+    """Line of the header."""
+    names: list[str]
+    """Names of the columns, without the unit in brackets behind them."""
+    units: list[str]
+    """Units of the columns, from the header or the row below it; "" where there is none."""
+    under: int
+    """Line of the row of units, or of the header if there is none."""
+    lines: list[int]
+    """The line of each row."""
+    rows: list[list[str]]
+
+    def fault(self, message: str, column: int, row: int | None = None) -> Fault:
+        """A fault of a column or of one of its cells; both count from zero."""
+        line = self.top if row is None else self.lines[row]
+        return Fault(self.file, line, column + 1, (self.names[column],), message)
+
+    def scale(self, column: int, units: Unit | str) -> float:
+        """How many units of SI the numbers of a column are in; one if the table gives no unit.
+
+        Raises
+        ------
+        ConfigError
+            if the table gives a unit of something else.
+        """
+        if not (written := self.units[column]):
+            return 1.0
+        unit = unit_of(units)
+        found = factor(written, unit) if unit else 1.0 if written == units else None
+        if found is None:
+            known = either(WRITTEN.get(unit, ()) if unit else [str(units)] if units else ())
+            words = f"its unit must be {known}" if known else "it is a pure number; leave the unit out"
+            fault = self.fault(f"is in '{brief(written, 20)}'; {words}", column)
+            raise ConfigError([replace(fault, line=self.under)])
+        return found
+
+    def numbers(self, column: int) -> list[float | str]:
+        """The numbers of a column, and the texts of cells that hold none.
+
+        Raises
+        ------
+        ConfigError
+            if commas may be decimal or set off thousands: a column is read as a whole or not at all.
+        """
+        cells = [row[column] for row in self.rows]
+        if commas := [cell for cell in cells if _COMMA.fullmatch(cell)]:
+            if pointed := next(
+                (cell for cell in cells if "." in cell and number(cell.replace(",", "")) is not None), ""
+            ):
+                words = f"has {commas[0]!r} and {pointed!r}; write decimal points alone, and no comma for thousands"
+                raise ConfigError([self.fault(words, column)])
+            if self.separator != ";" and all(map(_THOUSANDS.fullmatch, commas)):
+                plain = commas[0].replace(",", ".", 1), commas[0].replace(",", "")
+                words = (
+                    f"{commas[0]!r} may be {plain[0]} or {plain[1]}; write one of these, or semicolons between columns"
+                )
+                raise ConfigError([self.fault(words, column, cells.index(commas[0]))])
+            cells = [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in cells]
+        return [cell if (value := number(cell)) is None else value for cell in cells]
+
+
+def read(file: str, text: str) -> Table:
+    """Take a table apart: a line of names, perhaps one of units, and rows with a cell for each name.
+
+    Raises
+    ------
+    ConfigError
+        if it is no table: if a line has another number of cells than the first, or two units are given to a column.
+    """
+    try:
+        separator = _separator(text)
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True, strict=True)
+        lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+    except csv.Error as error:
+        raise fault_of(f"not a readable CSV file: {error}", file=file) from None
+    lines = [(line, row) for line, row in lines if len(row) > 1 or any(row)]
+    if not lines:
+        raise fault_of("empty; its first line has to name the columns, such as mu,n0", file=file)
+    (top, header), *rows = lines
+    if ragged := [(line, len(row)) for line, row in rows if len(row) != len(header)]:
+        line, values = ragged[0]
+        words = f"{values} values, but {len(header)} columns in line {top}, with {SEPARATORS[separator]} between them"
+        words += f"; so it is in {len(ragged)} of {len(rows)} rows" if len(ragged) > 1 else ""
+        decimal = "; put semicolons if numbers have decimal commas" if separator == "," and values > len(header) else ""
+        raise fault_of(words + decimal, file=file, line=line)
+    named = [re.fullmatch(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", cell, re.DOTALL) for cell in header]
+    names, units = ([(each[part] or "").strip() if each else "" for each in named] for part in (1, 2))
+    under = top
+    if len(rows) > 1 and _is_of_units(rows[0][1]):
+        under, below = rows.pop(0)
+        below = [cell.strip("()[] ") for cell in below]
+        for column, (unit, own) in enumerate(zip(units, below, strict=True)):
+            if unit and own and unit != own:
+                words = f"is in '{brief(unit, 20)}' in line {top}, and in '{brief(own, 20)}' here; give one unit"
+                raise ConfigError([Fault(file, under, column + 1, (names[column],), words)])
+        units = [unit or own for unit, own in zip(units, below, strict=True)]
+    return Table(file, separator, top, names, units, under, [line for line, _ in rows], [row for _, row in rows])
+
+
+def _separator(text: str) -> str:
+    """What stands between the columns: it divides the first line, and the next one into as many cells."""
+    first = [line[:_ENOUGH] for line in text.lstrip().split("\n", 2)[:2] if line.strip()]
+
+    def divided(mark: str) -> tuple[bool, int]:
+        header, *below = (len(next(csv.reader([line], delimiter=mark), [])) for line in first)
+        return header > 1 and below == [header], header
+
+    return max(SEPARATORS, key=divided) if first else ","
+
+
+def _is_of_units(row: list[str]) -> bool:
+    """Tell a row of units, in which there is text and no number."""
+    cells = [cell for cell in row if cell.lower() not in GAPS]
+    return bool(cells) and not any(re.fullmatch(r"[-+−.,eE0-9]*[0-9][-+−.,eE0-9]*", cell) for cell in cells)
