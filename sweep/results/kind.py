@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import xarray as xr
 
+from sweep.faults import counted
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
+from sweep.results.margins import POINTS
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
 
@@ -19,7 +22,7 @@ OWN_BODY = "a model"
 """What `model_brings` says of the model of a user that need not be of a rattleback."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kind:
     """A kind of dataset."""
 
@@ -31,15 +34,48 @@ class Kind:
     """Variables and dimensions by which a dataset that does not name its kind is known."""
     explored: bool = False
     """Whether the explorer shows it."""
+    needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """The variables without which it cannot be shown, and dimensions that each must have."""
+    attributes: tuple[str, ...] = ()
+    """The attributes without which it cannot be shown."""
 
 
-TRAJECTORY = Kind("trajectory", "single trajectories", frozenset({"trajectory"}))
-CRITICAL = Kind("critical", "critical spins", frozenset({"critical_reason"}), explored=True)
-BOUNDARIES = Kind("boundaries", "boundaries", frozenset({"level", "curve", "end_more"}))
-FIT = Kind("fit", "a fit", frozenset({"seen", "fitted"}))
-INDICES = Kind("indices", "Sobol indices", frozenset({"first_order", "total_order"}))
+def _over(dims: tuple[str, ...], *names: str) -> dict[str, tuple[str, ...]]:
+    return dict.fromkeys(names, dims)
+
+
+_SPINS = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
+_ENDS = [f"{order}{end}" for order in ("first_order", "total_order") for end in ("", "_low", "_high")]
+_FITTED = ("value", *(f"{end}_{share}" for share in (68, 95) for end in ("lower", "upper")))
+
+TRAJECTORY = Kind(
+    "trajectory", "single trajectories", frozenset({"trajectory"}),
+    needs=_over(("trajectory",), "status", "t_stop") | _over(("time",), "time") | {"spin": ("trajectory", "time")},
+)  # fmt: skip
+CRITICAL = Kind(
+    "critical", "critical spins", frozenset({"critical_reason"}), explored=True,
+    needs=_over((), "critical_reason", *(f"{name}_reason" for name in _SPINS),
+                *(f"{name}_{'linear' if name.startswith('n_c1') else 'simulated'}" for name in _SPINS)),
+)  # fmt: skip
+BOUNDARIES = Kind(
+    "boundaries", "boundaries", frozenset({"level", "curve", "end_more"}),
+    needs=_over(("point",), *POINTS), attributes=("x", "y", "trajectories"),
+)  # fmt: skip
+FIT = Kind(
+    "fit", "a fit", frozenset({"seen", "fitted"}),
+    needs=_over(("parameter",), *_FITTED) | _over(("time",), "time", "seen", "fitted"),
+    attributes=("title", "undetermined"),
+)  # fmt: skip
+INDICES = Kind(
+    "indices", "Sobol indices", frozenset({"first_order", "total_order"}),
+    needs=_over(("quantity", "parameter"), *_ENDS) | {name: (name,) for name in ("quantity", "parameter")},
+    attributes=("title", "trajectories"),
+)  # fmt: skip
 RUN = Kind("run", "a run", frozenset(), explored=True)
 """Its variables depend on what was measured.  Predictions count as a run, and so does a part of one."""
+
+_MAY_BE_EMPTY = {"point"}
+"""Dimensions that have no values where nothing was found."""
 
 _KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, RUN)}
 
@@ -55,12 +91,30 @@ def kind(dataset: xr.Dataset) -> Kind | None:
 
 
 def opened(path: Path, *, load: bool = True) -> xr.Dataset:
-    """Open a dataset as `open_dataset` does; `StoreError` also if it is of no kind."""
+    """Open a dataset as `open_dataset` does; `StoreError` also if it is of no kind, or lacks what its kind needs."""
     dataset = open_dataset(path, load=load)
-    if kind(dataset) is None:
+    if found := fault(dataset):
         dataset.close()
-        raise StoreError(f"{path}: not a dataset of sweep: no variable of it, such as status")
+        raise StoreError(f"{path}: {found}")
     return dataset
+
+
+def fault(dataset: xr.Dataset) -> str:
+    """Say why a dataset cannot be shown, such as one that has been averaged or cut since; "" if it can."""
+    if (found := kind(dataset)) is None:
+        return "not a dataset of sweep: no variable of it, such as status"
+    if empty := [str(dim) for dim, size in dataset.sizes.items() if not size and dim not in _MAY_BE_EMPTY]:
+        return f"the axis {empty[0]} has no values; select at least one"
+    lacks = [f"the variable {name}" for name in found.needs if name not in dataset.variables]
+    lacks += [
+        f"the axis {dim} of {name}"
+        for name, dims in found.needs.items()
+        for dim in dims
+        if name in dataset.variables and dim not in dataset[name].dims
+    ]
+    lacks += [f"the attribute {name}" for name in found.attributes if name not in dataset.attrs]
+    more = f" and {counted(len(lacks) - 1, 'other thing')}" if len(lacks) > 1 else ""
+    return f"lacks {lacks[0]}{more}; it was cut or averaged: take the dataset that sweep wrote" if lacks else ""
 
 
 def is_of_own_body(dataset: xr.Dataset) -> bool:

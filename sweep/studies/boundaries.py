@@ -23,9 +23,10 @@ from sweep.models.model import COUNT
 from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
+from sweep.studies import DEVIATIONS, WIDTHS
 from sweep.studies.curve import Cell, Curve, Middle, Point
 from sweep.studies.kept import Task
-from sweep.studies.search import Search, measuring, require_certain
+from sweep.studies.search import Search, measuring, require_between, require_certain
 
 Asked = tuple[Curve, Point | Middle, float]
 """A cell that is asked for: for which part of which curve, and its place along the line."""
@@ -33,6 +34,8 @@ Asked = tuple[Curve, Point | Middle, float]
 
 def boundaries(config: Config, x: str | None, y: str | None, width: float, deviation: float) -> Task:
     """What `sweep.api.boundaries` asks for."""
+    require_between("bracket", width, WIDTHS)
+    require_between("deviation", deviation, DEVIATIONS)
     across = chosen_axes(config, x, y)
     words = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
     make = partial(Boundaries, across=across, width=width, deviation=deviation)
