@@ -13,6 +13,7 @@ from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
 from sweep.results.margins import POINTS
 from sweep.results.netcdf import open_dataset
+from sweep.results.probabilities import PROBABILITIES
 from sweep.results.store import StoreError
 
 ATTRIBUTE = "sweep_kind"
@@ -74,8 +75,11 @@ INDICES = Kind(
 RUN = Kind("run", "a run", frozenset(), explored=True)
 """Its variables depend on what was measured.  Predictions count as a run, and so does a part of one."""
 
-_MAY_BE_EMPTY = {"point"}
-"""Dimensions that have no values where nothing was found."""
+_MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
+"""Dimensions that have no values where nothing was found, and that not each dataset of a kind has."""
+
+_CODES = ("status", "level", "curve", "outcome")
+"""Variables that mean nothing once they are averaged."""
 
 _KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, RUN)}
 
@@ -103,18 +107,33 @@ def fault(dataset: xr.Dataset) -> str:
     """Say why a dataset cannot be shown, such as one that has been averaged or cut since; "" if it can."""
     if (found := kind(dataset)) is None:
         return "not a dataset of sweep: no variable of it, such as status"
-    if empty := [str(dim) for dim, size in dataset.sizes.items() if not size and dim not in _MAY_BE_EMPTY]:
+    if empty := [dim for dim, size in dataset.sizes.items() if not size and dim not in _MAY_BE_EMPTY]:
         return f"the axis {empty[0]} has no values; select at least one"
-    lacks = [f"the variable {name}" for name in found.needs if name not in dataset.variables]
-    lacks += [
-        f"the axis {dim} of {name}"
-        for name, dims in found.needs.items()
-        for dim in dims
-        if name in dataset.variables and dim not in dataset[name].dims
-    ]
+    if stacked := [name for name, index in dataset.indexes.items() if index.nlevels > 1]:
+        return f"the axis {stacked[0]} is stacked; unstack it"
+    needs, there = _needs(dataset, found), {name: {*variable.dims} for name, variable in dataset.variables.items()}
+    lacks = [f"the variable {name}" for name in needs if name not in there]
     lacks += [f"the attribute {name}" for name in found.attributes if name not in dataset.attrs]
-    more = f" and {counted(len(lacks) - 1, 'other thing')}" if len(lacks) > 1 else ""
-    return f"lacks {lacks[0]}{more}; it was cut or averaged: take the dataset that sweep wrote" if lacks else ""
+    known = {name: {*dims} for name, dims in needs.items() if name in there}
+    lacks += [f"the axis {dim} of {name}" for name, dims in known.items() for dim in sorted(dims - there[name])]
+    if lacks:
+        more = f" and {counted(len(lacks) - 1, 'other thing')}" if len(lacks) > 1 else ""
+        return f"lacks {lacks[0]}{more}; it was cut or averaged: take the dataset that sweep wrote"
+    further = [str(dim) for name, dims in known.items() if dims for dim in there[name] - dims - _MAY_COME]
+    averaged = [name for name in known if name in _CODES and dataset[name].dtype.kind not in "iu"]
+    words = [*(f"the further axis {dim}; select one of its values" for dim in further),
+             *(f"no whole numbers in {name}: it was averaged" for name in averaged)]  # fmt: skip
+    return f"has {words[0]}" if words else ""
+
+
+def _needs(dataset: xr.Dataset, found: Kind) -> Mapping[str, tuple[str, ...]]:
+    """Return what a dataset of the kind that was found has to have, by what else it has."""
+    needs = {**found.needs}
+    if found == BOUNDARIES:
+        needs |= _over((), *(dataset.attrs[name] for name in ("x", "y") if name in dataset.attrs))
+    if found == TRAJECTORY and not is_of_own_body(dataset):
+        needs |= _over((), "a", "b", "c")
+    return needs | _over((), *PROBABILITIES, "count") if found == RUN and "probability" in dataset else needs
 
 
 def is_of_own_body(dataset: xr.Dataset) -> bool:

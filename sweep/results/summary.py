@@ -66,7 +66,7 @@ def _fit(dataset: xr.Dataset) -> Iterator[str]:
         yield f"{name:12} {one['value'].item():12.6g}   {'   '.join(ends)}"
     yield from filter(None, dataset.attrs["undetermined"].split("; "))
     if others := int((dataset["misfit"][1:] < 1.05 * dataset["misfit"][0]).sum()):
-        yield f"{counted(others, 'other minimum fits', 'other minima fit')} within 5 % as well: see the variable minimum"
+        yield f"{counted(others, 'other minimum fits', 'other minima fit')} within 5 % as well: see minimum"
     yield (
         f"residuals {dataset.attrs['root_mean_square']:.4g}, root mean square; Akaike's criterion "
         f"{dataset.attrs['akaike']:.6g}; {counted(dataset.attrs['trajectories'], 'trajectory', 'trajectories')}"
@@ -162,7 +162,7 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         error = dataset[f"{name}_error"].values if f"{name}_error" in dataset else np.empty(0)
         if np.isfinite(error).any():
             yield f"{name} error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}{words}"
-    if "step_rule" in dataset and (status != IMPOSSIBLE).any():
+    if {"step", "step_rule"} <= {*dataset.data_vars} and (status != IMPOSSIBLE).any():
         rule, step = (np.ravel(dataset[name].values)[status != IMPOSSIBLE] for name in ("step_rule", "step"))
         found = {name: int((rule == code).sum()) for code, name in STEP_RULES.items() if code in rule}
         missed = found.pop(STEP_RULES[MISSED], 0)
