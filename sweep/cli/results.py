@@ -47,9 +47,9 @@ def plot(
 
     interrupt.raise_again()
     # The picture without options is the run's own: with others it gets a name of its own.
-    asked = {**dict(zip(sel, map("{:g}".format, sel.values()), strict=True)), **how, "limits": limits}
-    words = [variable, *(f"{name}={value}" for name, value in asked.items() if value), "no-title" if no_title else None]
-    target = output or file.with_name(f"{'_'.join([file.stem, *filter(None, words)])}.png".replace("/", "-"))
+    asked = [f"{name}={value}" for name, value in {**how, "limits": limits}.items() if value]
+    words = [file.stem, variable, *cells, *asked, "no-title" if no_title else ""]
+    target = output or file.with_name(f"{'_'.join(filter(None, words))}.png".replace("/", "-"))
     dataset = opened(file)
     for name, taken in panels.nearest(dataset, sel).items():
         say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))

@@ -69,7 +69,7 @@ def run(
     if rerun and output is None:
         raise StoreError("rerun needs output, the folder of the run whose cells are to be simulated again")
     if rerun and config.refine:
-        raise StoreError("--rerun cannot simulate single cells of a refined run; leave it out, or set refine to 0")
+        raise StoreError("--rerun cannot simulate single cells of a refined run; start anew with --fresh")
     dataset.check_names(config)
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)

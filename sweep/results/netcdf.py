@@ -85,7 +85,8 @@ def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
     except StoreError:
         raise
     except Exception as error:  # what HDF5, netCDF and xarray raise for damaged files is documented nowhere
-        raise StoreError(f"{path}: not a netCDF dataset: {error}") from None
+        words = getattr(error, "strerror", None) or error
+        raise StoreError(f"{path}: not a netCDF dataset, or damaged: {words}") from None
 
 
 def _refuse_larger_than_memory(path: Path) -> None:
