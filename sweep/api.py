@@ -280,11 +280,12 @@ def trajectory(
     cells = {name: value for name, value in values.items() if name in known}
     settings = {name: value for name, value in values.items() if name not in known}
     with _prepared(config, settings, progress, reporter) as (checked, told):
-        if cells and (words := first_values(checked, cells)):
-            warn(words, stacklevel=2)
-        return trajectory(
+        found = trajectory(
             checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
         )
+    if cells and (words := first_values(checked, cells)):
+        warn(words, stacklevel=2)
+    return found
 
 
 def animate(
