@@ -100,16 +100,15 @@ def trajectory(
     normal force, energy and the work of friction.  Several trajectories are drawn over each other; of samples,
     the spins alone.
     """
+    at = cells_of(cells, config.table)  # which takes no time; what is loaded then takes a second
     if dry_run:
-        at = cells_of(cells, config.table)
-
         from sweep.studies.trajectory import estimate
 
         with of_option("--at", config.table):
             click.echo(estimate(config, at, samples))
         return
     files = _files(config, "trajectory", output)
-    _save(_followed(config, cells, quiet, samples=samples, **how), files)
+    _save(_followed(config, at, quiet, samples=samples, **how), files)
     if not quiet:
         say(f"wrote {files.dataset} and .png")
 
@@ -148,7 +147,7 @@ def animate(
     target = output or usual
     animation.check(target)
     require_writable(target)
-    result = _followed(config, cells, quiet) if config else source
+    result = _followed(config, cells_of(cells, config.table), quiet) if config else source
     target.parent.mkdir(parents=True, exist_ok=True)
     animation.animate(result, target, begin=begin, end=end, speed=speed)
     if not quiet:
@@ -237,10 +236,8 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
         say(f"{describe(result)}\nwrote {files.dataset}, .png and .yaml")
 
 
-def _followed(config: Config, cells: tuple[str, ...], quiet: bool, **how: Any) -> xr.Dataset:
-    """Follow the cells of `--at`."""
-    at = cells_of(cells, config.table)  # which takes no time; what is loaded then takes a second
-
+def _followed(config: Config, at: dict[str, Any], quiet: bool, **how: Any) -> xr.Dataset:
+    """Follow the cells of `--at`, and say which values axes take that it does not name."""
     from sweep.progress import Terminal
     from sweep.studies.trajectory import first_values, trajectory
 
