@@ -49,7 +49,7 @@ HOMES = {
 def _prepared(
     config: ConfigLike, overrides: Mapping[str, Any], progress: bool | None, reporter: Reporter | None
 ) -> Iterator[tuple[Config, Reporter]]:
-    """The checked configuration of a call, and who is told of its progress."""
+    """Yield the checked configuration of a call, and who is told of its progress."""
     from sweep.config import load_config
     from sweep.progress import shown
 
@@ -251,8 +251,8 @@ def trajectory(
     samples : follow so many samples of the parameters that are distributions, those with which a run begins, and not
         the medians alone
     values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``, of which each combination is one trajectory;
-        an axis of `config` that is not named takes its first value.  Anything else replaces a value of `config`, such
-        as ``t_end=300``
+        an axis of `config` that is not named takes its first value, with a warning if others are named.  Anything else
+        replaces a value of `config`, such as ``t_end=300``
 
     Returns
     -------
@@ -271,16 +271,21 @@ def trajectory(
     >>> two.spin.dims
     ('trajectory', 'time')
     """
+    from warnings import warn
+
     from sweep.config import parameters_of
-    from sweep.studies.trajectory import trajectory
+    from sweep.studies.trajectory import first_values, trajectory
 
     known = parameters_of(config, values)
     cells = {name: value for name, value in values.items() if name in known}
     settings = {name: value for name, value in values.items() if name not in known}
     with _prepared(config, settings, progress, reporter) as (checked, told):
-        return trajectory(
+        found = trajectory(
             checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
         )
+    if cells and (words := first_values(checked, cells)):
+        warn(words, stacklevel=2)
+    return found
 
 
 def animate(

@@ -54,6 +54,19 @@ def suggestion(word: object, names: Iterable[str], paths: Mapping[str, str] | No
     return f" (did you mean {spelled[close[0]]}?)" if close else ""
 
 
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """Return a number and a noun that agree, such as "1 cell" or "3 bodies"."""
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in a unit that people use, such as "0.35 s", "57 min", "3.4 h" or "120 days"."""
+    for size, unit in ((86400, "days"), (3600, "h"), (60, "min")):
+        if seconds >= 2 * size:
+            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    return "under 1 ms" if 0 < seconds < 1e-3 else f"{float(f'{seconds:.2g}'):g} s"
+
+
 def refusal(given: object, wanted: str, names: Iterable[str] = ()) -> str:
     """Say that a value is `given` where it must be `wanted`, and which of `names` may be meant."""
     return f"must be {wanted}, not {quote(given)}{suggestion(given, names)}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import click
 
+from sweep.cli import environment
 from sweep.cli.configurations import body, examples
 from sweep.cli.faults import Commands
 from sweep.cli.reports import bench, reproduce
@@ -22,10 +23,11 @@ def main() -> None:
 
     CONFIG is a YAML file, FILE a dataset that a command wrote.
 
-    Exit codes: 0 done; 1 a row of a report does not hold; 2 a configuration or file is wrong;
+    Exit codes: 0 done; 1 a check of `reproduce` or `bench` failed; 2 a configuration or file is wrong;
     3 more cells failed than the configuration allows; 130 interrupted, and the same command
     without --fresh resumes the run; 141 the program that read the output has closed the pipe.
     """
+    environment.check()
 
 
 for _command in (

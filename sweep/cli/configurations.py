@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from sweep.cli import options
 from sweep.cli.faults import refuse, say
 from sweep.cli.options import PATH
 from sweep.faults import brief, suggestion
@@ -27,8 +28,6 @@ MEASURED: dict[str, tuple[Parameter, str]] = {
     "angle": (PARAMETERS["delta"], "Angle from the surface's axes to the axes of inertia, such as 2deg [default: 0]."),
 }
 """What can be measured: the parameter whose unit and bounds it has, and the help of its option."""
-
-_EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 def _measured(command: Callable[..., None]) -> Callable[..., None]:
@@ -70,7 +69,7 @@ def examples(name: str | None, output: Path) -> None:
 
     Its model and a film of its body are copied as well, where it has them.  No file is overwritten.
     """
-    shipped = {path.stem: path for path in sorted(_EXAMPLES.glob("*.yaml"))}
+    shipped = options.examples()
     if name is None:
         width = max(map(len, shipped))
         for stem, path in shipped.items():
@@ -79,7 +78,7 @@ def examples(name: str | None, output: Path) -> None:
         return
     if name not in shipped:
         refuse(f"examples {brief(name)}", f"no such example{suggestion(name, shipped)}; `sweep examples` lists them")
-    companions = [path for path in _EXAMPLES.glob(f"{name}*") if path.suffix != ".yaml"]
+    companions = [path for path in shipped[name].parent.glob(f"{name}*") if path.suffix != ".yaml"]
     for path in (copied := [shipped[name], *companions]):
         if (output / path.name).exists():
             refuse(str(output / path.name), "exists already; choose another folder by --output")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Iterator, Mapping
@@ -58,19 +59,22 @@ def needs_bokeh(what: str) -> Iterator[None]:
         refuse(what, "needs Bokeh, which is not installed: pip install 'rattleback-sweep[explore]'")
 
 
-@contextmanager
-def about(file: Path) -> Iterator[None]:
-    """Make any error in reading a dataset of another program a fault of that file."""
-    try:
-        yield
-    except (Refused, OSError):
-        raise
-    except Exception as error:
-        refuse(file, f"not a dataset of sweep: {type(error).__name__}: {error}".partition("\n")[0])
+_PACKAGE = Path(__file__).parents[1]
+_FULL = {errno.ENOSPC, errno.EDQUOT}
+
+
+def _of_user(error: OSError) -> bool:
+    """Tell whether the user can mend an error of the system: it names a file that is not ours, or a disk is full."""
+    if error.filename is None:
+        return error.errno in _FULL
+    return not Path(str(error.filename)).is_relative_to(_PACKAGE)
 
 
 class Commands(click.Group):
-    """Commands whose errors, where the user can mend them, become lines on stderr and an exit code."""
+    """Commands whose errors, where the user can mend them, become lines on stderr and an exit code.
+
+    All others are ours, and show their traceback.
+    """
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -89,7 +93,9 @@ class Commands(click.Group):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
             sys.exit(CLOSED_PIPE)
         except OSError as error:
-            say(f"{error.filename or 'a file'}: {error.strerror or error}", err=True)
+            if not _of_user(error):
+                raise
+            say(f"{error.filename or 'standard output'}: {error.strerror or error}", err=True)
         except Refused as error:
             say(str(error), err=True)
         sys.exit(WRONG_INPUT)

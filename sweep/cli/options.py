@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 PATH = click.Path(path_type=Path)
 
 
+def examples() -> dict[str, Path]:
+    """Return the configurations that come with the package, by name."""
+    return {path.stem: path for path in sorted((Path(__file__).parents[1] / "examples").glob("*.yaml"))}
+
+
 def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> list[CompletionItem]:
     """The keys of a configuration, or with `--at` the parameters, that go on from what was typed."""
     from sweep.config.schema import PATHS
@@ -57,6 +62,8 @@ def loaded(config: Path, settings: tuple[str, ...]) -> Config:
     from sweep.config import load_config
     from sweep.config.document import parse_value
 
+    if config.stem in examples() and not config.exists():
+        refuse(config, f"no such file; `sweep examples {config.stem}` copies the example of that name")
     parsed = {}
     for setting in settings:
         path, equals, value = setting.partition("=")

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import click
 
-from sweep.cli.faults import DONE, ROWS_FAILED
+from sweep.cli.faults import DONE, ROWS_FAILED, say
 from sweep.cli.options import report_folder
 
 
@@ -42,8 +42,10 @@ def bench(output: Path) -> None:
 def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path, files: str, rows: str) -> NoReturn:
     """Write a report, its `files` in the folder `output`, and end by whether all of its `rows` hold."""
     from sweep.progress import Terminal
+    from sweep.results.writing import require_writable
 
+    require_writable(output / files.partition(",")[0])
     with Terminal():
         failed = report(output, click.echo)
-    click.echo(f"\nwrote {output / files}; {rows} that do not hold: {len(failed) or 'none'}")
+    say(f"\nwrote {output / files}; {rows} that do not hold: {len(failed) or 'none'}")
     sys.exit(ROWS_FAILED if failed else DONE)

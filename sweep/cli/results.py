@@ -10,8 +10,9 @@ from typing import Any
 import click
 
 from sweep import interrupt
-from sweep.cli.faults import DONE, about, needs_bokeh, say
+from sweep.cli.faults import DONE, needs_bokeh, refuse, say
 from sweep.cli.options import FILE, PATH, announce, parse_pair, parse_span
+from sweep.faults import brief
 from sweep.plots import formats
 
 
@@ -29,24 +30,30 @@ from sweep.plots import formats
               help="Width of a figure for print, such as 85mm, with text of 6 points or more.")  # fmt: skip
 @click.option("--no-title", is_flag=True, help="Draw no title.")
 @click.option("--output", type=PATH, help=f"Picture to write; its suffix names the format: {formats.A_PICTURE} "
-              "[default: a PNG beside FILE].")  # fmt: skip
+              "[default: a PNG beside FILE, named after FILE and the options].")  # fmt: skip
 def plot(
     file: Path, variable: str | None, cells: tuple[str, ...], limits: str | None, no_title: bool, output: Path | None,
     **how: Any,
 ) -> None:  # fmt: skip
     """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries."""
-    sel = dict(parse_pair(cell, "--sel") for cell in cells)
+    sel = dict[str, float]()
+    for cell in cells:
+        name, value = parse_pair(cell, "--sel")
+        if sel.setdefault(name, value) != value:
+            refuse(f"--sel {brief(cell)}", f"{name} has another value already; draw one picture for each")
     span = parse_span(limits, "--limits") if limits is not None else None
     from sweep.plots import panels, picture
     from sweep.results.kind import opened
 
     interrupt.raise_again()
-    target = output or file.with_name(f"{file.stem}{f'_{variable}' if variable else ''}.png")
+    # The picture without options is the run's own: with others it gets a name of its own.
+    asked = [f"{name}={value}" for name, value in {**how, "limits": limits}.items() if value]
+    words = [file.stem, variable, *cells, *asked, "no-title" if no_title else ""]
+    target = output or file.with_name(f"{'_'.join(filter(None, words))}.png".replace("/", "-"))
     dataset = opened(file)
-    with about(file):
-        for name, taken in panels.nearest(dataset, sel).items():
-            say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
-        picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
+    for name, taken in panels.nearest(dataset, sel).items():
+        say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
+    picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
     say(f"wrote {target}")
 
 
@@ -58,8 +65,7 @@ def info(file: Path) -> None:
     from sweep.results.summary import contents, describe
 
     dataset = opened(file)
-    with about(file):
-        say("\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)]))
+    say("\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)]))
 
 
 @click.command()
@@ -77,8 +83,7 @@ def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -
     from sweep.explorer.setup import Setup, usable
     from sweep.explorer.slices import open_source
 
-    with about(file):
-        source = open_source(file)
+    source = open_source(file)
     setup = Setup(source, model, announce) if model else usable(source)
     serve(source, setup, port, browser=not no_browser, say=say)
     say("stopped")

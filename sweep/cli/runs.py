@@ -14,7 +14,7 @@ from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
 from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured, loaded
 from sweep.interrupt import INTERRUPTED
 from sweep.parameters import PARAMETERS
-from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
+from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, DEVIATIONS, SPIN_WIDTH, WIDTHS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,15 +100,15 @@ def trajectory(
     normal force, energy and the work of friction.  Several trajectories are drawn over each other; of samples,
     the spins alone.
     """
+    at = cells_of(cells, config.table)  # which takes no time; what is loaded then takes a second
     if dry_run:
-        at = cells_of(cells, config.table)
-
         from sweep.studies.trajectory import estimate
 
         with of_option("--at", config.table):
             click.echo(estimate(config, at, samples))
         return
-    files = _save(config, "trajectory", _followed(config, cells, quiet, samples=samples, **how), output)
+    files = _files(config, "trajectory", output)
+    _save(_followed(config, at, quiet, samples=samples, **how), files)
     if not quiet:
         say(f"wrote {files.dataset} and .png")
 
@@ -137,6 +137,7 @@ def animate(
     side by side on a common clock, above their spin curves.  A page (html) opens without network; an mp4 needs ffmpeg.
     """
     from sweep.plots import animation
+    from sweep.results.writing import require_writable
 
     of_file = animation.is_dataset(source)
     if of_file and (settings or cells):
@@ -145,7 +146,8 @@ def animate(
     usual = Path("runs") / config.name / f"{config.name}_trajectory.gif" if config else source.with_suffix(".gif")
     target = output or usual
     animation.check(target)
-    result = _followed(config, cells, quiet) if config else source
+    require_writable(target)
+    result = _followed(config, cells_of(cells, config.table), quiet) if config else source
     target.parent.mkdir(parents=True, exist_ok=True)
     animation.animate(result, target, begin=begin, end=end, speed=speed)
     if not quiet:
@@ -156,9 +158,9 @@ def animate(
 @configured
 @click.option("--x", help="Parameter along the horizontal axis.")
 @click.option("--y", help="Parameter along the vertical axis.")
-@click.option("--bracket", type=click.FloatRange(1e-12, 0.5), default=BOUNDARY_WIDTH, show_default=True,
+@click.option("--bracket", type=click.FloatRange(*WIDTHS), default=BOUNDARY_WIDTH, show_default=True,
               help="Relative distance of the two simulated cells between which a count changes.")  # fmt: skip
-@click.option("--deviation", type=click.FloatRange(1e-9), default=BOUNDARY_DEVIATION, show_default=True,
+@click.option("--deviation", type=click.FloatRange(*DEVIATIONS), default=BOUNDARY_DEVIATION, show_default=True,
               help="Distance of a curve from its boundary between two points, in lengths of the axes.")  # fmt: skip
 @_resumed
 def boundaries(config: Config, x: str | None, y: str | None, bracket: float, deviation: float, **how: Any) -> None:
@@ -175,7 +177,7 @@ def boundaries(config: Config, x: str | None, y: str | None, bracket: float, dev
 
 @click.command()
 @configured
-@click.option("--bracket", type=click.FloatRange(1e-12, 0.5), default=SPIN_WIDTH, show_default=True,
+@click.option("--bracket", type=click.FloatRange(*WIDTHS), default=SPIN_WIDTH, show_default=True,
               help="Relative width of the brackets of n_c2.")  # fmt: skip
 @_resumed
 def critical(config: Config, bracket: float, **how: Any) -> None:
@@ -225,36 +227,43 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
     from sweep.studies.laws import fitted
 
     names, others = ([name.strip() for name in each.split(",")] if each else [] for each in (free, laws))
+    files = _files(config, "laws" if laws else "fit", output)
     with Terminal(quiet) as terminal, of_option("--free", config.table):
         result = fitted(config, film, names, others, terminal)
-    files = _save(config, "laws" if laws else "fit", result, output)
+    _save(result, files)
     files.configuration.write_text(result.attrs["config"], encoding="utf-8")
     if not quiet:
         say(f"{describe(result)}\nwrote {files.dataset}, .png and .yaml")
 
 
-def _followed(config: Config, cells: tuple[str, ...], quiet: bool, **how: Any) -> xr.Dataset:
-    """Follow the cells of `--at`."""
-    at = cells_of(cells, config.table)  # which takes no time; what is loaded then takes a second
-
+def _followed(config: Config, at: dict[str, Any], quiet: bool, **how: Any) -> xr.Dataset:
+    """Follow the cells of `--at`, and say which values axes take that it does not name."""
     from sweep.progress import Terminal
-    from sweep.studies.trajectory import trajectory
+    from sweep.studies.trajectory import first_values, trajectory
 
     with Terminal(quiet) as terminal, of_option("--at", config.table):
+        if words := first_values(config, at):
+            terminal.note(words)
         return trajectory(config, reporter=terminal, **how, **at)
 
 
-def _save(config: Config, verb: str, result: xr.Dataset, output: Path | None) -> RunFiles:
-    """Write a dataset that needed no checkpoint, and its picture."""
-    from sweep.plots import picture
-    from sweep.results import netcdf
+def _files(config: Config, verb: str, output: Path | None) -> RunFiles:
+    """Where a command without a checkpoint writes; `StoreError`, before it computes anything, if it cannot."""
     from sweep.results.folder import RunFiles
 
     files = RunFiles(output or Path("runs") / config.name, f"{config.name}_{verb}")
+    files.require_writable()
+    return files
+
+
+def _save(result: xr.Dataset, files: RunFiles) -> None:
+    """Write a dataset and its picture."""
+    from sweep.plots import picture
+    from sweep.results import netcdf
+
     files.folder.mkdir(parents=True, exist_ok=True)
     netcdf.write(files.dataset, result)
     picture.plot(result, output=files.picture)
-    return files
 
 
 def _studied(task: Task, **how: Any) -> None:

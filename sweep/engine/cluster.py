@@ -112,12 +112,16 @@ def connected(client: Client | str | None) -> Iterator[Client | None]:
     Raises
     ------
     StoreError
-        if no scheduler answers.
+        if no scheduler answers, or distributed is not installed.
     """
     if not isinstance(client, str):
         yield client
         return
-    import distributed
+    try:
+        import distributed
+    except ModuleNotFoundError:
+        words = "needs distributed, which is not installed: pip install 'dask[distributed]'"
+        raise StoreError(f"{client}: {words}") from None
 
     for logger in ("distributed", "distributed.client"):  # what a user has to know is raised as an error
         logging.getLogger(logger).setLevel("CRITICAL")

@@ -50,6 +50,8 @@ class Earlier:
     def words(self) -> str:
         """How many cells are taken over, and from which run."""
         taken, created = int((self.cells >= 0).sum()), self.dataset.attrs.get("created", "an unknown date")
+        if not taken:
+            return f"no cell of the run of {created} can be taken over; all are simulated"
         return f"{taken} of {len(self.cells)} cells are taken over from the run of {created}"
 
     def taken(self) -> tuple[Array, dict[str, Array]]:

@@ -11,6 +11,7 @@ from sweep.config import Config
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import BATCH
 from sweep.engine.plan import Choice, choose, kernels
+from sweep.faults import duration
 from sweep.grid import Array
 from sweep.kernels.build import compile_seconds, missing
 from sweep.kernels.methods import METHODS, PLAIN, automatic_step
@@ -33,8 +34,10 @@ _GENERAL = 1.4
 def estimate(config: Config) -> str:
     """Cells, steps, memory and time of a run, a line each."""
     grid = config.grid
-    axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True)) or "one cell"
-    cells = f"cells:  {grid.size} ({axes})" + (", not all of them simulated" if config.refine else "")
+    axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True))
+    cells = f"cells:  {grid.size}{f' ({axes})' if axes else ''}" + (
+        ", not all of them simulated" if config.refine else ""
+    )
     if not config.simulated:
         return cells
     sample = grid.sample(_SAMPLE)
@@ -48,13 +51,14 @@ def estimate(config: Config) -> str:
     numbers = sum(len(each.cells) * len(each.kernel.layout.names) for each in chosen)
     bytes_a_cell = np.dtype(float).itemsize * numbers / sample.size
     memory, disk = min(grid.size, BATCH) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
-    all_seconds = f"{compiling + seconds + _AROUND:.2g} s: {compiling:.2g} to compile, {seconds:.2g} to compute"
+    parts = f"{duration(compiling)} to compile, {duration(seconds)} to compute, {duration(_AROUND)} to start and draw"
+    total_time = duration(compiling + seconds + _AROUND)
     return "\n".join(
         [
             cells,
             f"steps:  {total:.3g} if every cell runs to t_end, {total / grid.size:.3g} per cell",
             f"memory: {memory:.3g} MiB for running trajectories; on disk as much again, and {disk:.3g} MiB of results",
-            f"time:   about {all_seconds}, {_AROUND} to start and draw; less if cells settle, more if some run again",
+            f"time:   about {total_time}: {parts}; less if cells settle, more if some run again",
         ]
     )
 

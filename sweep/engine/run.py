@@ -66,6 +66,10 @@ def run(
         raise ValueError(f"rerun must be {' or '.join(RERUN)}, not {rerun!r}")
     if rerun and fresh:
         raise StoreError("--rerun needs the dataset that --fresh discards; leave out one of the two")
+    if rerun and output is None:
+        raise StoreError("rerun needs output, the folder of the run whose cells are to be simulated again")
+    if rerun and config.refine:
+        raise StoreError("--rerun cannot simulate single cells of a refined run; start anew with --fresh")
     dataset.check_names(config)
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)
@@ -90,7 +94,7 @@ def run(
                 _compute(config, store, reporter, there, earlier).save(files.dataset)
         files.discard_checkpoint()
         point()
-        result = open_dataset(files.dataset, load=config.grid.size <= LARGE)
+        result = files.opened(files.dataset, load=config.grid.size <= LARGE)
         _draw(config.picture, result, files, reporter)
     return result
 
@@ -117,12 +121,12 @@ def _earlier(
         if results of that dataset would be lost.
     """
     if found:
-        there = open_dataset(files.dataset)
+        there = files.opened(files.dataset)
         if reason := reason_against(config, found, identity, there, rerun):
             raise not_resumed(files.dataset, reason)
         files.keep_earlier()
     elif files.earlier.exists():
-        there = open_dataset(files.earlier)
+        there = files.opened(files.earlier)
     elif rerun:
         raise StoreError(f"{files.dataset}: no such file; --rerun needs the dataset of an earlier run")
     else:

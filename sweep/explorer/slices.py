@@ -16,7 +16,7 @@ from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, marks, quantities
 from sweep.plots.description import Map, along, describe
-from sweep.results.kind import kind
+from sweep.results.kind import kind, opened
 from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
 
@@ -135,7 +135,7 @@ class Source:
 
 def open_source(path: Path) -> Source:
     """Open a dataset for the explorer: into memory if it is not too large."""
-    lazy = open_dataset(path, load=False)
+    lazy = opened(path, load=False)
     source = Source(lazy, str(path))
     if math.prod(lazy.sizes[d] for d in source.dims) > IN_MEMORY:
         return source

@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
+from sweep.config.document import is_number, plain_data
 from sweep.faults import fault_of
 from sweep.plots import labels
 from sweep.plots.quantities import COMPARISONS, derivable, field, first_picture, subject
@@ -108,9 +109,17 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
             raise fault_of(f"there is no axis {name}; the axes are {axes or 'none'}", "sel")
-        if not math.isfinite(wanted):
+        at = plain_data(wanted)
+        if not (is_number(at) and math.isfinite(at)):
             raise fault_of(f"{name} = {wanted}; give a finite number", "sel")
-        found[name] = int(np.abs(dataset[name].values - wanted).argmin())
+        values = dataset[name].values
+        low, high = values.min(), values.max()
+        # Half a cell beyond the ends, as the cells of a map go.
+        beyond = (high - low) / (len(values) - 1) / 2 if len(values) > 1 else abs(low) / 2
+        if not low - beyond <= at <= high + beyond:
+            span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+            raise fault_of(f"{name} = {at:g} is far from all its values, {span}; choose one of them", "sel")
+        found[name] = int(np.abs(values - at).argmin())
     return found
 
 

@@ -150,6 +150,7 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
             raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
         return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
     chosen = panels.choose(dataset, variable, **axes)
+    _require_scale(chosen, **how)
     if len(chosen.across) == 2:
         return maps.draw(chosen, **how)
     figure, frames = framed(chosen.dataset, chosen.each, next(iter(chosen.across), ""))
@@ -164,11 +165,21 @@ def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str
     chosen = panels.choose(dataset, variable, **axes, alone=True)
     if len(chosen.each) > 1 or (chosen.names == ["probability"] and "count" in chosen.dataset.dims):
         raise fault_of(f"{chosen.names[0]} needs more than one panel; select a value of each other axis", "ax")
+    _require_scale(chosen, **how)
     if len(chosen.across) == 2:
         maps.draw_in(ax, chosen, **how)
         return
     ax.set_xlabel(labels.label(chosen.dataset, chosen.across[0]) if chosen.across else "")
     _fill(chosen, [(ax, chosen.dataset.isel(chosen.each[0]))], how["limits"])
+
+
+def _require_scale(chosen: panels.Panels, limits: Limits | None, cmap: str | None) -> None:
+    """Raise a `ConfigError` for limits or a colour map that the chosen panels have no scale for."""
+    name = chosen.names[0]
+    if limits is not None and labels.flag_words(chosen.dataset, name):
+        raise fault_of(f"{name} is drawn as categories, which have no scale; leave them out", "limits")
+    if cmap is not None and len(chosen.across) < 2:
+        raise fault_of(f"{name} is drawn as a curve, which has no colour scale; leave it out", "cmap")
 
 
 def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None) -> list[Artist]:

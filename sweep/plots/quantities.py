@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import xarray as xr
 
 from sweep.config import Config, ConfigError
-from sweep.faults import either, fault_of, refusal
+from sweep.faults import either, fault_of, refusal, suggestion
 from sweep.kernels.measures import MEASURES
 from sweep.plots import labels, regimes
 from sweep.results.dataset import VARIABLES
@@ -73,8 +73,8 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
     if name in (possible := derivable(dataset)):
         return DERIVED[name].derive(dataset)
     if name not in dataset.data_vars:
-        choices = ", ".join([*map(str, dataset.data_vars), *possible])
-        raise fault_of(f"there is no variable {name}; choose {choices}", "variable")
+        choices = [*map(str, dataset.data_vars), *possible]
+        raise fault_of(f"there is no variable {name}{suggestion(name, choices)}; choose {either(choices)}", "variable")
     return dataset[name]
 
 

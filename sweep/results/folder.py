@@ -9,10 +9,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import xarray as xr
+
 from sweep.results import netcdf
 from sweep.results.identity import Identity
 from sweep.results.store import StoreError
-from sweep.results.writing import remove_unfinished, replacing
+from sweep.results.writing import remove_unfinished, replacing, require_writable
 
 
 class RunFiles:
@@ -31,16 +33,31 @@ class RunFiles:
         further = {self.folder / f"{self.name}_{name}.png": name for name in variables[1:]}
         return {self.picture: variables[0] if variables else None, **further}
 
+    def require_writable(self) -> None:
+        """Raise a `StoreError` if dataset or picture cannot be written."""
+        netcdf.require_name(self.dataset)
+        for path in (self.dataset, self.picture):
+            require_writable(path)
+
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other runs of this name out of the folder; `StoreError` if one is at work there.
+        """Keep other runs of this name out of the folder.
 
         The operating system holds the lock, and lets go of it when the process ends, however it ends.
+
+        Raises
+        ------
+        StoreError
+            if another run is at work there, or nothing can be written.
         """
+        self.require_writable()
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f".{self.name}.lock"
         while True:
-            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            try:
+                handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            except OSError as error:
+                raise StoreError(f"{self.dataset}: cannot be locked: {error.strerror}") from None
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -70,8 +87,15 @@ class RunFiles:
         """
         if not self.dataset.exists():
             return None
-        with netcdf.open_dataset(self.dataset, load=False) as dataset:
+        with self.opened(self.dataset, load=False) as dataset:
             return Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
+
+    def opened(self, path: Path, *, load: bool = True) -> xr.Dataset:
+        """Open the dataset at `path`, which is one of these files; errors as of `open_dataset` say how to go on."""
+        try:
+            return netcdf.open_dataset(path, load=load)
+        except StoreError as error:
+            raise StoreError(f"{error}; discard it with --fresh, or choose another --output") from None
 
     def keep_earlier(self) -> None:
         """Keep the dataset that is there while the run that enlarges it goes on."""

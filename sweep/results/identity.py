@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sweep.faults import printable
+from sweep.faults import either, printable
 from sweep.results.store import StoreError
+
+_UNSEEN = {"cases": "the table of cases", "misfit": "the film"}
+"""What a configuration names and does not contain, by its key."""
 
 
 @dataclass(frozen=True)
@@ -32,12 +36,16 @@ class Identity:
 
     def difference(self, other: Identity) -> str:
         """Why a run of `other` cannot resume files of this identity; "" if it can."""
+        if not self.config_hash:
+            return "another program, or has been edited since"
         if self.config_hash != other.config_hash:
             old, new = (c.config.splitlines() for c in (self, other))
             changed = [f"- {printable(line.strip())}" for line in old if line not in new]
             changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
             changed += [] if self.of_one_run else ["some cells were computed again (--rerun)"]
-            return "another configuration:\n  " + "\n  ".join(changed or ["the table of cases differs, or the film"])
+            unseen = [words for key, words in _UNSEEN.items() if re.search(rf"\b{key}: ", other.config)]
+            changed = changed or [f"{either(unseen or ['the order of the axes'])} differs"]
+            return "another configuration:\n  " + "\n  ".join(changed)
         if self.versions != other.versions:
             return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
         return "other sources of the model or kernel" if self.source_hash != other.source_hash else ""

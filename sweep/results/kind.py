@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import xarray as xr
 
+from sweep.faults import counted
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import VARIABLES
+from sweep.results.margins import POINTS
 from sweep.results.netcdf import open_dataset
+from sweep.results.probabilities import PROBABILITIES
 from sweep.results.store import StoreError
 
 ATTRIBUTE = "sweep_kind"
@@ -19,7 +23,7 @@ OWN_BODY = "a model"
 """What `model_brings` says of the model of a user that need not be of a rattleback."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kind:
     """A kind of dataset."""
 
@@ -31,15 +35,51 @@ class Kind:
     """Variables and dimensions by which a dataset that does not name its kind is known."""
     explored: bool = False
     """Whether the explorer shows it."""
+    needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """The variables without which it cannot be shown, and dimensions that each must have."""
+    attributes: tuple[str, ...] = ()
+    """The attributes without which it cannot be shown."""
 
 
-TRAJECTORY = Kind("trajectory", "single trajectories", frozenset({"trajectory"}))
-CRITICAL = Kind("critical", "critical spins", frozenset({"critical_reason"}), explored=True)
-BOUNDARIES = Kind("boundaries", "boundaries", frozenset({"level", "curve", "end_more"}))
-FIT = Kind("fit", "a fit", frozenset({"seen", "fitted"}))
-INDICES = Kind("indices", "Sobol indices", frozenset({"first_order", "total_order"}))
+def _over(dims: tuple[str, ...], *names: str) -> dict[str, tuple[str, ...]]:
+    return dict.fromkeys(names, dims)
+
+
+_SPINS = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
+_ENDS = [f"{order}{end}" for order in ("first_order", "total_order") for end in ("", "_low", "_high")]
+_FITTED = ("value", *(f"{end}_{share}" for share in (68, 95) for end in ("lower", "upper")))
+
+TRAJECTORY = Kind(
+    "trajectory", "single trajectories", frozenset({"trajectory"}),
+    needs=_over(("trajectory",), "status", "t_stop") | _over(("time",), "time") | {"spin": ("trajectory", "time")},
+)  # fmt: skip
+CRITICAL = Kind(
+    "critical", "critical spins", frozenset({"critical_reason"}), explored=True,
+    needs=_over((), "critical_reason", *(f"{name}_reason" for name in _SPINS),
+                *(f"{name}_{'linear' if name.startswith('n_c1') else 'simulated'}" for name in _SPINS)),
+)  # fmt: skip
+BOUNDARIES = Kind(
+    "boundaries", "boundaries", frozenset({"level", "curve", "end_more"}),
+    needs=_over(("point",), *POINTS), attributes=("x", "y", "trajectories"),
+)  # fmt: skip
+FIT = Kind(
+    "fit", "a fit", frozenset({"seen", "fitted"}),
+    needs=_over(("parameter",), *_FITTED) | _over(("time",), "time", "seen", "fitted"),
+    attributes=("title", "undetermined"),
+)  # fmt: skip
+INDICES = Kind(
+    "indices", "Sobol indices", frozenset({"first_order", "total_order"}),
+    needs=_over(("quantity", "parameter"), *_ENDS) | {name: (name,) for name in ("quantity", "parameter")},
+    attributes=("title", "trajectories"),
+)  # fmt: skip
 RUN = Kind("run", "a run", frozenset(), explored=True)
 """Its variables depend on what was measured.  Predictions count as a run, and so does a part of one."""
+
+_MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
+"""Dimensions that have no values where nothing was found, and that not each dataset of a kind has."""
+
+_CODES = ("status", "level", "curve", "outcome")
+"""Variables that mean nothing once they are averaged."""
 
 _KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, RUN)}
 
@@ -55,12 +95,45 @@ def kind(dataset: xr.Dataset) -> Kind | None:
 
 
 def opened(path: Path, *, load: bool = True) -> xr.Dataset:
-    """Open a dataset as `open_dataset` does; `StoreError` also if it is of no kind."""
+    """Open a dataset as `open_dataset` does; `StoreError` also if it is of no kind, or lacks what its kind needs."""
     dataset = open_dataset(path, load=load)
-    if kind(dataset) is None:
+    if found := fault(dataset):
         dataset.close()
-        raise StoreError(f"{path}: not a dataset of sweep: no variable of it, such as status")
+        raise StoreError(f"{path}: {found}")
     return dataset
+
+
+def fault(dataset: xr.Dataset) -> str:
+    """Say why a dataset cannot be shown, such as one that has been averaged or cut since; "" if it can."""
+    if (found := kind(dataset)) is None:
+        return "not a dataset of sweep: no variable of it, such as status"
+    if empty := [dim for dim, size in dataset.sizes.items() if not size and dim not in _MAY_BE_EMPTY]:
+        return f"the axis {empty[0]} has no values; select at least one"
+    if stacked := [name for name, index in dataset.indexes.items() if index.nlevels > 1]:
+        return f"the axis {stacked[0]} is stacked; unstack it"
+    needs, there = _needs(dataset, found), {name: {*variable.dims} for name, variable in dataset.variables.items()}
+    lacks = [f"the variable {name}" for name in needs if name not in there]
+    lacks += [f"the attribute {name}" for name in found.attributes if name not in dataset.attrs]
+    known = {name: {*dims} for name, dims in needs.items() if name in there}
+    lacks += [f"the axis {dim} of {name}" for name, dims in known.items() for dim in sorted(dims - there[name])]
+    if lacks:
+        more = f" and {counted(len(lacks) - 1, 'other thing')}" if len(lacks) > 1 else ""
+        return f"lacks {lacks[0]}{more}; it was cut or averaged: take the dataset that sweep wrote"
+    further = [str(dim) for name, dims in known.items() if dims for dim in there[name] - dims - _MAY_COME]
+    averaged = [name for name in known if name in _CODES and dataset[name].dtype.kind not in "iu"]
+    words = [*(f"the further axis {dim}; select one of its values" for dim in further),
+             *(f"no whole numbers in {name}: it was averaged" for name in averaged)]  # fmt: skip
+    return f"has {words[0]}" if words else ""
+
+
+def _needs(dataset: xr.Dataset, found: Kind) -> Mapping[str, tuple[str, ...]]:
+    """Return what a dataset of the kind that was found has to have, by what else it has."""
+    needs = {**found.needs}
+    if found == BOUNDARIES:
+        needs |= _over((), *(dataset.attrs[name] for name in ("x", "y") if name in dataset.attrs))
+    if found == TRAJECTORY and not is_of_own_body(dataset):
+        needs |= _over((), "a", "b", "c")
+    return needs | _over((), *PROBABILITIES, "count") if found == RUN and "probability" in dataset else needs
 
 
 def is_of_own_body(dataset: xr.Dataset) -> bool:

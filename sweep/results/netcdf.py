@@ -61,10 +61,19 @@ def _write_frame(frame: xr.Dataset, path: Path) -> None:
         frame.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
 
 
+def require_name(path: Path) -> None:
+    """Raise a `StoreError` if netCDF cannot open files at this path."""
+    try:
+        os.path.abspath(path).encode()
+    except UnicodeEncodeError:
+        raise StoreError(f"{path}: its full path is not UTF-8, as netCDF needs it; rename the folder") from None
+
+
 def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
     """Read a dataset, into memory or (`load=False`) when it is asked for; `StoreError` if it is not one."""
     if not path.is_file():
         raise StoreError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+    require_name(path)
     try:
         if load:
             _refuse_larger_than_memory(path)
@@ -76,7 +85,8 @@ def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
     except StoreError:
         raise
     except Exception as error:  # what HDF5, netCDF and xarray raise for damaged files is documented nowhere
-        raise StoreError(f"{path}: not a netCDF dataset: {error}") from None
+        words = getattr(error, "strerror", None) or error
+        raise StoreError(f"{path}: not a netCDF dataset, or damaged: {words}") from None
 
 
 def _refuse_larger_than_memory(path: Path) -> None:

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import xarray as xr
 
-from sweep.kernels.method import STEP_RULES
+from sweep.faults import counted, duration
+from sweep.kernels.method import MISSED, STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import REASONS, STATUSES, Reason
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, TRAJECTORY, Kind, kind, parameters
@@ -40,7 +41,7 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
     """How many points were found, and how exactly."""
     points, open_ = dataset.sizes["point"], int((dataset["outcome"] == OPEN).sum())
     curves, simulated = len(np.unique(dataset["curve"])), dataset.attrs["trajectories"]
-    yield f"{curves} curves with {points} points, by {simulated} simulations"
+    yield f"{counted(curves, 'curve')} with {counted(points, 'point')}, by {counted(simulated, 'simulation')}"
     one = dataset.isel(point=(dataset["outcome"] == FOUND).values)
     if found := one.sizes["point"]:
         width = np.abs(one["end_more"] - one["end_fewer"]) / np.maximum(abs(one["end_more"]), abs(one["end_fewer"]))
@@ -69,10 +70,10 @@ def _fit(dataset: xr.Dataset) -> Iterator[str]:
         yield f"{name:12} {one['value'].item():12.6g}   {'   '.join(ends)}"
     yield from filter(None, dataset.attrs["undetermined"].split("; "))
     if others := int((dataset["misfit"][1:] < 1.05 * dataset["misfit"][0]).sum()):
-        yield f"{others} other minima fit as well, within 5 % of the misfit: see the variable minimum"
+        yield f"{counted(others, 'other minimum fits', 'other minima fit')} within 5 % as well: see minimum"
     yield (
         f"residuals {dataset.attrs['root_mean_square']:.4g}, root mean square; Akaike's criterion "
-        f"{dataset.attrs['akaike']:.6g}; {dataset.attrs['trajectories']} trajectories"
+        f"{dataset.attrs['akaike']:.6g}; {counted(dataset.attrs['trajectories'], 'trajectory', 'trajectories')}"
     )
 
 
@@ -83,10 +84,10 @@ def _indices(dataset: xr.Dataset) -> Iterator[str]:
         for name in dataset["parameter"].values:
             one = dataset.sel(quantity=quantity, parameter=name)
             alone, total = (
-                "{:6.3f} ({:.3f} to {:.3f})".format(*(one[f"{order}{end}"].item() for end in ("", "_low", "_high")))
+                _interval(*(one[f"{order}{end}"].item() for end in ("", "_low", "_high")))
                 for order in ("first_order", "total_order")
             )
-            yield f"  {quantity:18} {name:8} {alone}   {total}"
+            yield f"  {quantity:18} {name:8} {alone:22}   {total}".rstrip()
 
 
 def _laws(dataset: xr.Dataset) -> Iterator[str]:
@@ -105,20 +106,21 @@ def _laws(dataset: xr.Dataset) -> Iterator[str]:
 def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
     """A line for each trajectory: how it ended, and its reversals."""
     most = 20
-    yield f"{dataset.sizes['trajectory']} trajectories, sampled in time"
+    yield f"{counted(dataset.sizes['trajectory'], 'trajectory', 'trajectories')}, sampled in time"
     for i in range(min(dataset.sizes["trajectory"], most)):
         one = dataset.isel(trajectory=i)
         where = ", ".join(f"{name} = {float(one[name]):g}" for name in parameters(one))
-        count = f", {int(one['reversals'])} reversals" if "reversals" in one else ""
+        count = f", {counted(int(one['reversals']), 'reversal')}" if "reversals" in one else ""
         samples = int(np.isfinite(one["spin"]).sum())
-        yield f"  {where}: {STATUSES[int(one['status'])]} at t = {float(one['t_stop']):.6g}{count}, {samples} samples"
+        end = f"{STATUSES[int(one['status'])]} at t = {float(one['t_stop']):.6g}"
+        yield f"  {where}: {end}{count}, {counted(samples, 'sample')}"
     if dataset.sizes["trajectory"] > most:
         yield f"  and {dataset.sizes['trajectory'] - most} more"
 
 
 def _critical(dataset: xr.Dataset) -> Iterator[str]:
     """How many critical spins were found, and why the others were not."""
-    yield f"critical spins of {_count(dataset['critical_reason'], 'bodies', 'no axis')}"
+    yield f"critical spins of {_count(dataset['critical_reason'], 'body', 'bodies')}"
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
     for name in ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus"):
@@ -131,19 +133,21 @@ def _critical(dataset: xr.Dataset) -> Iterator[str]:
         yield f"  {name}: {ends}{span}"
 
 
-def _count(variable: xr.DataArray, of: str, no_axis: str) -> str:
+def _count(variable: xr.DataArray, *noun: str) -> str:
     """How many values there are, and along which axes."""
-    return f"{variable.size} {of} ({' × '.join(f'{d} {n}' for d, n in variable.sizes.items()) or no_axis})"
+    axes = " × ".join(f"{d} {n}" for d, n in variable.sizes.items())
+    return f"{counted(variable.size, *noun)}{f' ({axes})' if axes else ''}"
 
 
 def _run(dataset: xr.Dataset) -> Iterator[str]:
     """How cells ended, what they count, how exact they are, and what they cost."""
-    if "status" not in dataset:
-        yield "no status: predictions, or a part of a run"
+    if "status" not in dataset or dataset["status"].dtype.kind not in "iu":
+        averaged = "status" in dataset
+        yield "no status of single cells: averaged" if averaged else "no status: predictions, or a part of a run"
         return
     status = np.ravel(dataset["status"].values)
     ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if code in status)
-    yield f"{_count(dataset['status'], 'cells', 'one cell')}: {ends}"
+    yield f"{_count(dataset['status'], 'cell')}: {ends or 'status unknown'}"
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
     if "simulated_share" in dataset.attrs:
@@ -162,13 +166,18 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         error = dataset[f"{name}_error"].values if f"{name}_error" in dataset else np.empty(0)
         if np.isfinite(error).any():
             yield f"{name} error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}{words}"
-    if "step_rule" in dataset and (status != IMPOSSIBLE).any():
+    if {"step", "step_rule"} <= {*dataset.data_vars} and (status != IMPOSSIBLE).any():
         rule, step = (np.ravel(dataset[name].values)[status != IMPOSSIBLE] for name in ("step_rule", "step"))
-        who = ", ".join(f"{name} in {(rule == code).sum()}" for code, name in STEP_RULES.items() if code in rule)
-        yield f"step: {step.min():.3g} to {step.max():.3g}, set by {who} cells"
+        found = {name: int((rule == code).sum()) for code, name in STEP_RULES.items() if code in rule}
+        missed = found.pop(STEP_RULES[MISSED], 0)
+        who = ", ".join(f"{name} in {counted(count, 'cell')}" for name, count in found.items())
+        yield f"step: {step.min():.3g} to {step.max():.3g}{f', set by {who}' if who else ''}"
+        if missed:
+            verb = "misses" if missed == 1 else "miss"
+            yield f"tolerance: {missed} of {counted(status.size, 'cell')} {verb} the requested tolerance"
     if "wall_time" in dataset.attrs:
-        seconds, rate = dataset.attrs["wall_time"], dataset.attrs["trajectories_per_second"]
-        yield f"cost: {seconds:.3g} s, {rate:.3g} trajectories/s"
+        rate = dataset.attrs.get("trajectories_per_second", np.nan)
+        yield f"cost: {duration(dataset.attrs['wall_time'])}, {rate:.3g} trajectories/s"
 
 
 def _probabilities(dataset: xr.Dataset) -> Iterator[str]:
@@ -176,7 +185,12 @@ def _probabilities(dataset: xr.Dataset) -> Iterator[str]:
     for count in dataset["count"].values:
         one = dataset.sel(count=count)
         share, low, high = (one[name].item() for name in PROBABILITIES)
-        yield f"{count} or more {share:.3f} ({low:.3f} to {high:.3f})"
+        yield f"{count} or more {_interval(share, low, high)}"
+
+
+def _interval(value: float, low: float, high: float) -> str:
+    """A share with its interval of 95 %, where it is known."""
+    return f"{value:6.3f} ({low:.3f} to {high:.3f})" if np.isfinite(value) else "unknown"
 
 
 def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:

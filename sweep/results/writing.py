@@ -8,13 +8,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from sweep.results.store import StoreError
 
 _PROBE = 1 << 22
 """Bytes; more than HDF5 writes at once."""
+
+_BLOCK = 1 << 12
+"""Bytes for which a disk that is not full has room."""
+
+
+def require_writable(path: Path) -> None:
+    """Raise a `StoreError` if a file cannot be written, before anything is computed for it.
+
+    A folder that is missing may be made later; nothing is left on the disk.
+    """
+    if path.is_dir():
+        raise StoreError(f"{path}: cannot be written: a folder")
+    folder = next(each for each in path.absolute().parents if each.exists())
+    try:
+        with TemporaryFile(dir=folder) as stream:
+            stream.write(bytes(_BLOCK))
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written: {error.strerror}; choose another --output") from None
 
 
 @contextmanager
@@ -37,7 +56,8 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # a disk that is read-only says so even of a file that is not there
+            temporary.unlink()
 
 
 def remove_unfinished(path: Path) -> None:

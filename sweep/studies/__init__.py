@@ -8,3 +8,6 @@ BOUNDARY_DEVIATION = 1e-2
 
 SPIN_WIDTH = 1e-3
 """Relative width down to which simulation brackets n_c2."""
+
+WIDTHS, DEVIATIONS = (1e-12, 0.5), (1e-9, 1.0)
+"""The least and the largest width of brackets, and deviation of curves, that can be asked for."""

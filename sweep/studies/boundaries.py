@@ -24,9 +24,10 @@ from sweep.models.model import COUNT
 from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
+from sweep.studies import DEVIATIONS, WIDTHS
 from sweep.studies.curve import Cell, Curve, Middle, Point
 from sweep.studies.kept import Task
-from sweep.studies.search import Search, measuring, require_certain
+from sweep.studies.search import Search, measuring, require_between, require_certain
 
 # How far a place on an edge of the grid is from a whole index at most: that of rounding.  `_levelled` keeps places on
 # diagonals farther away.
@@ -38,6 +39,8 @@ Asked = tuple[Curve, Point | Middle, float]
 
 def boundaries(config: Config, x: str | None, y: str | None, width: float, deviation: float) -> Task:
     """What `sweep.api.boundaries` asks for."""
+    require_between("bracket", width, WIDTHS)
+    require_between("deviation", deviation, DEVIATIONS)
     across = chosen_axes(config, x, y)
     words = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
     make = partial(Boundaries, across=across, width=width, deviation=deviation)

@@ -20,9 +20,10 @@ from sweep.results import dataset
 from sweep.results.dataset import Reason
 from sweep.results.margins import Counts
 from sweep.results.store import Store
+from sweep.studies import WIDTHS
 from sweep.studies.kept import Task
 from sweep.studies.roots import Root
-from sweep.studies.search import Search, measuring, require_certain
+from sweep.studies.search import Search, measuring, require_between, require_certain
 
 RATIO = 1.25
 """From one spin of the way outwards to the next."""
@@ -38,6 +39,7 @@ _FARTHEST = 8.0
 
 def critical(config: Config, width: float) -> Task:
     """What `sweep.api.critical` asks for."""
+    require_between("bracket", width, WIDTHS)
     words = f"width of the brackets: {width!r}"
     return Task(searchable(config), "critical", words, partial(CriticalSpins, width=width))
 

@@ -16,7 +16,7 @@ import numpy as np
 from sweep.config import Config, ConfigError
 from sweep.engine.errors import ROUND_OFF
 from sweep.engine.whole import Whole
-from sweep.faults import either
+from sweep.faults import either, fault_of, quote
 from sweep.grid import Array
 from sweep.kernels.measures import default
 from sweep.models import MODELS
@@ -54,6 +54,12 @@ def require_simulated(config: Config) -> None:
     if not config.simulated:
         message = f"the {config.model} model is a formula and cannot be simulated; choose {either(MODELS)}"
         raise ConfigError([config.fault(("model",), message)])
+
+
+def require_between(option: str, value: float, ends: tuple[float, float]) -> None:
+    """Raise a `ConfigError` if the value of an option is not between these."""
+    if not ends[0] <= value <= ends[1]:
+        raise fault_of(f"must be between {ends[0]:g} and {ends[1]:g}, not {quote(value)}", option)
 
 
 class Search(Whole):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import xarray as xr
 from sweep import units as u
 from sweep.config import Config, ConfigLike, load_config
 from sweep.config.cross_checks import misplaced, unfit
+from sweep.config.document import is_number, plain_data
 from sweep.config.schema import FOREVER
 from sweep.config.values import numbers_of
 from sweep.engine import executor, final
@@ -21,7 +23,7 @@ from sweep.engine.executor import UNTIL_ALL_STOP, Work, nominal_seconds
 from sweep.engine.plan import plan, steps_of
 from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
-from sweep.faults import fault_of, suggestion
+from sweep.faults import duration, fault_of, refusal, suggestion
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
 from sweep.kernels import path
@@ -135,6 +137,8 @@ def trajectory(
     ConfigError
         if the model is a formula, `at` picks cells that cannot be run, or the samples do not fit into memory.
     """
+    if every is not None and not (is_number(each := plain_data(every)) and 0 < each < inf):
+        raise fault_of(refusal(every, "a finite number > 0"), "every")
     chosen = choose(config, at, samples)
     stops = stop_when_settled or chosen.integrator.t_end >= FOREVER
     chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_when_settled": stops}))
@@ -145,6 +149,14 @@ def trajectory(
     numbers = np.arange(found.sizes["trajectory"]) % samples
     told = {"long_name": SAMPLE, "description": dataset.ROWS[SAMPLE]}
     return found.assign_coords({SAMPLE: ("trajectory", numbers, told)})
+
+
+def first_values(config: Config, at: Mapping[str, Any]) -> str:
+    """Say in words which axes of `config` take their first value because `at` does not name them; "" if none."""
+    config = config.at_medians
+    columns = {name: value.numbers for name, value in config.parameters.items()} | config.cases
+    left = [f"{name} = {values[0]:g}" for name, values in columns.items() if len({*values}) > 1 and name not in at]
+    return f"taking the first value of each axis that is not named: {', '.join(left)}" if left else ""
 
 
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
@@ -201,7 +213,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
             f"trajectories: {len(steps)}",
             f"steps:        at most {steps.sum():.3g}",
             f"samples:      at most {samples:.3g}",
-            f"time:         at most about {seconds:.3g} s",
+            f"time:         at most about {duration(seconds)}",
         ]
     )
 

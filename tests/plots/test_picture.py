@@ -270,9 +270,9 @@ def test_the_suffix_names_the_format(suffix: str, tmp_path: Path) -> None:
     write(tmp_path / "made.nc", made())
     for name in ("one", "two"):
         target = tmp_path / f"{name}.{suffix}"
-        result = invoke("plot", tmp_path / "made.nc", "--var", "reversals", "--sel", "n0=0.1", "--output", target)
+        result = invoke("plot", tmp_path / "made.nc", "--var", "reversals", "--sel", "n0=0.06", "--output", target)
         assert result.exit_code == 0, result.output
-        assert "n0 = 0.05, nearest to 0.1" in result.stdout
+        assert "n0 = 0.05, nearest to 0.06" in result.stdout
         assert target.read_bytes().startswith(MAGIC[suffix])
     assert (tmp_path / f"one.{suffix}").read_bytes() == (tmp_path / f"two.{suffix}").read_bytes()
 

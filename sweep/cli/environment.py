@@ -1,0 +1,25 @@
+"""Checks environment variables with which Numba would fail, after a warning or a traceback of its own."""
+
+from __future__ import annotations
+
+import os
+import re
+
+from sweep.cli.faults import refuse
+from sweep.faults import either, refusal
+
+_LAYERS = ("default", "safe", "forksafe", "threadsafe", "tbb", "omp", "workqueue")
+
+_ALLOWED = {
+    "NUMBA_NUM_THREADS": (r"\+?0*[1-9]\d{0,3}", "a whole number from 1 to 9999"),
+    "NUMBA_DISABLE_JIT": ("[01]", "0 or 1"),
+    "NUMBA_THREADING_LAYER": ("|".join(_LAYERS), either(_LAYERS)),
+}
+"""A pattern of what each may be, and the same in words."""
+
+
+def check() -> None:
+    """Raise a `ConfigError` for the first variable that is set to what Numba does not take."""
+    for name, (pattern, words) in _ALLOWED.items():
+        if (given := os.environ.get(name, "").strip()) and not re.fullmatch(pattern, given):
+            refuse(name, refusal(given, words))

@@ -1,0 +1,149 @@
+"""No option is accepted and does nothing: it is refused, or the command says what it did instead."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import Write
+from support.cli import invoke
+
+import sweep
+from sweep.config import ConfigError
+
+GRID = {"name": "quick", "friction": {"mu": [40.0, 60.0, 80.0, 100.0, 120.0]}, "start": {"n0": [0.02, 0.05]}}
+TEXT = "name: quick\nmodel: averaged\nfriction: {mu: [40, 60]}\nstart: {n0: [0.02, 0.05]}\nintegrator: {t_end: 40}\n"
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The file of a dataset, with the pictures that its run drew."""
+    found = sweep.predict(GRID)
+    status = (("mu", "n0"), np.ones((5, 2), "int8"), {"flag_values": [1, 2], "flag_meanings": "settled time_limit"})
+    found.assign(status=status).to_netcdf(tmp_path / "quick.nc")
+    (tmp_path / "quick.png").write_bytes(b"of the run")
+    return tmp_path / "quick.nc"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("--var status --limits 0..5", "limits: status is drawn as categories, which have no scale; leave them out"),
+        ("--sel n0=0.02 --cmap gray", "cmap: reversals_predicted is drawn as a curve, which has no colour scale"),
+        ("--sel n0=5", "sel: n0 = 5 is far from all its values, 0.02 to 0.05; choose one of them"),
+        ("--sel n0=0.02 --sel n0=0.05", "--sel n0=0.05: n0 has another value already; draw one picture for each"),
+        ("--var reversals_predict", "no variable reversals_predict (did you mean reversals_predicted?); choose"),
+    ],
+)
+def test_what_a_picture_has_no_use_for_is_refused(options: str, said: str, file: Path) -> None:
+    result = invoke("plot", file, *options.split())
+    assert (result.exit_code, said in result.stderr) == (2, True), result.output
+    assert {path.name for path in file.parent.iterdir()} == {"quick.nc", "quick.png"}
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [
+        ("--sel n0=0.04", "quick_n0=0.04.png"),
+        ("--var form_factor", "quick_form_factor.png"),
+        ("--x n0 --y mu --width 85mm --no-title", "quick_x=n0_y=mu_width=85mm_no-title.png"),
+        ("--limits 0..3", "quick_limits=0..3.png"),
+    ],
+)
+def test_the_picture_of_the_run_is_not_overwritten(options: str, name: str, file: Path) -> None:
+    result = invoke("plot", file, *options.split())
+    assert result.stdout.endswith(f"wrote {file.parent / name}\n"), result.output
+    assert (file.parent / "quick.png").read_bytes() == b"of the run"
+    assert invoke("plot", file).stdout == f"wrote {file.parent / 'quick.png'}\n"
+
+
+@pytest.mark.parametrize("value", [slice(0, 1), "a", [0.02, 0.05], np.nan, True])
+def test_a_selection_is_a_number(value: Any) -> None:
+    with pytest.raises(ConfigError, match=r"^sel: n0 = .*; give a finite number"):
+        sweep.plot(sweep.predict(GRID), sel={"n0": value})
+
+
+def test_a_selection_is_any_number_near_a_value() -> None:
+    maps = sweep.predict(GRID)
+    for value in (0.05, np.float32(0.05), maps.n0[1], 0.06):
+        assert sweep.plot(maps, sel={"n0": value}).axes
+    with pytest.raises(ConfigError, match=r"^sel: n0 = 0\.066 is far from all its values, 0\.02 to 0\.05"):
+        sweep.plot(maps, sel={"n0": 0.066})
+
+
+@pytest.mark.parametrize("every", [0, -1, np.nan, np.inf, "1", True])
+def test_the_time_between_samples_is_a_positive_number(every: Any) -> None:
+    with pytest.raises(ConfigError, match=r"^every: must be a finite number > 0, not"):
+        sweep.trajectory({"model": "averaged", "friction": {"mu": 60}}, t_end=20, every=every)
+
+
+TAKEN = "taking the first value of each axis that is not named: "
+
+
+def test_a_trajectory_says_which_values_it_takes(write: Write, tmp_path: Path) -> None:
+    result = invoke("trajectory", write(TEXT), "--at", "mu=60", "--output", tmp_path)
+    assert f"{TAKEN}n0 = 0.02\n" in result.stderr
+    assert (
+        TAKEN not in invoke("trajectory", write(TEXT), "--at", "mu=60", "--at", "n0=0.05", "--output", tmp_path).stderr
+    )
+    with pytest.warns(UserWarning, match=f"^{TAKEN}n0 = 0.02$") as warned:
+        sweep.trajectory(write(TEXT), mu=60)
+    assert warned[0].filename == __file__
+    sweep.trajectory(write(TEXT), mu=60, n0=0.05)
+    sweep.trajectory(write(TEXT))  # the first cell, as documented
+
+
+@pytest.mark.parametrize("name", ["bracket", "deviation"])
+@pytest.mark.parametrize("value", [0, -1, 2, np.nan])
+def test_a_width_that_no_search_reaches_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ConfigError, match=f"^{name}: must be between .* and .*, not "):
+        sweep.boundaries(GRID, **{name: value})  # type: ignore[arg-type]
+
+
+def test_cells_are_run_again_only_of_a_run_that_is_there(write: Write) -> None:
+    with pytest.raises(sweep.StoreError, match=r"^rerun needs output, the folder of the run"):
+        sweep.run(write(TEXT), rerun="failed")
+    said = r"^--rerun cannot simulate single cells of a refined run; start anew with --fresh"
+    with pytest.raises(sweep.StoreError, match=said):
+        sweep.run(write(TEXT), "out", rerun="failed", refine=1, tolerance=1e-9)
+
+
+def summary(**variables: Any) -> str:
+    from sweep.results.summary import describe
+
+    return describe(xr.Dataset(variables))
+
+
+def test_words_agree_with_their_number() -> None:
+    one = {"status": ((), np.int8(2)), "step": ((), 0.5), "step_rule": ((), np.int8(1))}
+    assert summary(**one) == "1 cell: 1 time_limit\nstep: 0.5 to 0.5, set by accuracy in 1 cell"
+
+
+def test_cells_that_miss_the_tolerance_do_not_set_a_step() -> None:
+    rules = {"status": ("mu", np.full(4, 2, "int8")), "step": ("mu", [1.0, 2, 3, 4]), "step_rule": ("mu", [1, 4, 4, 3])}
+    assert summary(**rules).splitlines()[1:] == [
+        "step: 1 to 4, set by accuracy in 1 cell, repeat in 1 cell",
+        "tolerance: 2 of 4 cells miss the requested tolerance",
+    ]
+
+
+def test_a_status_that_was_averaged_is_no_status() -> None:
+    assert summary(status=("mu", [1.5, 2.0])) == "no status of single cells: averaged"
+
+
+def test_a_probability_that_nobody_knows_is_no_number() -> None:
+    nothing = {name: ("count", [np.nan]) for name in ("probability", "probability_low", "probability_high")}
+    text = summary(status=("sample", np.array([3, 3], "int8")), count=("count", [1]), **nothing)
+    assert text.splitlines()[1] == "probability: 1 or more unknown"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(0.0, "0 s"), (5e-5, "under 1 ms"), (0.351, "0.35 s"), (119, "120 s"), (3400, "57 min"), (12000, "3.3 h"),
+     (1e7, "120 days")],
+)  # fmt: skip
+def test_a_time_is_said_as_people_say_it(seconds: float, said: str) -> None:
+    from sweep.faults import duration
+
+    assert duration(seconds) == said
