@@ -24,7 +24,7 @@ _OPEN: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "m
 def draw(dataset: xr.Dataset) -> Picture:
     """The curves of a dataset of `sweep boundaries`, each with the count that begins on it, and their open points."""
     x, y = dataset.attrs["x"], dataset.attrs["y"]
-    panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [("no count changes between the cells", dataset)]
+    panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [("no boundary was found between the cells", dataset)]
     rows, columns = arrangement(len(panels), 1)
     width = panel_width(columns, 5.2, 0.6)
     figure = Picture(width * columns + 0.6, 1.2 + width * RATIO * rows)
