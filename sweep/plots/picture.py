@@ -103,8 +103,8 @@ def plot(
     Raises
     ------
     ConfigError
-        if the dataset has no such variable or axis, would need too many panels, or there is no such format or width.
-        With `ax`, if there are several panels.
+        if the dataset has no such variable or axis, has lost what the picture needs, would need too many panels, or
+        there is no such format or width; if the size is too small.  With `ax`, if there are several panels.
     StoreError
         if the file is not a dataset, or `output` cannot be written.
 
