@@ -42,16 +42,18 @@ def draw(dataset: xr.Dataset) -> Picture:
         at = along(chosen, x)
         set_scale(axes, "x", at)
         between = fine.critical_spins(chosen, Axis(x, at)) if x else {}
+        there = _found(chosen, styles)
         for variable in filter(chosen.__contains__, styles):
-            values = between.get(variable, chosen[variable])
-            smooth = x in values.coords  # and not rows of a table, which have no values in between
-            places, values = (values[x].values, values) if smooth else (at, chosen[variable])
+            values, places = chosen[variable], at
+            if variable in there & {*between} and x in between[variable].coords:
+                # Rows of a table have no values in between.
+                values, places = between[variable], between[variable][x].values
             if len(places) == 1 and "marker" not in styles[variable]:
                 places = Axis(x, at).edges  # a line of one point would not be seen
             axes.plot(places, np.broadcast_to(values.values, places.shape), gid=variable, **styles[variable])
         zero_line(axes)
         axes.tick_params(bottom=bool(x), labelbottom=bool(x) and axes.xaxis.get_tick_params()["labelbottom"])
-        if not shown & _found(chosen, styles):
+        if not there:
             say_nothing(axes, _why_none(chosen))
         axes.set_ylabel(labels.with_unit("spin n", labels.unit(dataset, min(shown)) if shown else ""))
     names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()
@@ -72,7 +74,8 @@ def _found(dataset: xr.Dataset, names: Iterable[str]) -> set[str]:
 
 def _why_none(dataset: xr.Dataset) -> str:
     """Why there is no critical spin, with the number of bodies."""
-    meanings = labels.flag_words(dataset, "critical_reason")
+    if not (meanings := labels.flag_words(dataset, "critical_reason")):
+        return "no critical spin"
     codes, counts = np.unique(dataset["critical_reason"], return_counts=True)
     reasons = [f"{meanings.get(code, code)} ({n})" for code, n in zip(codes.tolist(), counts.tolist(), strict=True)]
     return f"no critical spin: {', '.join(reasons)}"
