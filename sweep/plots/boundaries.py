@@ -24,9 +24,9 @@ _OPEN: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "m
 def draw(dataset: xr.Dataset) -> Picture:
     """The curves of a dataset of `sweep boundaries`, each with the count that begins on it, and their open points."""
     x, y = dataset.attrs["x"], dataset.attrs["y"]
-    nothing = (
-        "no boundary was searched" if dataset.attrs.get("pairs_not_searched") else "no count changes between the cells"
-    )
+    unsearched = dataset.attrs.get("pairs_not_searched")
+    nothing = "no boundary was searched" if unsearched else "no count changes between the cells"
+    nothing = "no boundary was found between the cells" if unsearched is None else nothing
     panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [(nothing, dataset)]
     rows, columns = arrangement(len(panels), 1)
     width = panel_width(columns, 5.2, 0.6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import product
 from typing import Any
 
@@ -12,8 +13,8 @@ from matplotlib.lines import Line2D
 from sweep.axis import Axis
 from sweep.plots import fine, labels, theory
 from sweep.plots.description import along
-from sweep.plots.figure import Picture, framed, set_scale, zero_line
-from sweep.plots.panels import MAX_PANELS, indices
+from sweep.plots.figure import Picture, framed, say_nothing, set_scale, zero_line
+from sweep.plots.panels import MAX_PANELS, check, indices
 
 _COLOURS = {"n_c1": "C0", "n_c2": "C1"}
 
@@ -28,27 +29,53 @@ _SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
 def draw(dataset: xr.Dataset) -> Picture:
     """Critical spins by formula, eigenvalues and simulation, over the longest axis."""
     dims = sorted(map(str, dataset["critical_reason"].dims), key=lambda d: -dataset.sizes[d])
+    check(dataset, dims, "critical_reason")
     x = dims[0] if dims else ""
     figure, frames = framed(dataset, indices(dataset, dims[1:])[:MAX_PANELS], x)
     styles = {
         f"{name}_{side}{suffix}": {"color": colour, "linewidth": 1, **style}
         for (name, colour), side, (suffix, (_, style)) in product(_COLOURS.items(), ("plus", "minus"), _SOURCES.items())
     }
+    shown = _found(dataset, styles)
     for axes, chosen in frames:
         chosen = chosen.sortby(x) if x else chosen
         at = along(chosen, x)
         set_scale(axes, "x", at)
         between = fine.critical_spins(chosen, Axis(x, at)) if x else {}
+        there = _found(chosen, styles)
         for variable in filter(chosen.__contains__, styles):
-            values = between.get(variable, chosen[variable])
-            places = values[x].values if variable in between else at
-            axes.plot(places, np.atleast_1d(values.values), gid=variable, **styles[variable])
+            values, places = chosen[variable], at
+            if variable in there & {*between} and x in between[variable].coords:
+                # Rows of a table have no values in between.
+                values, places = between[variable], between[variable][x].values
+            if len(places) == 1 and "marker" not in styles[variable]:
+                places = Axis(x, at).edges  # a line of one point would not be seen
+            axes.plot(places, np.broadcast_to(values.values, places.shape), gid=variable, **styles[variable])
         zero_line(axes)
-        axes.set_ylabel(f"spin n ({labels.unit(dataset, 'n_c2_plus_simulated')})")
-    names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()}
-    sources = [drawn for suffix, drawn in _SOURCES.items() if {f"n_c1_plus{suffix}", f"n_c2_plus{suffix}"} & {*dataset}]
+        axes.tick_params(bottom=bool(x), labelbottom=bool(x) and axes.xaxis.get_tick_params()["labelbottom"])
+        if not there:
+            say_nothing(axes, _why_none(chosen))
+        axes.set_ylabel(labels.with_unit("spin n", labels.unit(dataset, min(shown)) if shown else ""))
+    names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()
+             if any(variable.startswith(name) for variable in shown)}  # fmt: skip
+    sources = [drawn for suffix, drawn in _SOURCES.items()
+               if shown & {f"{name}_{side}{suffix}" for name in _COLOURS for side in ("plus", "minus")}]  # fmt: skip
     figure.explain([
         *(Line2D([], [], color=colour, linewidth=4, label=words) for words, colour in names.items()),
         *(Line2D([], [], color="0.3", linewidth=1, label=words, **style) for words, style in sources),
     ])  # fmt: skip
     return figure
+
+
+def _found(dataset: xr.Dataset, names: Iterable[str]) -> set[str]:
+    """Those of the critical spins that some body has."""
+    return {name for name in names if name in dataset and np.isfinite(dataset[name]).any()}
+
+
+def _why_none(dataset: xr.Dataset) -> str:
+    """Why there is no critical spin, with the number of bodies."""
+    if not (meanings := labels.flag_words(dataset, "critical_reason")):
+        return "no critical spin"
+    codes, counts = np.unique(dataset["critical_reason"], return_counts=True)
+    reasons = [f"{meanings.get(code, code)} ({n})" for code, n in zip(codes.tolist(), counts.tolist(), strict=True)]
+    return f"no critical spin: {', '.join(reasons)}"

@@ -9,13 +9,19 @@ from math import log
 from string import ascii_lowercase
 from textwrap import fill
 from typing import Any, Literal
+from warnings import catch_warnings, simplefilter
 
 import matplotlib as mpl
+import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
+from matplotlib.collections import Collection
+from matplotlib.colors import to_rgb, to_rgba, to_rgba_array
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sweep.axis import Axis
@@ -57,6 +63,12 @@ _OF_CONSTANTS, _LONGEST = 1 / 13, 90
 
 _UNIT, _PARAMETER = r"(?<= )\(.*\)$|\S+ = \S+", "[^, ][^,]*"
 """What stays on one line: in a label, brackets at its end, such as its unit, and a value; a constant with its unit."""
+
+_HIGHER = (1.0, 1.25, 1.6, 2.0, 2.5)
+"""How many times as high a figure becomes at most whose width alone is asked for."""
+
+_SPARE = 0.97
+"""Share of a size that has to do: each time that a figure is drawn, its layout is a little different."""
 
 _LEAST = 2.1
 """Inches of a map across, at least."""
@@ -111,7 +123,7 @@ class Picture(Figure):
         """A title, and the constant parameters, which stand over the legend."""
         self._constants = constants_in_lines(constants, self._width)
         if title:
-            self.suptitle(fill(title, int(self._width / _OF_TITLE)))
+            self.suptitle(fill(title, max(1, int(self._width / _OF_TITLE))))
 
     def panels(self, rows: int, columns: int, count: int, **shared: Any) -> list[Axes]:
         """Axes side by side and below each other, of which the last row may have fewer."""
@@ -130,7 +142,7 @@ class Picture(Figure):
         self._wrap_labels()
         if not handles and not self._constants:
             return
-        room = int((self._width - _HANDLE) / _LETTER)
+        room = max(1, int((self._width - _HANDLE) / _LETTER))
         words = [fill(str(handle.get_label()), room, break_long_words=False) for handle in handles]
         longest = max((len(line) for each in words for line in each.split("\n")), default=0)
         columns = min(max(1, int(self._width / (longest * _LETTER + _HANDLE))), max(len(words), 1))
@@ -144,8 +156,8 @@ class Picture(Figure):
         self.set_figheight(self.get_figheight() * (1 + more / self._height))
 
     def _wrap_labels(self) -> None:
-        """Break the titles and labels of panels that are longer than their axes."""
-        for axes in self._panels:
+        """Break the titles and labels of panels and bars that are longer than their axes."""
+        for axes in self.axes:
             letter = _OF_LABEL * self.dpi * self.get_figwidth() / self._width
             across, up = axes.bbox.size
             for text, length in ((axes.title, across), (axes.xaxis.label, across), (axes.yaxis.label, up)):
@@ -156,6 +168,44 @@ class Picture(Figure):
         for letter, axes in zip(ascii_lowercase, self._panels if len(self._panels) > 1 else [], strict=False):
             axes.annotate(letter, (0, 1), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points",
                           ha="right", va="bottom", weight="bold")  # fmt: skip
+
+    def has_room(self, *, taller: bool) -> bool:
+        """Tell whether the panels have room, perhaps after the figure has become higher."""
+        wide, high = self.get_size_inches()
+        return any(self._holds(wide, factor * high) for factor in (_HIGHER if taller else (1.0,)))
+
+    def _holds(self, wide: float, high: float) -> bool:
+        """Give the figure this size in inches, and tell whether its panels have room."""
+        with catch_warnings():
+            simplefilter("error")
+            try:
+                for share in (_SPARE, 1.0):
+                    self.set_size_inches(share * wide, share * high)
+                    self.draw_without_rendering()
+            except UserWarning:  # of constrained_layout
+                return False
+        return True
+
+
+def opaque(figure: Figure) -> None:
+    """Mix all transparent colours with the ground, for a format without transparency."""
+    figure.draw_without_rendering()  # which makes the ticks
+    ground = np.array(to_rgb(figure.get_facecolor()))
+
+    def mixed(colours: Any) -> Array:
+        rgba = to_rgba_array(colours)
+        alpha = np.where(rgba[:, 3:] > 0, rgba[:, 3:], 1.0)  # what is not drawn at all stays so
+        return np.hstack([alpha * rgba[:, :3] + (1 - alpha) * ground, np.ceil(rgba[:, 3:])])
+
+    for artist in figure.findobj(lambda each: isinstance(each, Line2D | Patch | Collection)):
+        found: Any = artist
+        if isinstance(found, Line2D):
+            colour = mixed(to_rgba(found.get_color(), found.get_alpha()))[0]
+            found.set(alpha=None, color=colour)
+        elif getattr(found, "get_array", lambda: None)() is None:  # not what a colour map colours
+            one = isinstance(found, Patch)
+            face, edge = (mixed(each) for each in (found.get_facecolor(), found.get_edgecolor()))
+            found.set(alpha=None, facecolor=face[0] if one else face, edgecolor=edge[0] if one else edge)
 
 
 def constants_in_lines(constants: str, width: float) -> str:
@@ -170,6 +220,11 @@ def _wrapped(words: str, room: int, whole: str) -> str:
     return fill(joined, max(room, 1), break_long_words=False, break_on_hyphens=False).replace(space, " ")
 
 
+def say_nothing(axes: Axes, words: str) -> None:
+    """Say in the middle of empty axes why nothing is drawn there."""
+    axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", wrap=True)
+
+
 def zero_line(axes: Axes) -> None:
     """Draw where the spin, or what else goes up, is zero."""
     axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
@@ -177,10 +232,11 @@ def zero_line(axes: Axes) -> None:
 
 def page() -> float:
     """Inches of a page across, beside a text of `TEXT` points: as the user wants it, or of a screen."""
-    return float(mpl.rcParams["figure.figsize"][0] * TEXT / mpl.rcParams["font.size"]) if _is_asked() else _WIDE
+    return float(mpl.rcParams["figure.figsize"][0] * TEXT / mpl.rcParams["font.size"]) if is_asked() else _WIDE
 
 
-def _is_asked() -> bool:
+def is_asked() -> bool:
+    """Tell whether the user has asked for a size."""
     return bool(mpl.rcParams["figure.figsize"] != mpl.rcParamsDefault["figure.figsize"])
 
 
@@ -197,7 +253,7 @@ def panel_width(columns: int, widest: float, around: float) -> float:
     around : inches across of what stands around the panels
     """
     width = (page() - around) / columns
-    return width if _is_asked() else min(width, widest)
+    return width if is_asked() else min(width, widest)
 
 
 Frames = list[tuple[Axes, xr.Dataset]]

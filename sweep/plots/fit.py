@@ -16,7 +16,7 @@ _VALUES = 3.2
 def draw(dataset: xr.Dataset) -> Picture:
     """The film and the fit, or those of several laws, over time; below the residuals, beside the values or weights."""
     figure = Picture(panel_width(1, 11, 0), 6)
-    figure.head(dataset.attrs["title"], "")
+    figure.head(dataset.attrs.get("title", ""), "")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     time, seen = dataset["time"].values, dataset["seen"].values
     above.plot(time, seen, ".", color="0.6", markersize=3, label="film", gid="seen")

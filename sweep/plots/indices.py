@@ -16,7 +16,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     quantities = dataset["quantity"].values
     rows, columns = arrangement(len(quantities), 1) if page() < 3.2 * len(quantities) else (1, len(quantities))
     figure = Picture(panel_width(columns, 3.2, 1) * columns + 1, 1 + 2.6 * rows)
-    figure.head(dataset.attrs["title"], "")
+    figure.head(dataset.attrs.get("title", ""), "")
     grid = figure.panels(rows, columns, len(quantities), sharey=True)
     places = np.arange(dataset.sizes["parameter"])
     for axes, quantity in zip(grid, quantities, strict=True):

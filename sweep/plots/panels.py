@@ -75,12 +75,15 @@ def choose(
     dataset = dataset.isel(_nearest(dataset, sel or {}))
     names, compared = _variables(dataset, variable, alone=alone)
     dims = [str(d) for d in field(dataset, names[0]).dims]
+    check(dataset, dims, names[0])
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in dims:
             raise fault_of(f"{names[0]} has no axis {name}; its axes are {', '.join(dims) or 'none'}", option)
     if x is not None and x == y:
         raise fault_of(f"{x} is the other axis already; choose two axes", "y")
     across = _across(dataset, dims, x, y)
+    if names == ["probability"]:  # a curve of one point says less than bars do
+        across = [d for d in across if dataset.sizes[d] > 1 or d in (x, y)]
     rest = [d for d in dims if d not in across]
     if names == ["probability"] and len(across) < 2:
         rest = [d for d in rest if d != "count"]  # all counts are drawn together
@@ -109,6 +112,7 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
             raise fault_of(f"there is no axis {name}; the axes are {axes or 'none'}", "sel")
+        check(dataset, [name], name)
         at = plain_data(wanted)
         if not (is_number(at) and math.isfinite(at)):
             raise fault_of(f"{name} = {wanted}; give a finite number", "sel")
@@ -121,6 +125,17 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
             raise fault_of(f"{name} = {at:g} is far from all its values, {span}; choose one of them", "sel")
         found[name] = int(np.abs(values - at).argmin())
     return found
+
+
+def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:
+    """Raise a `ConfigError` if a variable cannot be drawn over these dimensions."""
+    if name == "probability" and "count" not in dataset.coords:
+        raise fault_of("the probabilities have lost their axis count; reduce the dataset along other axes", "variable")
+    for d in dims:
+        if not dataset.sizes[d]:
+            raise fault_of(f"{name} has no cells: the axis {d} is empty; select at least one value")
+        if dataset[d].dtype.kind not in "fiub" or not np.isfinite(dataset[d].values).all():
+            raise fault_of(f"the values of the axis {d} are not finite numbers; unstack it, or give it numbers")
 
 
 def indices(dataset: xr.Dataset, dims: list[str]) -> list[Panel]:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from functools import partial
+from itertools import count
+from math import ceil
 from pathlib import Path
 from typing import Any, cast
 
@@ -27,7 +30,7 @@ from sweep.plots import (
     scales,
     trajectories,
 )
-from sweep.plots.figure import Frames, Picture, framed, style
+from sweep.plots.figure import Frames, Picture, framed, is_asked, opaque, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
@@ -42,11 +45,18 @@ _NO_DATE: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"D
 _NARROWEST, _WIDEST = 0.05, 1.0
 """Metres of a figure across."""
 
-_OWN: dict[Kind, Callable[[xr.Dataset], Picture]] = {
-    TRAJECTORY: trajectories.draw, CRITICAL: critical.draw, BOUNDARIES: boundaries.draw, FIT: fit.draw,
-    INDICES: indices.draw,
-}  # fmt: skip
-"""How the kinds of dataset are drawn that are not drawn as maps or curves."""
+_GROWTH = 1.15
+"""Steps in which the size is sought that has room."""
+
+_OWN: dict[Kind, tuple[Callable[[xr.Dataset], Picture], tuple[str, ...], tuple[str, ...]]] = {
+    TRAJECTORY: (trajectories.draw, ("spin",), ("trajectory", "time")),
+    CRITICAL: (critical.draw, ("critical_reason",), ()),
+    BOUNDARIES: (boundaries.draw, ("level", "curve", "closed", "outcome", "x", "y"), ("point",)),
+    FIT: (fit.draw, ("seen", "fitted"), ("time",)),
+    INDICES: (indices.draw, ("first_order", "total_order"), ("quantity", "parameter")),
+}
+"""How the kinds of dataset are drawn that are not drawn as maps or curves, and what each needs: variables and
+attributes, and the axes of the first of these."""
 
 
 def plot(
@@ -93,8 +103,8 @@ def plot(
     Raises
     ------
     ConfigError
-        if the dataset has no such variable or axis, would need too many panels, or there is no such format or width.
-        With `ax`, if there are several panels.
+        if the dataset has no such variable or axis, has lost what the picture needs, would need too many panels, or
+        there is no such format or width; if the size is too small.  With `ax`, if there are several panels.
     StoreError
         if the file is not a dataset, or `output` cannot be written.
 
@@ -118,15 +128,12 @@ def plot(
         _draw_in(ax, opened, variable, axes, how)
         figure = cast(Figure, ax.get_figure(root=True))
     else:
-        across = inches(width) if width is not None else None
-        with mpl.rc_context(style(figsize[0] if figsize else across, printed=across is not None)):
-            figure = _drawn(opened, variable, axes, how)
-            if across:
-                figure.letter()
-        if figsize:
-            figure.set_size_inches(figsize)
-        if not title:
-            figure.suptitle("")
+        figure = _of_size(
+            partial(_drawn, opened, variable, axes, how),
+            figsize,
+            inches(width) if width is not None else None,
+            title=title,
+        )
     if output is not None:
         save(figure, Path(output))
     return figure
@@ -148,7 +155,9 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
         options = {"variable": variable if found != TRAJECTORY else None, **axes, **how}
         if given := [name for name, value in options.items() if value]:
             raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
-        return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
+        draw, needs, axes_of_first = _OWN[found]
+        _require_whole(dataset, found, needs, axes_of_first)
+        return draw(dataset) if variable is None else trajectories.draw(dataset, variable)
     chosen = panels.choose(dataset, variable, **axes)
     _require_scale(chosen, **how)
     if len(chosen.across) == 2:
@@ -156,6 +165,55 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
     figure, frames = framed(chosen.dataset, chosen.each, next(iter(chosen.across), ""))
     figure.explain(_fill(chosen, frames, how["limits"]))
     return figure
+
+
+def _of_size(
+    draw: Callable[[], Picture], size: tuple[float, float] | None, across: float | None, *, title: bool
+) -> Picture:
+    """The figure that `draw` makes, of a size, or as wide as this for print, in inches.
+
+    Raises
+    ------
+    ConfigError
+        if that is too small, with a size that is not.
+    """
+
+    def of(scale: float) -> tuple[Picture, bool]:
+        """The figure in this scale, and whether it has room."""
+        wide = size[0] if size else across
+        with mpl.rc_context(style(wide and wide * scale, printed=size is None and across is not None)):
+            figure = draw()
+            if across:
+                figure.letter()
+            if size:
+                figure.set_size_inches(scale * size[0], scale * size[1])
+            if not title:
+                figure.suptitle("")
+            return figure, not is_asked() or figure.has_room(taller=size is None)
+
+    figure, room = of(1.0)
+    if room:
+        return figure
+    scale = next(scale for k in count(1) if of(scale := _GROWTH**k)[1])
+    wide = across or float(mpl.rcParams["figure.figsize"][0])
+    told, needed = (
+        f"{size[0] * by:.3g} × {size[1] * by:.3g} inches" if size else f"{ceil(wide * by * 25.4 - 1e-6)}mm"
+        for by in (1, scale)
+    )
+    words = f"{told} is too small for this figure; give {needed}, or choose a smaller text"
+    raise fault_of(words, "figsize" if size else "width" if across else "figure.figsize")
+
+
+def _require_whole(dataset: xr.Dataset, found: Kind, needs: tuple[str, ...], dims: tuple[str, ...]) -> None:
+    """Raise a `ConfigError` if a dataset of this kind has lost what its picture needs."""
+    words = f"draw {found.words} as the command {found.name} writes them"
+    if missing := [name for name in needs if name not in {*dataset.variables, *dataset.attrs}]:
+        raise fault_of(f"the dataset has no {', '.join(missing)}; {words}")
+    there = dataset[needs[0]].dims
+    if dims and set(there) != set(dims):
+        raise fault_of(f"the axes of {needs[0]} are {', '.join(map(str, there)) or 'lost'}; {words}")
+    if found != BOUNDARIES and (empty := [str(d) for d in dims if not dataset.sizes[d]]):
+        raise fault_of(f"the axis {empty[0]} is empty; {words}")
 
 
 def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> None:
@@ -200,6 +258,8 @@ def inches(width: str) -> float:
 def save(figure: Figure, path: Path) -> None:
     """Write a figure in the format that the suffix names; the same figure gives the same bytes."""
     form = suffix(path)
+    if form == "eps":
+        opaque(figure)
     with replacing(path) as temporary:
         dpi = figure.dpi * (1 if form == "png" else 2)
         figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE.get(form))

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
 from sweep.plots import labels
-from sweep.plots.figure import Frames, set_scale
+from sweep.plots.figure import Frames, say_nothing, set_scale
 from sweep.plots.panels import Panels, title
 from sweep.plots.scales import Limits
 from sweep.results.probabilities import interval, sound
@@ -29,9 +29,12 @@ def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[A
             _bars(axes, chosen, lowest=len(frames) == 1 or bool(axes.get_xlabel()))
         else:
             _curves(axes, chosen, panels.across[0])
+        if chosen["probability"].isnull().all():
+            say_nothing(axes, "all samples failed" if "status" in chosen else "no probability is known")
         axes.set_ylim(limits or (0, 1.02))
         axes.grid(alpha=0.3)
-    return frames[0][0].get_legend_handles_labels()[0]
+    shown = [axes for axes, chosen in frames if chosen["probability"].notnull().any()]
+    return shown[0].get_legend_handles_labels()[0] if shown else []
 
 
 def _curves(axes: Axes, chosen: xr.Dataset, x: str) -> None:
@@ -41,10 +44,13 @@ def _curves(axes: Axes, chosen: xr.Dataset, x: str) -> None:
     colours = mpl.colormaps["viridis"](_COLOURS * np.arange(counts) / max(counts - 1, 3))
     at = chosen[x].values
     set_scale(axes, "x", at)
+    axes.update_datalim([(value, 0.0) for value in at])  # also where all samples failed
     for i, colour in enumerate(colours):
         one = each.isel(count=i)
-        axes.plot(at, one["probability"], color=colour, linewidth=1.2, label=title(each, {"count": i}))
-        axes.fill_between(at, one["probability_low"], one["probability_high"], color=colour, alpha=0.25, linewidth=0)
+        axes.plot(at, one["probability"], ".-", color=colour, linewidth=1.2, label=title(each, {"count": i}))
+        ends = one["probability_low"], one["probability_high"]
+        axes.fill_between(at, *ends, color=colour, alpha=0.25, linewidth=0)
+        axes.vlines(at, *ends, color=colour, linewidth=0.6)  # of a point between failures, there is no band
     axes.set_ylabel("probability, with its interval of 95 %")
 
 
@@ -52,12 +58,14 @@ def _bars(axes: Axes, chosen: xr.Dataset, *, lowest: bool) -> None:
     """Draw the probability of each count, or of a chosen one or more and of fewer, with its interval."""
     at_least = np.concatenate([[1.0], np.atleast_1d(chosen["probability"]), [0.0]])
     share: Array = np.array([more - still for more, still in pairwise(at_least)])
-    low, high = interval(share, np.asarray(sound(chosen).sum()))
     axes.bar(np.arange(len(share)), share, color="C0", label="share of the samples", zorder=2)
-    axes.errorbar(
-        np.arange(len(share)), share, yerr=[share - low, high - share],
-        fmt="none", ecolor="black", elinewidth=1, capsize=3, label="interval of 95 %", zorder=3,
-    )  # fmt: skip
+    axes.set_xlim(-0.6, len(share) - 0.4)
+    if "status" in chosen and labels.is_code(chosen["status"]):  # else nobody knows how many samples there are
+        low, high = interval(share, np.asarray(sound(chosen).sum()))
+        axes.errorbar(
+            np.arange(len(share)), share, yerr=[share - low, high - share],
+            fmt="none", ecolor="black", elinewidth=1, capsize=3, label="interval of 95 %", zorder=3,
+        )  # fmt: skip
     if "count" in chosen.dims:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("spin reversals" if lowest else "")

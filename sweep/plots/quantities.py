@@ -74,7 +74,9 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
         return DERIVED[name].derive(dataset)
     if name not in dataset.data_vars:
         choices = [*map(str, dataset.data_vars), *possible]
-        raise fault_of(f"there is no variable {name}{suggestion(name, choices)}; choose {either(choices)}", "variable")
+        words = f"there is no variable {name}" if name else "none of the variables is drawn unless it is named"
+        words += f"{suggestion(name, choices)}; choose {either(choices)}"
+        raise fault_of(words if choices else "the dataset has no variable to draw", "variable")
     return dataset[name]
 
 
@@ -104,9 +106,12 @@ def check_pictures(config: Config) -> None:
 
 
 def subject(dataset: xr.Dataset) -> str:
-    """The variable that a dataset is about: the first picture that its configuration names, or else of `_SUBJECTS`."""
+    """The variable that a dataset is about: the first picture that its configuration names, or else of `_SUBJECTS`.
+
+    Empty if it has none of these.
+    """
     there = {*map(str, dataset.data_vars), *derivable(dataset)}
-    return next((name for name in (*pictured(dataset)[:1], *_SUBJECTS) if name in there), _SUBJECTS[-1])
+    return next((name for name in (*pictured(dataset)[:1], *_SUBJECTS) if name in there), "")
 
 
 def first_picture(dataset: xr.Dataset) -> str:

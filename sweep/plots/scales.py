@@ -6,7 +6,7 @@ All maps get steadily lighter or, about zero, steadily darker on both sides, so 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import count, pairwise
 from math import exp, log
 from typing import Literal
 
@@ -32,6 +32,9 @@ _MAX_RATIO = 2.0
 """Ratios beyond this, or below its inverse, share the last colours."""
 
 _MAX_TICKS = 12
+
+_LARGEST = 10**15
+"""Limits of a scale of integers, which floating-point numbers still tell apart."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,13 @@ def counts(values: Array, limits: Limits | None = None, name: str | None = None)
     values : integers
     limits : lowest and highest count with colours of their own; all beyond share one on either side
     """
-    low, high = (round(limit) for limit in limits) if limits else (int(values.min()), int(values.max()))
+    low, high = _whole(limits) if limits else (int(values.min()), int(values.max()))
     return _stepped(low + _steps(high - low, _MAX_COUNTS), values, name or SEQUENTIAL)
 
 
 def differences(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
     """A diverging scale of integers, the same on both sides of zero, which has a colour of its own."""
-    top = max(round(max(map(abs, limits))) if limits else int(np.abs(values).max(initial=0)), 1)
+    top = max(max(map(abs, _whole(limits))) if limits else int(np.abs(values).max(initial=0)), 1)
     side = _steps(top, _MAX_DIFFERENCES + 1)[1:]
     return _stepped(np.concatenate([1 - side[::-1], side]), values, name or DIVERGING)
 
@@ -132,17 +135,24 @@ def _arrows(values: Array, low: float, high: float) -> Arrows:
     return "both" if below and above else "min" if below else "max" if above else "neither"
 
 
+def _whole(limits: Limits) -> list[int]:
+    """The limits of a scale of integers; `ConfigError` if they are too large."""
+    if max(map(abs, limits)) > _LARGEST:
+        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {_LARGEST:g} for counts", "limits")
+    return [round(limit) for limit in limits]
+
+
 def _steps(top: int, most: int) -> Array:
     """Where the ranges of the counts 0 to `top` begin, and the last one ends: at most `most` ranges.
 
     Each ends at a multiple of its width, which is 1, 2, 5, 10, 20 and so on, and no less than that of the range below.
     """
-    for percent in range(200):
+    for percent in count():
         steps = [0]
-        while steps[-1] <= top:
+        while steps[-1] <= top and len(steps) <= most:
             width = _round(steps[-1] * percent // 100)
             steps.append((steps[-1] // width + 1) * width)
-        if len(steps) - 1 <= most:
+        if steps[-1] > top:
             break
     return np.array(steps)
 

@@ -1,0 +1,206 @@
+"""Pictures of datasets that have lost something or have one value or none, and sizes and limits at the edge."""
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from support.figures import entries, made
+
+import sweep
+from sweep.config import ConfigError
+from sweep.kernels.status import SETTLED, TOPPLED
+from sweep.plots import picture, scales
+from sweep.results.dataset import REASONS, VARIABLES, described
+from sweep.results.probabilities import PROBABILITIES, probabilities
+
+FORMULAS: dict[str, Any] = {"name": "formulas", "friction": {"mu": 60}}
+
+
+def sampled(n0: tuple[float, ...] = (0.02, 0.05), status: int = SETTLED) -> xr.Dataset:
+    """A run of eight samples along each of these starts, of which every other one reverses."""
+    shape = (len(n0), 8)
+    counts = np.broadcast_to(np.arange(8) % 2, shape).astype("int16")
+    run = xr.Dataset(
+        {"reversals": (("n0", "sample"), counts), "status": (("n0", "sample"), np.full(shape, status, "int8"))},
+        {"n0": list(n0), "sample": np.arange(8)},
+    )
+    found = probabilities(run)
+    number = found["probability"].shape[-1]
+    shares = {n: (("n0", "count"), v, described(PROBABILITIES[n])) for n, v in found.items()}
+    return run.assign(shares).assign_coords(count=np.arange(1, number + 1))
+
+
+def critical(spins: dict[str, list[float]], reason: list[int], dim: str = "case", **coords: Any) -> xr.Dataset:
+    """A dataset of critical spins, with these values of them along one axis."""
+    flags = described(VARIABLES["critical_reason"])
+    found = {name: (dim, np.array(values), described(VARIABLES[name])) for name, values in spins.items()}
+    return xr.Dataset({**found, "critical_reason": (dim, np.array(reason, "int8"), flags)}, coords)
+
+
+def words(figure: Figure) -> list[str]:
+    """What is written in the panels."""
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+@pytest.mark.parametrize("top", [1e7, 1e9, 1e15])
+def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
+    start = perf_counter()
+    for make in (scales.counts, scales.differences):
+        scale = make(np.arange(7), (0, top))
+        assert isinstance(scale.norm, BoundaryNorm)
+        assert scale.norm.Ncmap <= 24
+        assert scale.norm.boundaries[-1] > top
+    assert perf_counter() - start < 5
+    with pytest.raises(ConfigError, match=r"limits: 0\.\.1e\+16; give numbers up to 1e\+15 for counts"):
+        picture.plot(made(), "reversals", limits=(0, 1e16))
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda d: d.isel(mu=slice(0)), "has no cells: the axis mu is empty"),
+        (lambda d: d.isel(b=0, n0=0).isel(mu=slice(0)), "has no cells: the axis mu is empty"),
+        (lambda d: d.stack(both=("mu", "b")), "the values of the axis both are not finite numbers; unstack it"),
+        (lambda d: d.assign_coords(mu=[f"{v:g}" for v in d.mu.values]), "the values of the axis mu are not finite"),
+        (lambda d: d[["n_c1_plus"]], "none of the variables is drawn unless it is named; choose n_c1_plus"),
+        (lambda d: d[["n_c1_plus"]].drop_vars("n_c1_plus").assign_attrs(sweep_kind="run"), "has no variable to draw"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(damage: Callable[[xr.Dataset], xr.Dataset], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        picture.plot(damage(made()))
+
+
+def test_an_axis_without_numbers_has_no_nearest_value() -> None:
+    stacked = made().stack(both=("mu", "b"))
+    with pytest.raises(ConfigError, match="axis both are not finite numbers"):
+        picture.plot(stacked, sel={"both": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (xr.Dataset(attrs={"sweep_kind": "boundaries"}), "no level, curve, closed, outcome, x, y; draw boundaries as"),
+        (xr.Dataset({"critical_reason": ("mu", [])}, {"mu": []}), "critical_reason has no cells: the axis mu is empty"),
+        (xr.Dataset(attrs={"sweep_kind": "critical"}), "no critical_reason; draw critical spins as the command"),
+        (xr.Dataset({"seen": 1.0, "fitted": 1.0}), "the axes of seen are lost; draw a fit as the command fit"),
+        (xr.Dataset({"spin": (("trajectory", "time"), np.zeros((0, 3)))}), "the axis trajectory is empty"),
+    ],
+)
+def test_datasets_of_other_kinds_that_are_not_whole_are_refused(found: xr.Dataset, said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        picture.plot(found)
+
+
+def test_samples_without_a_status_or_counts() -> None:
+    """A mean of the status is none, so that nobody knows the number of samples, and a mean over counts has no sense."""
+    with pytest.raises(ConfigError, match="the probabilities have lost their axis count"):
+        picture.plot(sampled().mean())
+    for part in (sampled().mean("n0"), sampled().isel(n0=0).drop_vars("status")):
+        assert entries(picture.plot(part)) == ["share of the samples"]
+    with pytest.raises(ConfigError, match="reversals has no axis count; its axes are n0, sample"):
+        picture.plot(sampled(), "reversals", y="count")
+
+
+def test_samples_at_one_value_are_bars_under_its_name() -> None:
+    (axes,) = picture.plot(sampled((0.05,))).axes
+    bars: Any = axes.patches
+    assert axes.get_title() == "n₀ = 0.05"
+    assert [patch.get_height() for patch in bars] == [0.5, 0.5]
+
+
+def test_a_point_between_failures_is_seen() -> None:
+    dataset = sampled((0.02, 0.03, 0.04))
+    dataset["probability"][[0, 2]] = np.nan
+    (axes,) = picture.plot(dataset).axes
+    assert axes.lines[0].get_marker() == "."
+
+
+@pytest.mark.parametrize("starts", [(0.05,), (0.02, 0.05)])
+def test_a_figure_of_failures_says_so(starts: tuple[float, ...]) -> None:
+    figure = picture.plot(sampled(starts, TOPPLED))
+    assert words(figure) == ["all samples failed"]
+    assert not figure.legends
+
+
+def test_critical_spins_of_rows_of_a_table_that_share_a_body() -> None:
+    found = sweep.predict({**FORMULAS, "cases": {"x0": [0.01, 0.02], "n0": [0.02, 0.03]}})
+    spins = {name: found[name].values.tolist() for name in ("n_c1_plus", "n_c1_plus_linear")}
+    coords: Any = {name: found[name] for name in ("a", "b", "c", "delta", "mu")}
+    rows = critical(spins, [0, 0], **coords).assign_attrs(config=found.attrs["config"])
+    (axes,) = picture.plot(rows).axes
+    drawn = {line.get_gid(): line.get_ydata() for line in axes.lines if line.get_gid()}
+    assert {name: np.asarray(values).tolist() for name, values in drawn.items()} == spins
+
+
+def test_critical_spins_that_do_not_exist() -> None:
+    no_coupling = {name: code for code, name in REASONS.items()}["no_coupling"]
+    figure = picture.plot(critical({"n_c1_plus": [np.nan, np.inf]}, [no_coupling] * 2))
+    assert words(figure) == ["no critical spin: no coupling (2)"]
+    assert not entries(figure)
+    some = picture.plot(critical({"n_c1_plus": [0.1, 0.2], "n_c2_plus_simulated": [np.nan] * 2}, [no_coupling] * 2))
+    assert len(entries(some)) == 2
+    assert not [text for text in entries(some) if "simulation" in text or "c2" in text]
+
+
+def test_the_critical_spins_of_one_body_are_seen() -> None:
+    one = critical({"n_c1_plus": [0.1]}, [0]).isel(case=0)
+    (axes,) = picture.plot(one).axes
+    (line,) = [line for line in axes.lines if line.get_gid() == "n_c1_plus"]
+    assert np.ptp(line.get_xdata()) > 0
+
+
+def test_a_search_without_points_does_not_say_that_counts_are_the_same() -> None:
+    axis = {"actual_range": [1.0, 2.0], "spacing": "linear"}
+    empty = xr.Dataset(
+        {name: ("point", np.zeros(0, int)) for name in ("level", "curve", "closed", "outcome")},
+        {name: ("point", np.zeros(0), axis) for name in ("n0", "mu")},
+        {"x": "n0", "y": "mu"},
+    )
+    (axes,) = picture.plot(empty.assign(end_more=("point", np.zeros(0)))).axes
+    assert axes.get_title() == "no boundary was found between the cells"
+
+
+@pytest.mark.parametrize("size", [{"figsize": (1, 1)}, {"figsize": (2.5, 1)}, {"width": "50mm"}])
+def test_a_size_without_room_is_refused_with_one_that_has(size: dict[str, Any]) -> None:
+    style: Any = {"font.size": 14, "axes.titlesize": 20}
+    with mpl.rc_context(style):
+        with pytest.raises(
+            ConfigError, match=f"^{next(iter(size))}: .* is too small for this figure; give "
+        ) as refused:
+            picture.plot(made(), **size)
+        given = str(refused.value).split("give ")[1].split(",")[0]
+        figsize = tuple(map(float, given.removesuffix(" inches").split(" × "))) if "figsize" in size else None
+        fitting = {"figsize": figsize} if figsize else {"width": given}
+        picture.plot(made(), **fitting).draw_without_rendering()  # without a warning
+
+
+def test_eps_is_opaque(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Matplotlib logs transparent colours, which EPS does not support, and draws them in full strength."""
+    dataset = made()
+    dataset["status"][:] = TOPPLED
+    dataset["status"][:, :4] = 2
+    with caplog.at_level(logging.WARNING, "matplotlib"):
+        for name, each in {"map": dataset, "curves": made().isel(b=0), "samples": sampled()}.items():
+            picture.plot(each, output=tmp_path / f"{name}.eps")
+    assert not caplog.records
+
+
+def test_labels_of_bars_stay_in_the_figure() -> None:
+    """The label of a bar is broken as those of axes are."""
+    long = "spin that is left " * 9
+    dataset = made().assign(spin_final=lambda d: d["spin_final"].assign_attrs(long_name=long))
+    figure = picture.plot(dataset, "spin_final")
+    figure.draw_without_rendering()
+    box = figure.axes[-1].yaxis.label.get_window_extent()
+    assert figure.axes[-1].get_label() == "<colorbar>"
+    assert box.y0 >= 0
+    assert box.y1 <= figure.bbox.y1
