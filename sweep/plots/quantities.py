@@ -73,10 +73,10 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
     if name in (possible := derivable(dataset)):
         return DERIVED[name].derive(dataset)
     if name not in dataset.data_vars:
-        choices = [*map(str, dataset.data_vars), *possible]
+        if not (choices := [*map(str, dataset.data_vars), *possible]):
+            raise fault_of("the dataset has no variable to draw")
         words = f"there is no variable {name}" if name else "none of the variables is drawn unless it is named"
-        words += f"{suggestion(name, choices)}; choose {either(choices)}"
-        raise fault_of(words if choices else "the dataset has no variable to draw", "variable")
+        raise fault_of(f"{words}{suggestion(name, choices)}; choose {either(choices)}", "variable")
     return dataset[name]
 
 
