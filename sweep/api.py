@@ -397,7 +397,7 @@ def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
     Raises
     ------
     StoreError
-        if the file is no dataset with an axis.
+        if the dataset has no axis, or was cut or averaged.
     ModuleNotFoundError
         if Bokeh is not installed.
     """
@@ -406,8 +406,9 @@ def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
     from sweep.explorer.server import serve_beside
     from sweep.explorer.setup import usable
     from sweep.explorer.slices import Source, open_source
+    from sweep.results.kind import require_whole
 
-    source = open_source(Path(dataset)) if isinstance(dataset, str | Path) else Source(dataset)
+    source = open_source(Path(dataset)) if isinstance(dataset, str | Path) else Source(require_whole(dataset))
     return serve_beside(source, usable(source), height)
 
 

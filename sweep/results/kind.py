@@ -97,9 +97,17 @@ def kind(dataset: xr.Dataset) -> Kind | None:
 def opened(path: Path, *, load: bool = True) -> xr.Dataset:
     """Open a dataset as `open_dataset` does; `StoreError` also if it is of no kind, or lacks what its kind needs."""
     dataset = open_dataset(path, load=load)
-    if found := fault(dataset):
+    try:
+        return require_whole(dataset, str(path))
+    except StoreError:
         dataset.close()
-        raise StoreError(f"{path}: {found}")
+        raise
+
+
+def require_whole(dataset: xr.Dataset, name: str = "the dataset") -> xr.Dataset:
+    """Return a dataset that is of a kind and has what its kind needs; `StoreError` for any other."""
+    if found := fault(dataset):
+        raise StoreError(f"{name}: {found}")
     return dataset
 
 

@@ -1,15 +1,18 @@
-"""How the explorer draws: the scales of its maps.  It imports Bokeh, which the extra `browser` brings."""
+"""How the explorer draws, and what it refuses.  It imports Bokeh, which the extra `browser` brings."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 import xarray as xr
 
+import sweep
 from sweep.explorer import state
 from sweep.explorer.slices import Source
 from sweep.kernels.status import LIFT_OFF
+from sweep.results.store import StoreError
 
 pytestmark = pytest.mark.browser
 
@@ -31,3 +34,17 @@ def test_a_ratio_keeps_its_scale_where_a_limit_is_not_positive(opened: xr.Datase
     part, first = source.map("ratio", "mu", "b", {"n0": 1}), state.first(source)
     scales = [style.scale_of(part, each) for each in (first, replace(first, limits={"low": low}))]
     assert style.mapping(scales[0]) == style.mapping(scales[1])
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda whole: whole.isel(mu=slice(0, 0)), "the axis mu has no values"),
+        (lambda whole: whole.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),
+    ],
+)
+def test_a_dataset_that_is_not_whole_is_refused(
+    opened: xr.Dataset, damage: Callable[[xr.Dataset], xr.Dataset], said: str
+) -> None:
+    with pytest.raises(StoreError, match=said):
+        sweep.explore(damage(opened))
