@@ -25,7 +25,7 @@ from sweep.config import load_config
 from sweep.config.schema import PATHS
 
 POOL = [(method, model, draws.compiled(measure)) for method, model, measure in SHARED]
-STEPS = 10
+STEPS = 12
 
 
 def run_machine(number: int, runs: int, kernels: int = 0, **parts: Any) -> None:
@@ -46,14 +46,14 @@ def asked(name: str, usual: int) -> int:
 
 
 def test_some_combinations() -> None:
-    run_machine(0, 10)
+    run_machine(0, 6)
 
 
 @pytest.mark.campaign
 def test_many_combinations(client: Any) -> None:
     """Other ones each time, with kills and a cluster."""
     number = asked("SEED", SystemRandom().randrange(10**6))
-    run_machine(number, asked("RUNS", 25), asked("KERNELS", 4), far=True, client=client)
+    run_machine(number, asked("RUNS", 20), asked("KERNELS", 3), far=True, client=client)
 
 
 @pytest.mark.browser

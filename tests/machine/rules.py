@@ -34,9 +34,8 @@ from machine.draws import Draws, Flat, Piece
 from sweep.cli import main
 from sweep.config import Config, load_config
 from sweep.config.document import parse_value
-from sweep.engine.enlarged import RERUN
 from sweep.faults import Refused
-from sweep.kernels.status import TIME_LIMIT
+from sweep.kernels.status import FAILURES, TIME_LIMIT
 from sweep.plots.formats import PICTURES
 from sweep.results.kind import kind
 from sweep.results.summary import contents, describe
@@ -148,25 +147,31 @@ class Machine(RuleBasedStateMachine):
         return self._configured(base, changes, number)
 
     def _configured(self, base: str, changes: Draws, number: int) -> Found:
-        drawn = {path: draws.setting(path, n) for path, n in changes}
-        flat = {key: value for key, value in draws.shipped()[base].items() if key not in drawn} | drawn
-        scene = self._bounded(*draws.in_pool(flat, base, self.pool, number), base, number)
+        scene = self._scene(base, changes, number)
+        while not self._affordable(scene.config) and number % 8 != 1 and (changes or base != "paper"):
+            base, changes = base if changes else "paper", changes[1:]
+            scene = self._scene(base, changes, number)
         if scene.config.row != "case" or not scene.config.cases:  # a table stands in no document
             again = load_config(self._written(scene.config.to_yaml()))
             assert again.fingerprint() == scene.config.fingerprint(), "read again, another configuration"
+        predicted = sweep.predict(scene.config)
         if not self._affordable(scene.config):
-            return Found(sweep.predict(scene.config), scene)
-        return Found(self._run(scene.config, *([self._new()] if number % 4 == 0 else [])), scene, ran=True)
+            return Found(predicted, scene)
+        found = self._run(scene.config, *([self._new()] if number % 8 == 0 else []))
+        for name in predicted.data_vars:
+            xr.testing.assert_equal(predicted[name], found[name])
+        return Found(found, scene, ran=True)
 
-    def _bounded(self, flat: Flat, config: Config, base: str, number: int) -> Scene:
-        """A scene of few cells and steps."""
+    def _scene(self, base: str, changes: Draws, number: int) -> Scene:
+        """A configuration of few cells and steps, with kernels of the pool if it has such."""
+        drawn = {path: draws.setting(path, n) for path, n in changes}
+        known = {key: value for key, value in draws.shipped()[base].items() if key not in drawn}
+        flat, config = draws.in_pool(known | drawn, base, self.pool, number)
         unit = 1.0 if config.units == PAPER_UNITS else float(np.sqrt(config.grid.columns()["c"].max() / 9.8))
         small: Flat = {"samples": 3} if config.samples and config.samples > 5 else {}
         if config.integrator.t_end > 1000 * unit and not (self.far and config.grid.size < 4 and number % 6 == 0):
-            small["integrator.t_end"] = float(f"{300 * unit:.2g}")
-        if small:
-            flat, config = draws.accepted(flat | small, base)
-        return Scene(flat, config)
+            small["integrator.t_end"] = float(f"{1000 * unit:.2g}")
+        return Scene(*draws.accepted(flat | small, base))
 
     def _affordable(self, config: Config) -> bool:
         if not config.simulated or config.grid.size > 60:
@@ -250,6 +255,16 @@ class Machine(RuleBasedStateMachine):
             ended = before["status"] != TIME_LIMIT
             oracles.alike(*({name: values[ended] for name, values in each.items()} for each in (before, after)))
 
+    @rule(found=datasets, place=NUMBER)
+    def follow(self, found: Found, place: int) -> None:
+        """A cell that is followed in time ends and counts alike."""
+        if found.compared and not found.scene.config.samples:
+            config, there = found.scene.config, oracles.rows(found.dataset)
+            cell = [place % len(there["status"])]
+            values = {name: float(there[name][cell[0]]) for name in (*config.axes, *config.cases)}
+            followed = sweep.trajectory(found.scene.with_({}, "cases"), stop_when_settled=True, **values)
+            oracles.alike(oracles.rows(followed), {name: column[cell] for name, column in there.items()})
+
     # ---- over the files of an earlier run
 
     @rule(target=datasets, scene=SCENE, number=NUMBER)
@@ -261,9 +276,10 @@ class Machine(RuleBasedStateMachine):
         few: Flat = {"integrator.t_end": config.integrator.t_end / 2, "integrator.patience": config.integrator.patience}
         more: Flat = few | {"integrator.t_end": config.integrator.t_end}
         if config.axes and number % 3:
-            name = list(config.axes)[number % len(config.axes)]
-            numbers = config.axes[name].tolist()
-            few, more = ({config.table[name].path: each} for each in (numbers[: -(-len(numbers) // 2)], numbers))
+            random, (name, known) = Random(number), list(config.axes.items())[number % len(config.axes)]
+            numbers = [*random.sample(known, len(known)), float(np.mean(known)) * (1 + 1e-3)]
+            sets = numbers[random.randrange(len(numbers)) :], random.sample(numbers, len(numbers))
+            few, more = ({config.table[name].path: each} for each in sets)
         with nothing_drawn(number % 5 > 0):
             self._run(scene.with_(few), folder)
             found = self._run(scene.with_(more), folder)
@@ -281,7 +297,7 @@ class Machine(RuleBasedStateMachine):
             again = self.ask("rerun", lambda: sweep.run(document | {"name": scene.config.name}, folder, rerun=which))
         if again is not None:
             new, fresh = oracles.rows(again), oracles.rows(sweep.run(document))
-            repeated = np.isin(old["status"], RERUN[which])
+            repeated = np.isin(old["status"], FAILURES if which == "failed" else TIME_LIMIT)
             for cells, rows in ((repeated, fresh), (~repeated, old)):
                 oracles.same({k: v[cells] for k, v in new.items()}, {k: v[cells] for k, v in rows.items()}, NUMBERS)
 
