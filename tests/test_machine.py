@@ -53,7 +53,7 @@ def test_some_combinations() -> None:
 def test_many_combinations(client: Any) -> None:
     """Other ones each time, with kills and a cluster."""
     number = asked("SEED", SystemRandom().randrange(10**6))
-    run_machine(number, asked("RUNS", 20), asked("KERNELS", 3), far=True, client=client)
+    run_machine(number, asked("RUNS", 10), asked("KERNELS", 2), far=True, client=client)
 
 
 @pytest.mark.browser

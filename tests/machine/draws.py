@@ -35,7 +35,7 @@ Draws = list[tuple[str, int]]
 PHYSICAL = {parameter.path: parameter for parameter in PARAMETERS.values()}
 
 
-def draws(names: Mapping[str, Any] | list[str], most: int = 4) -> st.SearchStrategy[Draws]:
+def draws(names: Mapping[str, Any] | list[str], most: int = 5) -> st.SearchStrategy[Draws]:
     """Some of the names, each with a number for its value."""
     return (
         st.just([])
@@ -99,11 +99,11 @@ def _physical(parameter: Parameter, random: Random) -> Any:
         return float(f"{next(n for n in (near, abs(near), known[0], 0.5) if parameter.allows(n)):.4g}")
 
     values = sorted(set(map(number, range(random.choice((2, 3))))))
-    if (form := random.randrange(9)) < 5 or len(values) < 2:
+    if (form := random.randrange(9)) < 4 or len(values) < 2:
         return values[0]
-    if form < 7:
+    if form < 6:
         return random.sample(values, len(values))
-    if form == 7:
+    if form == 6:
         return {"start": values[0], "stop": values[-1], "num": random.choice((1, 2, 3, 5)),
                 "spacing": random.choice(("linear", "log"))}  # fmt: skip
     family = random.choice(sorted(FAMILIES))

@@ -277,7 +277,7 @@ class Machine(RuleBasedStateMachine):
         more: Flat = few | {"integrator.t_end": config.integrator.t_end}
         if config.axes and number % 3:
             random, (name, known) = Random(number), list(config.axes.items())[number % len(config.axes)]
-            numbers = [*random.sample(known, len(known)), float(np.mean(known)) * (1 + 1e-3)]
+            numbers = [*random.sample(known, len(known)), float(np.mean(known)) * 1.001 or 1e-6]
             sets = numbers[random.randrange(len(numbers)) :], random.sample(numbers, len(numbers))
             few, more = ({config.table[name].path: each} for each in sets)
         with nothing_drawn(number % 5 > 0):
