@@ -143,7 +143,7 @@ class Machine(RuleBasedStateMachine):
 
     @rule(targets=(scenes, datasets), base=BASE, changes=draws.draws(KEYS), number=NUMBER)
     def configure(self, base: str, changes: Draws, number: int) -> Found:
-        """Draw a configuration, which is the same when it is read again, and run it, with its pictures at times."""
+        """Draw a configuration that is the same when it is read again, and predict, estimate and run it."""
         return self._configured(base, changes, number)
 
     def _configured(self, base: str, changes: Draws, number: int) -> Found:
@@ -154,6 +154,7 @@ class Machine(RuleBasedStateMachine):
         if scene.config.row != "case" or not scene.config.cases:  # a table stands in no document
             again = load_config(self._written(scene.config.to_yaml()))
             assert again.fingerprint() == scene.config.fingerprint(), "read again, another configuration"
+        invoke("run", str(self._written(draws.in_yaml(scene.flat))), "--dry-run")
         predicted = sweep.predict(scene.config)
         if not self._affordable(scene.config):
             return Found(predicted, scene)
