@@ -345,6 +345,7 @@ class Machine(RuleBasedStateMachine):
             self.ask("describe", lambda: (describe(cut), contents(cut)))
             figure = self.ask("plot", lambda: sweep.plot(cut))
             figure and figure.draw_without_rendering()
+            self._reopened(Found(cut))
         return Found(cut)
 
     def _saved(self, found: Found, file: Path) -> bool:
@@ -356,14 +357,15 @@ class Machine(RuleBasedStateMachine):
     @rule(target=datasets, found=datasets)
     def save(self, found: Found) -> Any:
         """A dataset that is saved is the same when it is opened."""
+        again = self._reopened(found)
+        return multiple() if again is None else Found(again, found.scene, found.ran)
+
+    def _reopened(self, found: Found) -> xr.Dataset | None:
         file = self._new(".nc")
-        if not self._saved(found, file):
-            return multiple()
-        again = self.ask("open", lambda: sweep.open(file), str(file))
-        if again is None:
-            return multiple()
-        xr.testing.assert_identical(again.drop_attrs(deep=False), found.dataset.drop_attrs(deep=False))
-        return Found(again, found.scene, found.ran)
+        again = self.ask("open", lambda: sweep.open(file), str(file)) if self._saved(found, file) else None
+        if again is not None:
+            xr.testing.assert_identical(again.drop_attrs(deep=False), found.dataset.drop_attrs(deep=False))
+        return again
 
     @rule(found=datasets, arguments=draws.draws(words.TAKEN["plot"], 3), form=st.sampled_from(["", *PICTURES]))
     def plot(self, found: Found, arguments: Draws, form: str) -> None:

@@ -95,7 +95,8 @@ CALLED = sorted({name for name, known in FUNCTIONS.items() if {"config", "source
 """The functions that take a configuration."""
 
 CUTS: dict[str, Callable[[xr.Dataset, str, Random], xr.Dataset]] = {
-    "isel": lambda dataset, dim, random: dataset.isel({dim: random.choice((0, -1, [0], slice(None, None, -1)))}),
+    "isel": lambda dataset, dim, random: dataset.isel({dim: random.choice((0, -1, slice(None, None, -1)))}),
+    "one value": lambda dataset, dim, _: dataset.isel({dim: [0]}),
     "none": lambda dataset, dim, _: dataset.isel({dim: slice(0, 0)}),
     "sel": lambda dataset, dim, _: dataset.sel({dim: dataset[dim][-1]}) if dim in dataset.coords else dataset,
     "mean": lambda dataset, dim, _: dataset.mean(dim),
