@@ -17,7 +17,7 @@ import pytest
 import xarray as xr
 from hypothesis import settings
 from support import SMALL, Write
-from support.kernels import default_measures, kernel
+from support.kernels import SHARED, kernel
 
 import sweep
 from sweep.jit import showing
@@ -37,22 +37,6 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 if "PYTEST_XDIST_WORKER" in os.environ:
     numba.set_num_threads(1)
 
-# The longest first.
-KERNELS = [
-    ("adams", "slip", default_measures("slip")),
-    ("dopri5", "slip", default_measures("slip")),
-    ("adams", "slip", ("reversals", "margin")),
-    ("adams", "slip", ("reversals", "reversal_times=3")),
-    ("dopri5", "noslip", default_measures("noslip")),
-    ("dopri5", "effective", default_measures("effective")),
-    ("dopri5", "averaged", default_measures("averaged")),
-    ("dopri5", "slip", ()),
-    ("dopri5", "slip", ("reversals",)),
-    ("dopri5", "slip", ("reversals", "first_reversal")),
-    ("dopri5", "averaged", ("reversals",)),
-]
-"""Method, model and measurements of the kernels that several files of tests run."""
-
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the kernels on all cores before processes that share the tests wait for the same ones."""
@@ -62,7 +46,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         return
     writer = config.get_terminal_writer()
     with showing(lambda: nullcontext(writer.line("compiling kernels", flush=True))):
-        build([kernel(*each) for each in KERNELS])
+        build([kernel(*each) for each in SHARED])
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

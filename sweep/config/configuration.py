@@ -185,9 +185,10 @@ class Config:
     def document(self) -> dict[str, Any]:
         """The whole configuration, defaults included, as plain data."""
         table = self.table
-        written = [table[name].section for name in self.axes if name not in FIRST_AXES]
-        # In the order of the axes, so that they keep it when the document is read again.
-        found: dict[str, dict[str, Any]] = {section: {} for section in (*written, *sections(table)) if section}
+        # In the order of axes and samples, so that they keep it when the document is read again.
+        varying = [name for name, value in self.parameters.items() if value.is_axis or value.distribution]
+        written = [table[name].place[0] for name in varying if name not in FIRST_AXES]
+        found: dict[str, Any] = {key: {} for key in (*written, *sections(table))}
         top: dict[str, Any] = {"model_sha256": self.origin.digest} if self.origin else {}
         if self.units != PAPER_UNITS and self.of_rattlebacks:
             top["units"] = self.units
@@ -197,14 +198,17 @@ class Config:
         if self.surface != ELLIPSOID.name:
             found["body"] |= {"surface": self.surface}
         for name, value in self.parameters.items():
-            found.get(table[name].section, top)[name] = value.spec
+            if section := table[name].section:
+                found[section][name] = value.spec
+            else:
+                found[name] = value.spec
         return {
             "name": self.name,
             "model": self.model,
             **top,
             **({"cases": self.cases_file} if self.cases_file else {}),
             **({"samples": self.samples, "seed": self.seed} if self.samples else {}),
-            **{section: values for section, values in found.items() if values},
+            **{key: values for key, values in found.items() if values != {}},
             "integrator": self.integrator.model_dump(),
             "measure": [
                 {name: n if name == Misfit.name else int(n)} if n else name

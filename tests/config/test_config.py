@@ -152,7 +152,15 @@ def test_what_the_numbers_of_a_paraboloid_mean(read: Read) -> None:
     assert read(text).axes == {}
 
 
-@pytest.mark.parametrize("text", [SMALL, STONE, BOWL], ids=["paper", "ellipsoid", "paraboloid"])
+GRAVITY = STONE.replace("gravity: 9.81\n", "") + "gravity: [9.8, 9.9]\n"
+UNCERTAIN = "start: {x0: {uniform: [0, 0.02]}}\nbody: {c: {normal: [1, 0.01]}}\nfriction: {mu: 60}\nsamples: 4\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [SMALL, STONE, BOWL, GRAVITY.replace("sigma: 1.0e-4", "sigma: [0, 1.0e-4]"), UNCERTAIN],
+    ids=["paper", "ellipsoid", "paraboloid", "axis of gravity", "samples"],
+)
 def test_it_survives_its_own_document(text: str, read: Read) -> None:
     config = read(text)
     again = read(config.to_yaml())

@@ -78,3 +78,22 @@ def threads(number: int) -> Iterator[None]:
         yield
     finally:
         numba.set_num_threads(before)
+
+
+# The longest first.
+SHARED = [
+    ("adams", "slip", default_measures("slip")),
+    ("dopri5", "slip", default_measures("slip")),
+    ("adams", "slip", ("reversals", "margin")),
+    ("adams", "slip", ("reversals", "reversal_times=3")),
+    ("dopri5", "noslip", default_measures("noslip")),
+    ("dopri5", "effective", default_measures("effective")),
+    ("dopri5", "averaged", default_measures("averaged")),
+    ("dopri5", "slip+coulomb-sqrt+sigma", default_measures("slip+coulomb-sqrt+sigma")),
+    ("dopri5", "slip+viscous", default_measures("slip+viscous")),
+    ("dopri5", "slip", ()),
+    ("dopri5", "slip", ("reversals",)),
+    ("dopri5", "slip", ("reversals", "first_reversal")),
+    ("dopri5", "averaged", ("reversals",)),
+]
+"""Method, model and measurements of the kernels that several files of tests run."""

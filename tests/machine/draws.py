@@ -1,0 +1,245 @@
+"""What can be drawn of configurations, from the schema, the shipped files and what refusals say.
+
+A draw is a name and a small number, which together give a value, so that Hypothesis shrinks what fails to few names.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from functools import cache
+from random import Random
+from typing import Any
+
+import numpy as np
+from fuzzing import check_refusal
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+from support import ROOT
+
+from sweep.config import Config, ConfigError, load_config
+from sweep.config.distributions import FAMILIES
+from sweep.config.schema import PATHS, schema_of
+from sweep.kernels.measures import MEASURES, chosen
+from sweep.kernels.methods import AUTO, allowed, cheapest
+from sweep.models import TIERS
+from sweep.parameters import PARAMETERS, Parameter
+from sweep.plots.quantities import DERIVED, check_pictures
+from sweep.results.dataset import VARIABLES
+
+Flat = dict[str, Any]
+"""A configuration: values by path."""
+
+Draws = list[tuple[str, int]]
+
+PHYSICAL = {parameter.path: parameter for parameter in PARAMETERS.values()}
+
+
+def draws(names: Mapping[str, Any] | list[str], most: int = 5) -> st.SearchStrategy[Draws]:
+    """Some of the names, each with a number for its value."""
+    return (
+        st.just([])
+        if not names
+        else st.lists(st.tuples(st.sampled_from(sorted(names)), st.integers(0, 999)), max_size=most)
+    )
+
+
+def flattened(document: Mapping[str, Any]) -> Flat:
+    sections = {
+        key for key, value in document.items() if isinstance(value, dict) and any(f"{key}." in p for p in PATHS)
+    }
+    inner = {f"{key}.{name}": value for key in document if key in sections for name, value in document[key].items()}
+    return {key: value for key, value in document.items() if key not in sections} | inner
+
+
+def nested(flat: Flat) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for path, value in flat.items():
+        section, _, name = path.rpartition(".")
+        (found.setdefault(section, {}) if section else found)[name] = value
+    return found
+
+
+def _numbers(value: Any) -> list[float]:
+    if isinstance(value, dict):
+        return [value["start"], value["stop"]] if "start" in value else next(iter(value.values()))
+    return value if isinstance(value, list) else [value]
+
+
+@cache
+def shipped() -> dict[str, Flat]:
+    """The configurations that come with the package and need no code of a user, with two values an axis."""
+    found: dict[str, Flat] = {"paper": {"friction.mu": 60}}
+    for file in sorted((ROOT / "configs").glob("*.yaml")):
+        flat = flattened(YAML(typ="safe").load(file.read_text(encoding="utf-8")))
+        if flat.get("model", "slip") in TIERS:
+            flat |= {
+                path: _numbers(flat[path])[:2] for path in flat if path in PHYSICAL and isinstance(flat[path], list)
+            }
+            flat |= {path: _numbers(flat[path]) for path in flat if path in PHYSICAL and "start" in str(flat[path])}
+            found[file.stem] = flat | ({"samples": 3} if "samples" in flat else {})
+    return found
+
+
+@cache
+def _known(path: str) -> list[float]:
+    numbers = [number for flat in shipped().values() for number in _numbers(flat.get(path, []))]
+    return [number for number in numbers if isinstance(number, int | float)]
+
+
+def _physical(parameter: Parameter, random: Random) -> Any:
+    """A number, an axis, a range or a distribution; near what a shipped configuration says of it, or anything."""
+    known = _known(parameter.path) or [
+        n for p in PHYSICAL.values() if p.units == parameter.units for n in _known(p.path)
+    ]
+    known = known or [0.01, 0.3, 1.0]
+
+    def number(_: int) -> float:
+        near = random.choice(known) * random.choice((1, 1, 0.5, 0.9, 1.1, 2, -1)) + random.choice((0, 0, 0, 0.01))
+        return float(f"{next(n for n in (near, abs(near), known[0], 0.5) if parameter.allows(n)):.4g}")
+
+    values = sorted(set(map(number, range(random.choice((2, 3))))))
+    if (form := random.randrange(9)) < 4 or len(values) < 2:
+        return values[0]
+    if form < 6:
+        return random.sample(values, len(values))
+    if form == 6:
+        return {"start": values[0], "stop": values[-1], "num": random.choice((1, 2, 3, 5)),
+                "spacing": random.choice(("linear", "log"))}  # fmt: skip
+    family = random.choice(sorted(FAMILIES))
+    return {family: [values[0], values[-1] if family == "uniform" else abs(values[0]) / 10 or 0.1]}
+
+
+def _of_schema(field: Mapping[str, Any], random: Random) -> Any:
+    """A value that the JSON schema of a field allows, by itself; mostly a small one."""
+    field = random.choice(field.get("anyOf", [field]))
+    if choices := field.get("enum", [field["const"]] if "const" in field else []):
+        return random.choice(choices)
+    kind = field.get("type")
+    if kind in ("number", "integer"):
+        low = field.get("minimum", field.get("exclusiveMinimum", field.get("ge", -9)))
+        high = field.get("maximum", field.get("exclusiveMaximum", 9))
+        numbers = [n for n in (low, 1, 2, 3, 0.5, 1e-3, 1e-6, 20, min(high, 40)) if low <= n <= high]
+        number = random.choice(numbers)
+        return int(number) if kind == "integer" else float(number)
+    return {"boolean": random.random() < 0.5, "string": random.choice(("a", "x-1", "2")), "null": None}.get(str(kind))
+
+
+def _measure(random: Random) -> Any:
+    names = random.sample(sorted(MEASURES), random.randrange(5))
+    bounds = {name: MEASURES[name].bounds for name in names}
+    return [{name: random.randint(b[0], min(b[1], 4))} if (b := bounds[name]) else name for name in names]
+
+
+def _cases(random: Random) -> Any:
+    names = random.sample(["n0", "mu", "b", random.choice(sorted(PARAMETERS))], random.choice((1, 2)))
+    return {name: [v for _ in range(3) for v in _numbers(_physical(PARAMETERS[name], random))][:3] for name in names}
+
+
+SPECIAL = {
+    "measure": _measure,
+    "cases": _cases,
+    "picture": lambda random: random.sample([*VARIABLES, *DERIVED], random.choice((1, 2))),
+    "samples": lambda random: random.choice((1, 2, 3, 5)),
+    "seed": lambda random: random.randrange(5),
+    "refine": lambda random: random.choice((0, 1, 2)),
+    "integrator.t_end": lambda random: random.choice((20, 100.0, 300, 1000)),
+    "integrator.step": lambda random: random.choice(("auto", 0.02, 0.05, 0.15, 1.0)),
+    "integrator.tolerance": lambda random: random.choice((1e-4, 1e-6, 1e-8, 1e-10)),
+}  # fmt: skip
+"""What the schema cannot say, or what would take long."""
+
+
+@cache
+def _fields() -> dict[str, Any]:
+    schema = schema_of(None).model_json_schema()
+    sections = {key: schema["$defs"][value["$ref"].rpartition("/")[2]]["properties"]
+                for key, value in schema["properties"].items() if "$ref" in value}  # fmt: skip
+    return flattened(sections) | {key: v for key, v in schema["properties"].items() if key not in sections}
+
+
+def choices() -> list[tuple[str, str]]:
+    """Keys that have one of several words, and each of these: laws, models, surfaces, units, methods."""
+    return [(path, word) for path, field in _fields().items() for word in field.get("enum", ())]
+
+
+def setting(path: str, number: int) -> Any:
+    """The value of a key of a configuration that belongs to a number."""
+    random = Random(f"{path} {number}")
+    if path in PHYSICAL:
+        return _physical(PHYSICAL[path], random)
+    return SPECIAL[path](random) if path in SPECIAL else _of_schema(_fields()[path], random)
+
+
+def accepted(flat: Flat, base: str = "paper") -> tuple[Flat, Config]:
+    """The configuration, without what refusals name and with what they miss, until it is accepted; or else the base."""
+    flat = dict(flat)
+    for i in range(20):
+        try:
+            check_pictures(config := load_config(nested(flat)))
+            return flat, config
+        except ConfigError as error:
+            check_refusal(error, "")
+            for fault in error.faults:
+                paths = [".".join(map(str, fault.path[:k])) for k in range(len(fault.path), 0, -1)]
+                if found := [path for path in paths if path in flat]:
+                    del flat[found[0]]
+                elif fault.message.startswith("missing"):
+                    flat[paths[0]] = _numbers(setting(paths[0], i))[0]
+                else:  # a section, or what a default says
+                    flat = {path: value for path, value in flat.items() if path.split(".")[0] != fault.path[0]}
+    return shipped()[base], load_config(nested(shipped()[base]))
+
+
+def in_yaml(flat: Flat) -> str:
+    return json.dumps(nested(flat), indent=1)  # which is YAML
+
+
+# Kernels.  Each takes seconds to be compiled, so that a session has a pool of them.
+
+Piece = tuple[str, str, tuple[str, ...]]
+"""Method, model and specs of measurements."""
+
+
+def kernels(config: Config) -> set[Piece]:
+    """What a run of the configuration may need."""
+    methods = allowed(config.equations) if config.integrator.method == AUTO else [config.integrator.method]
+    return {(method, config.tier.name, compiled(config.measure)) for method in methods}
+
+
+def steps(config: Config) -> float:
+    """Steps of all cells to t_end."""
+    model, columns, integrator = config.equations, config.grid.columns(), config.integrator
+    columns = {name: column[~model.impossible(columns)] for name, column in columns.items()}
+    with np.errstate(all="ignore"):
+        _, step, _ = cheapest(model, columns, integrator.tolerance, integrator.t_end)
+    return float((integrator.t_end / (step if integrator.step == "auto" else integrator.step + 0 * step)).sum())
+
+
+def compiled(specs: tuple[str, ...]) -> tuple[str, ...]:
+    """Those of the measurements that are made in a kernel."""
+    return tuple(each.spec for each in chosen(specs) if each.in_kernel)
+
+
+def further(random: Random) -> Iterator[Piece]:
+    """Kernels of configurations that are drawn, each once."""
+    seen: set[Piece] = set()
+    while True:
+        base = random.choice(sorted(shipped()))
+        drawn = {path: setting(path, random.randrange(1000)) for path in random.sample(sorted(PATHS), 4)}
+        _, config = accepted(shipped()[base] | drawn, base)
+        if config.simulated and not config.film:
+            new = kernels(config) - seen
+            seen |= new
+            yield from sorted(new)
+
+
+def in_pool(flat: Flat, base: str, pool: list[Piece], number: int) -> tuple[Flat, Config]:
+    """The configuration with a method and measurements of the pool, if its model is there and others are asked for."""
+    flat, config = accepted(flat, base)
+    of_model = [piece for piece in pool if piece[1] == config.tier.name]
+    if config.simulated and of_model and not kernels(config) <= {*pool}:
+        method, _, specs = of_model[number % len(of_model)]
+        measure = [{name: int(n)} if n else name for name, _, n in (spec.partition("=") for spec in specs)]
+        flat, config = accepted(flat | {"measure": measure, "integrator.method": method}, base)
+    return flat, config
