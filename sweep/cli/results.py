@@ -51,9 +51,9 @@ def plot(
     words = [file.stem, variable, *cells, *asked, "no-title" if no_title else ""]
     target = output or file.with_name(f"{'_'.join(filter(None, words))}.png".replace("/", "-"))
     dataset = opened(file)
+    picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
     for name, taken in panels.nearest(dataset, sel).items():
         say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
-    picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
     say(f"wrote {target}")
 
 

@@ -30,7 +30,8 @@ class MapControls:
     def __init__(self, source: Source, change: Callable[[Callable[[State], State]], None]) -> None:
         """`change` is called with what the visitor makes of the state."""
         self._source, self._change = source, change
-        self._choices = choices(source)
+        # An axis of one value leaves no choice, and Bokeh has no slider that ends where it starts.
+        self._choices = {name: one for name, one in choices(source).items() if not one.axis or len(one.options) > 1}
         self._widgets = {name: self._widget(choice) for name, choice in self._choices.items()}
         self._limits = {name: self._limit(name, words) for name, words in LIMITS.items()}
         self.root = Row(children=[*self._widgets.values(), *self._limits.values()], name="controls",

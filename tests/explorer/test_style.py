@@ -48,3 +48,18 @@ def test_a_dataset_that_is_not_whole_is_refused(
 ) -> None:
     with pytest.raises(StoreError, match=said):
         sweep.explore(damage(opened))
+
+
+@pytest.mark.parametrize("values", [1, 2])
+def test_an_axis_of_one_value_has_no_slider(opened: xr.Dataset, values: int, caplog: pytest.LogCaptureFixture) -> None:
+    from bokeh.document import Document
+    from bokeh.models import Slider
+
+    from sweep.explorer.view import View
+
+    document, source = Document(), Source(opened.isel(n0=slice(values)))
+    View(document, source, None, None, {"n0": ["0.02"]})
+    document.validate()
+    names = {model.name for model in document.select({"type": Slider})}
+    assert {"mu", "b", "n0"} - names == ({"n0"} if values == 1 else set())
+    assert not caplog.records

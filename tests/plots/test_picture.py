@@ -285,6 +285,8 @@ def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
         ("--sel", "n0", "NAME=NUMBER"),
     ):
         refused(invoke("plot", tmp_path / "made.nc", option, text), f"{option} {text}: must be {form}")
+    result = invoke("plot", tmp_path / "made.nc", "--sel", "n0=0.06", "--var", "nothing")
+    assert (result.exit_code, result.stdout) == (2, "")
 
 
 def test_numbers_along_a_further_dimension_get_panels() -> None:
