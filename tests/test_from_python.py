@@ -58,10 +58,10 @@ def test_a_mapping_a_path_and_a_config_are_one_configuration(write: Write) -> No
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "a word": ({"mu": "x"}, "mu: must be a finite number >= 0 and < 1e+12, a list of such"),
+    "a word": ({"mu": "x"}, "mu: must be a finite number >= 0 and < 1e+12, a list of numbers"),
     "an entry": ({"mu": [1, "x"]}, "mu[1]: must be a finite number >= 0 and < 1e+12, not 'x'"),
     "a key of a range": ({"mu": {"strat": 1, "stop": 2, "num": 3}}, "mu.strat: unknown key (did you mean start?)"),
-    "another type": ({"mu": 1j}, "mu: must be a finite number >= 0 and < 1e+12, a list of such"),
+    "another type": ({"mu": 1j}, "mu: must be a finite number >= 0 and < 1e+12, a list of numbers"),
     "by path": ({"friction.mu": -1}, "friction.mu: must be a finite number >= 0 and < 1e+12, not -1"),
     "misspelt": ({"t_edn": 3}, "t_edn: unknown key (did you mean integrator.t_end?); the keys here are name, model"),
     "a section": ({"friction": {}}, "friction.mu: missing; give a finite number >= 0"),
@@ -89,7 +89,7 @@ def test_faults_of_a_mapping_have_its_path() -> None:
 
 
 def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name() -> None:
-    for cell, said in (({"mu": []}, "mu: an empty axis"), ({"x0": 20}, "start point off the ellipsoid at x0=20")):
+    for cell, said in (({"mu": []}, "mu: axis is empty"), ({"x0": 20}, "start point off the ellipsoid at x0=20")):
         with pytest.raises(ConfigError, match=f"^{said}"):
             sweep.trajectory(SAID, **cell)
     with pytest.raises(ConfigError, match=r"^mu: is no parameter of the noslip model; its parameters are a, b"):

@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 import pytest
-from support import ROOT, STANDARD
+from support import STANDARD, Write
 
 import sweep
 from sweep.engine.estimate import estimate
@@ -17,14 +17,14 @@ def told(what: str, **settings: Any) -> float:
     cells = {"body": {"b": [2.0, 3.0]}, "friction": {"mu": STANDARD["mu"]}, "start": {"n0": 0.05}}
     integrator = {"t_end": 3e6, "method": "dopri5", "estimate_errors": settings.pop("estimate_errors", False)}
     said = estimate(sweep.load_config(cells | {"integrator": integrator, **settings}))
-    found = re.search(rf"([\d.e+]+) to {what}", said)
+    found = re.search(rf"([\d.e+]+) (s|min|h|days) to {what}", said)
     assert found
-    return float(found[1])
+    return float(found[1]) * {"s": 1, "min": 60, "h": 3600, "days": 86400}[found[2]]
 
 
 @pytest.mark.parametrize("name", MEASURES)
-def test_every_measurement_is_counted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    film = {name: ROOT / "configs" / "wooden_film.csv"}
+def test_every_measurement_is_counted(name: str, monkeypatch: pytest.MonkeyPatch, write: Write) -> None:
+    film = {name: write("time,spin,error\n0,0.05,0.01\n10,0.04,0.01\n", "film.csv")}
     measure = [*MEASURES[name].needs, film if name == "misfit" else name]
     for each in (*MEASURES[name].needs, name):
         monkeypatch.setattr(MEASURES[each], "cost", 1.0)

@@ -85,7 +85,7 @@ def test_another_film_is_another_run(write: Write, config: Path, tmp_path: Path)
     assert "6 of 8" in grown.attrs["taken_over"]
     np.testing.assert_array_equal(grown.misfit.sel(mu=first.mu), first.misfit)
     film(write, np.linspace(0, 150, 301), turned=0.1)
-    with pytest.raises(StoreError, match="or the film"):
+    with pytest.raises(StoreError, match="the film differs"):
         sweep.run(config, tmp_path / "out", mu=[40, 60, 80, 100])
     assert sweep.run(config).attrs["film_sha256"] != first.attrs["film_sha256"]
 
