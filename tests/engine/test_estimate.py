@@ -24,7 +24,7 @@ def told(what: str, **settings: Any) -> float:
 
 @pytest.mark.parametrize("name", MEASURES)
 def test_every_measurement_is_counted(name: str, monkeypatch: pytest.MonkeyPatch, write: Write) -> None:
-    film = {name: write("time,spin,error\n0,0.05,0.01\n10,0.04,0.01\n", "film.csv")}
+    film = {name: write("time,spin\n" + "".join(f"{t},{0.05 - t / 1000}\n" for t in range(9)), "film.csv")}
     measure = [*MEASURES[name].needs, film if name == "misfit" else name]
     for each in (*MEASURES[name].needs, name):
         monkeypatch.setattr(MEASURES[each], "cost", 1.0)
