@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from support import ROOT
 
 import sweep
 from sweep.engine.reporter import Progress
@@ -181,3 +182,11 @@ def test_cases_are_run_with_their_own_parameters(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "colour: red\n", "model: analytic\nfriction: {mu: [1, 2]}\n"])
 def test_without_a_usable_configuration_there_are_maps_alone(text: str, opened: xr.Dataset) -> None:
     assert usable(Source(opened.assign_attrs(config=text))) is None
+
+
+def test_an_axis_on_which_no_prediction_depends_has_its_first_value() -> None:
+    predicted = sweep.predict(ROOT / "configs" / "kane_levinson_coulomb.yaml")
+    source = Source(predicted)
+    assert "n0" in predicted.dims
+    assert "n0" not in source.axes
+    assert Setup(source).base["n0"] == float(predicted["n0"][0])
