@@ -112,7 +112,7 @@ class Source:
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:
         """The parameters `names` of the cell at `index`, as far as the dataset has them; the first on further axes."""
         there = {name: self.dataset.coords[name] for name in names if name in self.dataset.coords}
-        return {name: float(known.isel({d: index.get(d, 0) for d in known.dims})) for name, known in there.items()}
+        return {name: float(known.isel({d: index.get(str(d), 0) for d in known.dims})) for name, known in there.items()}
 
     def describe(self, index: Mapping[str, int]) -> dict[str, str]:
         """All values of the cell at `index`: each variable in words, and its value with its unit."""
