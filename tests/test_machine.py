@@ -59,12 +59,12 @@ def test_some_combinations() -> None:
 @pytest.mark.campaign
 def test_many_combinations(client: Any) -> None:
     """With kills and a cluster."""
-    run_machine(asked("SEED", 1), asked("RUNS", 18), asked("KERNELS", 2), far=True, client=client)
+    run_machine(asked("SEED", 1), asked("RUNS", 6), asked("KERNELS", 2), far=True, client=client)
 
 
 @pytest.mark.browser
 def test_many_combinations_in_the_explorer() -> None:
-    run_machine(asked("SEED", 2), asked("RUNS", 10), browser=True)
+    run_machine(asked("SEED", 2), asked("RUNS", 4), browser=True)
 
 
 # Each refers to what only a user can bring.

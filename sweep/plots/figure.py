@@ -197,6 +197,9 @@ def opaque(figure: Figure) -> None:
         alpha = np.where(rgba[:, 3:] > 0, rgba[:, 3:], 1.0)  # what is not drawn at all stays so
         return np.hstack([alpha * rgba[:, :3] + (1 - alpha) * ground, np.ceil(rgba[:, 3:])])
 
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        if alpha := axis.get_tick_params().get("grid_alpha"):  # another resolution may make further ticks
+            axis.set_tick_params(grid_color=mixed(to_rgba(mpl.rcParams["grid.color"], alpha))[0], grid_alpha=1.0)
     for artist in figure.findobj(lambda each: isinstance(each, Line2D | Patch | Collection)):
         found: Any = artist
         if isinstance(found, Line2D):

@@ -18,6 +18,7 @@ import sweep
 from sweep.config import ConfigError
 from sweep.kernels.status import SETTLED, TOPPLED
 from sweep.plots import picture, scales
+from sweep.plots.figure import opaque
 from sweep.results.dataset import REASONS, VARIABLES, described
 from sweep.results.probabilities import PROBABILITIES, probabilities
 
@@ -204,3 +205,15 @@ def test_labels_of_bars_stay_in_the_figure() -> None:
     assert figure.axes[-1].get_label() == "<colorbar>"
     assert box.y0 >= 0
     assert box.y1 <= figure.bbox.y1
+
+
+def test_ticks_that_are_made_later_are_opaque_too() -> None:
+    """Another resolution gives the panels another size, and that another number of ticks."""
+    drawn = Figure()
+    axes = drawn.add_subplot()
+    axes.grid(alpha=0.3)
+    axes.set_xticks([])
+    opaque(drawn)
+    axes.set_xticks(np.linspace(0, 1, 30))
+    drawn.draw_without_rendering()
+    assert {line.get_alpha() for line in axes.get_xgridlines()} <= {None, 1.0}
