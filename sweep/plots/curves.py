@@ -79,7 +79,7 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str, kinds: dict
     axes.grid(alpha=0.3)
     if first.name in theory.REVERSALS:
         entries |= lines.draw_vertical(axes, theory.crossings(chosen, first.x))
-        if x == "b" and "form_factor" in chosen:
+        if x == "b" and "form_factor" in chosen and chosen["form_factor"].dims == ("b",):
             entries["form_factor"] = _form_factor(axes, chosen)
     return entries
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Number
 from pathlib import Path
 
 import xarray as xr
@@ -81,6 +82,12 @@ _MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
 _CODES = ("status", "level", "curve", "outcome")
 """Variables that mean nothing once they are averaged."""
 
+_TEXTS = ("title", "config", "x", "y", "surface", "pictured", "undetermined", "model_parameters", "model_brings")
+"""Attributes that are texts, where there are any."""
+
+_NUMBERS = ("wall_time", "trajectories_per_second")
+"""Attributes that are numbers, where there are any."""
+
 _KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, RUN)}
 
 
@@ -115,6 +122,8 @@ def fault(dataset: xr.Dataset) -> str:
     """Say why a dataset cannot be shown, such as one that has been averaged or cut since; "" if it can."""
     if (found := kind(dataset)) is None:
         return "not a dataset of sweep: no variable of it, such as status"
+    if odd := _foreign(dataset):
+        return f"{odd}; another program wrote or changed it"
     if empty := [dim for dim, size in dataset.sizes.items() if not size and dim not in _MAY_BE_EMPTY]:
         return f"the axis {empty[0]} has no values; select at least one"
     if stacked := [name for name, index in dataset.indexes.items() if index.nlevels > 1]:
@@ -132,6 +141,25 @@ def fault(dataset: xr.Dataset) -> str:
     words = [*(f"the further axis {dim}; select one of its values" for dim in further),
              *(f"no whole numbers in {name}: it was averaged" for name in averaged)]  # fmt: skip
     return f"has {words[0]}" if words else ""
+
+
+def _foreign(dataset: xr.Dataset) -> str:
+    """Say which attribute or variable of a known name is not as sweep writes it; "" if none."""
+    for name in _TEXTS:
+        if not isinstance(dataset.attrs.get(name, ""), str):
+            return f"the attribute {name} is not text"
+    for name in _NUMBERS:
+        if not isinstance(dataset.attrs.get(name, 0), Number):
+            return f"the attribute {name} is not a number"
+    cells = {*dataset["status"].dims} if "status" in dataset else None
+    for name in VARIABLES.keys() & {*map(str, dataset.data_vars)}:
+        spec, variable = VARIABLES[name], dataset[name]
+        if variable.dtype.kind not in "biuf":
+            return f"the variable {name} holds no numbers"
+        over = {*variable.dims} - {spec.along}
+        if cells is not None and not (over <= cells if spec.per_body else over == cells):
+            return f"the variable {name} is not over the axes of status"
+    return ""
 
 
 def _needs(dataset: xr.Dataset, found: Kind) -> Mapping[str, tuple[str, ...]]:

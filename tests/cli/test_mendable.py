@@ -163,6 +163,23 @@ def test_a_dataset_that_was_cut_says_what_it_lacks(cut: str, tmp_path: Path, mon
         refused(invoke(verb, tmp_path / "cut.nc"), f"cut.nc: {said}")
 
 
+FOREIGN: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
+    "title": (lambda d: d.assign_attrs(title=[1, 2]), "the attribute title is not text; another program"),
+    "time": (lambda d: d.assign_attrs(wall_time="x"), "the attribute wall_time is not a number; another program"),
+    "words": (lambda d: d.assign(step=d.step.astype(str)), "the variable step holds no numbers; another program"),
+    "shape": (lambda d: d.assign(step=d.step.isel(mu=0)), "the variable step is not over the axes of status; another"),
+}
+
+
+@pytest.mark.parametrize("change", FOREIGN)
+def test_a_dataset_with_known_names_for_other_things_is_refused(change: str, tmp_path: Path) -> None:
+    changed, said = FOREIGN[change]
+    found = sweep.run({"friction": {"mu": [50, 60]}}, t_end=20, method="dopri5", estimate_errors=False)
+    changed(found).to_netcdf(tmp_path / "foreign.nc")
+    for verb in ("info", "plot"):
+        refused(invoke(verb, tmp_path / "foreign.nc"), f"foreign.nc: {said}")
+
+
 def test_a_cluster_without_distributed_says_what_to_install(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(sweep.StoreError, match=r"tcp://here:1: needs distributed, which is not installed: pip install"):
