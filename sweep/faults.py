@@ -39,8 +39,8 @@ def printable(text: str) -> str:
 
 
 def either(names: Iterable[str]) -> str:
-    """Names among which to choose: "a, b or c"."""
-    *most, last = names
+    """Names among which to choose: "a, b or c"; "" if there are none."""
+    *most, last = [*names] or [""]
     return f"{', '.join(most)} or {last}" if most else last
 
 

@@ -8,6 +8,7 @@ of each kind with hypothesis, and among the campaigns many.
 import os
 import warnings
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -187,6 +188,9 @@ def _invoke(folder: Path, *arguments: str) -> bool:
     return result.exit_code == 0
 
 
+_FILES = count()
+
+
 def foreign(random: Random, folder: Path) -> bool:
     """A dataset of another program, whose variables may have the same names as ours."""
     names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step",
@@ -213,7 +217,7 @@ def foreign(random: Random, folder: Path) -> bool:
         if kind.startswith("float") and random.random() < 0.3:
             filled = np.full(shape, random.choice((np.nan, np.inf)), kind)
         variables[name] = (over, filled, {} if kind.startswith("M") else attributes())
-    file = folder / f"foreign{random.randrange(1 << 30)}.nc"  # the one before may be open still
+    file = folder / f"foreign{next(_FILES)}.nc"  # the ones before may be open still
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
