@@ -19,6 +19,7 @@ from unittest.mock import patch
 
 import click
 import numpy as np
+import pytest
 import xarray as xr
 from click.testing import CliRunner
 from fuzzing import Violation, check_refusal
@@ -32,10 +33,10 @@ import sweep
 from machine import draws, oracles, words
 from machine.draws import Draws, Flat, Piece
 from sweep.cli import main
-from sweep.config import Config, load_config
+from sweep.config import Config, ConfigError, load_config
 from sweep.config.document import parse_value
 from sweep.faults import Refused
-from sweep.kernels.status import FAILURES, TIME_LIMIT
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT
 from sweep.plots.formats import PICTURES
 from sweep.results.kind import kind
 from sweep.results.summary import contents, describe
@@ -263,7 +264,12 @@ class Machine(RuleBasedStateMachine):
             config, there = found.scene.config, oracles.rows(found.dataset)
             cell = [place % len(there["status"])]
             values = {name: float(there[name][cell[0]]) for name in (*config.axes, *config.cases)}
-            followed = sweep.trajectory(found.scene.with_({}, "cases"), stop_when_settled=True, **values)
+            scene = found.scene.with_({}, "cases")
+            if there["status"][cell[0]] == IMPOSSIBLE:
+                with pytest.raises(ConfigError):
+                    sweep.trajectory(scene, **values)
+                return
+            followed = sweep.trajectory(scene, stop_when_settled=True, **values)
             oracles.alike(oracles.rows(followed), {name: column[cell] for name, column in there.items()})
 
     # ---- over the files of an earlier run
