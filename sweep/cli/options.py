@@ -62,7 +62,7 @@ def loaded(config: Path, settings: tuple[str, ...]) -> Config:
     from sweep.config import load_config
     from sweep.config.document import parse_value
 
-    if config.stem in examples() and not config.exists():
+    if not config.exists() and config.stem in examples():
         refuse(config, f"no such file; `sweep examples {config.stem}` copies the example of that name")
     parsed = {}
     for setting in settings:

@@ -96,7 +96,7 @@ def read(file: str, text: str) -> Table:
     Raises
     ------
     ConfigError
-        if it is no table: if a line has another number of cells than the first, or two units are given to a column.
+        if a line has another number of cells than the first, or a column is given two units.
     """
     try:
         separator = _separator(text)
@@ -140,6 +140,6 @@ def _separator(text: str) -> str:
 
 
 def _is_of_units(row: list[str]) -> bool:
-    """Tell a row of units, in which there is text and no number."""
+    """Tell whether a row holds units: text, and no number."""
     cells = [cell for cell in row if cell.lower() not in GAPS]
     return bool(cells) and not any(re.fullmatch(r"[-+−.,eE0-9]*[0-9][-+−.,eE0-9]*", cell) for cell in cells)

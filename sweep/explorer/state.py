@@ -17,15 +17,13 @@ from sweep.faults import brief
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.plots import labels
 from sweep.plots.quantities import subject
+from sweep.plots.scales import LARGEST
 
 MAX_CELLS = 6
 """Curves over each other; as many as there are colours that everybody can distinguish."""
 
 LIMITS = {"low": "from", "high": "to"}
 """The ends of the colour scale, and what the page calls them."""
-
-MAX_LIMIT = 1e15
-"""Of the size of a limit: up to here a float holds every count."""
 
 # Limits below this are zero: of smaller numbers a logarithmic scale overflows.
 _ZERO = 1e-100
@@ -159,7 +157,7 @@ def read(
         elif key in LIMITS and math.isfinite(at := limit(values[-1])):
             state = replace(state, limits={**state.limits, key: at})
         elif key in LIMITS:
-            faults.append(f"{key}={brief(values[-1])}: give a number from {-MAX_LIMIT:g} to {MAX_LIMIT:g}")
+            faults.append(f"{key}={brief(values[-1])}: give a number from {-LARGEST:g} to {LARGEST:g}")
         elif key not in ("cell", *_ENDED):
             unknown.append(f"'{brief(key)}'")
     if unknown:
@@ -203,9 +201,9 @@ def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell:
 
 
 def limit(text: str) -> float:
-    """An end of the colour scale as a text spells it; NaN if it is not a number, or farther out than `MAX_LIMIT`."""
+    """An end of the colour scale as a text spells it; NaN if it is not a number, or farther out than `LARGEST`."""
     at = number(text)
-    return math.nan if abs(at) > MAX_LIMIT else 0.0 if abs(at) < _ZERO else at
+    return math.nan if abs(at) > LARGEST else 0.0 if abs(at) < _ZERO else at
 
 
 def number(text: str) -> float:

@@ -48,9 +48,9 @@ def approach(model: Model, states: Array, constants, stretch: Array) -> tuple[Ar
     Returns
     -------
     The status of each trajectory, shape (cells,): `LIFT_OFF`, `PARADOX` or `TOPPLED`; `RUNNING` if it passes the
-    stretch; `DIVERGED` if the states cannot be followed.  The time from the beginning of the stretch to this,
-    shape (cells,), in sqrt(c/g).  The spin at that time, shape (cells,).  And how much
-    it may change in what remains of that time, shape (cells,): near a paradox it changes like the root of the time.
+    stretch; `DIVERGED` if the states cannot be followed.  Second, the time from the beginning of the stretch to this,
+    in sqrt(c/g), shape (cells,).  Third, the spin at that time, shape (cells,).  Fourth, how much the spin may change
+    in the time that the last step leaves, shape (cells,): near a paradox it changes as the root of the time.
     """
     status, time, spin, doubt = found = np.empty((4, len(stretch)))
     rows = np.ascontiguousarray(np.concatenate([stack(tuple(states)), stack(tuple(constants))]).T)

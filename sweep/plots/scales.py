@@ -33,8 +33,8 @@ _MAX_RATIO = 2.0
 
 _MAX_TICKS = 12
 
-_LARGEST = 10**15
-"""Limits of a scale of integers, which floating-point numbers still tell apart."""
+LARGEST = 10**15
+"""Largest size of a limit: up to here a float holds every count."""
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,8 @@ def _arrows(values: Array, low: float, high: float) -> Arrows:
 
 def _whole(limits: Limits) -> list[int]:
     """The limits of a scale of integers; `ConfigError` if they are too large."""
-    if max(map(abs, limits)) > _LARGEST:
-        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {_LARGEST:g} for counts", "limits")
+    if max(map(abs, limits)) > LARGEST:
+        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {LARGEST:g} for counts", "limits")
     return [round(limit) for limit in limits]
 
 

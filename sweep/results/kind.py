@@ -152,7 +152,7 @@ def _foreign(dataset: xr.Dataset) -> str:
         if not isinstance(dataset.attrs.get(name, 0), Number):
             return f"the attribute {name} is not a number"
     cells = {*dataset["status"].dims} if "status" in dataset else None
-    for name in VARIABLES.keys() & {*map(str, dataset.data_vars)}:
+    for name in (name for name in VARIABLES if name in dataset.data_vars):
         spec, variable = VARIABLES[name], dataset[name]
         if variable.dtype.kind not in "biuf":
             return f"the variable {name} holds no numbers"
