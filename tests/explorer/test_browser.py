@@ -206,10 +206,11 @@ def tip(page: Page, i: int, j: int) -> str:
 
 
 def resize(page: Page, width: int) -> None:
-    """Give the window another width, and wait until the figures have theirs."""
+    """Give the window another width, and wait until the figures fit and the server has painted the patterns anew."""
     page.set_viewport_size({"width": width, "height": 950})
     page.wait_for_function(f"{MAP}.outer_width <= {width}")
     page.wait_for_timeout(300)
+    wait(page, "map figure", "Math.abs(m.renderers[2].data_source.data.image[0].shape[1] - m.inner_width) <= 1")
 
 
 def curves(page: Page) -> list[str]:
@@ -551,10 +552,7 @@ def test_nothing_runs_out_of_the_window(clicked: Page) -> None:
         resize(clicked, width)
         assert clicked.evaluate("document.documentElement.scrollWidth") <= width
         for name in ("map figure", "spin", "energies", "body"):
-            assert 200 < model(clicked, name, "m.outer_width") <= width
-        # The patterns are painted for the new size.
-        shape = model(clicked, "map figure", "m.renderers[2].data_source.data.image[0].shape")
-        assert abs(shape[1] - model(clicked, "map figure", "m.inner_width")) <= 1
+            wait(clicked, name, f"200 < m.outer_width && m.outer_width <= {width}")
 
 
 def test_a_click_runs_a_users_model_that_the_user_names(go: Open, tmp_path: Path) -> None:
