@@ -82,13 +82,13 @@ def _variables() -> tuple[Row, list[Row]]:
 
 _STATUS_MEANINGS = {
     "not_run": "not simulated",
-    "settled": "upright spin is stable, and the rattle left can change neither that nor the count",
-    "time_limit": "`t_end` was reached first, or `patience` where nothing more can be foreseen",
+    "settled": "upright spin is stable, and the remaining rattle can change neither that nor the count",
+    "time_limit": "`t_end` was reached first, or `patience` if the end could not be predicted",
     "lift_off": "the normal force fell to zero: the body leaves the plane",
-    "diverged": "the integration did not hold, even with a shorter step; the numbers are worth nothing",
+    "diverged": "the integration failed, even with shorter steps; the numbers are meaningless",
     "paradox": "Painlevé's paradox: no contact force solves the equations",
-    "toppled": "the body is tilted by a right angle, where the variables end",
-    "impossible": "not simulated: there is no such body, or it does not stand upright at rest",
+    "toppled": "the body is tilted by a right angle, the limit of the variables",
+    "impossible": "not simulated: the body cannot exist, or does not stand upright at rest",
 }
 
 
@@ -106,7 +106,7 @@ def _measurements() -> tuple[Row, list[Row]]:
     for name, kind in measures.MEASURES.items():
         needs = ", ".join(f"`{n}`" for n in kind.needs)
         rows.append((f"`{name}`", kind.summary, needs, "yes" if kind.by_default else "no"))
-    return ("measurement", "what it is", "needs", "by default"), rows
+    return ("measurement", "description", "needs", "by default"), rows
 
 
 def _methods() -> tuple[Row, list[Row]]:
@@ -114,7 +114,7 @@ def _methods() -> tuple[Row, list[Row]]:
     for method in methods.METHODS.values():
         models = ", ".join(f"`{m.name}`" for m in MODELS.values() if method.runs(m))
         rows.append((f"`{method.name}`", method.summary, models))
-    return ("method", "what it is", "models"), rows
+    return ("method", "description", "models"), rows
 
 
 def _models() -> tuple[Row, list[Row]]:
@@ -124,7 +124,7 @@ def _models() -> tuple[Row, list[Row]]:
         states = ", ".join(f"`{s}`" for s in tier.states) if isinstance(tier, Model) else ""
         possible = ", ".join(f"`{m}`" for m in measures.possible(tier))
         rows.append((f"`{tier.name}`", tier.summary, states, used, possible))
-    return ("model", "what it is", "states", "methods", "measures"), rows
+    return ("model", "description", "states", "methods", "measures"), rows
 
 
 def _directive(make: Callable[[], tuple[Row, list[Row]]]) -> type[SphinxDirective]:
