@@ -70,7 +70,7 @@ def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
     trajectory that fails is infinite.
     """
     table = np.concatenate([kernel.images(reference.columns, step, t) for t in reference.times])
-    execute(kernel, table, stop_when_settled=False)
+    execute(kernel, table)
     spin = kernel.model.energy(*kernel.unpack(table))[0]
     error = np.where(kernel.table(table)["status"] == TIME_LIMIT, np.abs(spin - reference.spins.T.ravel()), np.inf)
     return np.asarray(error.reshape(len(reference.times), -1).max(axis=0))

@@ -75,7 +75,7 @@ class Work:
     step: Array
 
     def __call__(self) -> None:
-        execute(self.kernel, self.kernel.images(self.columns, self.step, T_END), stop_when_settled=False)
+        execute(self.kernel, self.kernel.images(self.columns, self.step, T_END))
 
     def __len__(self) -> int:
         return len(self.step)

@@ -22,6 +22,7 @@ from sweep.engine.plan import kernels
 from sweep.grid import Tile
 from sweep.interrupt import point
 from sweep.kernels.build import APPROACH, build
+from sweep.kernels.layout import LANES
 from sweep.results.identity import Identity
 from sweep.results.provenance import identify, sources
 from sweep.results.store import StoreError
@@ -34,6 +35,9 @@ PATIENCE = "10s"
 
 _POLL = 0.01
 """Time in seconds between two looks at whether a tile has come back."""
+
+_CELLS_A_LANE, _TASKS_A_WORKER = 32, 4
+"""Cells of a task for each lane of a worker, unless that would leave a worker fewer tasks than the second."""
 
 _LOST = "the dask scheduler is gone; finished tiles are kept, and the same command without --fresh resumes the run"
 
@@ -52,18 +56,27 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
         build(kernels(config), APPROACH)  # once, into the cache that those workers read
     # A task's result rather than scattered data, which would be lost along with the workers that hold it.
     shared = client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
-    numbers = {client.submit(_work, shared, i, pure=False): i for i in todo}
+    numbers = {client.submit(_work, shared, some, pure=False): some for some in _together(client, config, tiles, todo)}
     for future in _arriving(as_completed(numbers, loop=client.loop)):
         try:
-            done: Done = future.result()
+            done: list[Done] = future.result()
         except KilledWorker as error:
             deaths = error.allowed_failures + 1
-            raise StoreError(f"tile {numbers[future]}: {deaths} workers died computing it; out of memory?") from None
+            raise StoreError(f"tile {numbers[future][0]}: {deaths} workers died computing it; out of memory?") from None
         except CancelledError:
             raise StoreError(_LOST) from None
         del numbers[future]
         future.release()
-        yield done
+        yield from done
+
+
+def _together(client: Client, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Sequence[int]]:
+    """Divide `todo` among tasks: as many cells in each as keep the lanes of a worker full, but some tasks a worker."""
+    threads = [*client.nthreads().values()] or [1]
+    largest = max((config.grid.part(tiles[i]).size for i in todo), default=1)
+    enough = max(threads) * LANES * _CELLS_A_LANE // largest
+    together = max(1, min(enough, len(todo) // (_TASKS_A_WORKER * len(threads))))
+    return (todo[first : first + together] for first in range(0, len(todo), together))
 
 
 def _on_this_machine(client: Client) -> bool:
@@ -91,7 +104,7 @@ Shared = tuple[Config, list[Tile], Identity]
 _one_tile = threading.Lock()
 
 
-def _work(shared: Shared, tile: int) -> Done:
+def _work(shared: Shared, together: Sequence[int]) -> list[Done]:
     from distributed import get_worker
 
     config, tiles, identity = shared
@@ -101,8 +114,7 @@ def _work(shared: Shared, tile: int) -> Done:
     with _one_tile:
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         numba.set_num_threads(min(get_worker().state.nthreads, most))
-        (done,) = run_batch(config, tiles, [tile])
-    return done
+        return list(run_batch(config, tiles, together))
 
 
 @contextmanager

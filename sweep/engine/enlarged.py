@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -203,12 +203,9 @@ class Enlarged(Some):
         super().__init__(config, store)
         self.earlier = earlier
 
-    def grow(self, tile_size: Callable[[int], int]) -> bool:
-        """Add the tiles to simulate: all of them, once.  False if there are no more.
-
-        `tile_size` as for `Whole.grow`.
-        """
-        return not self.tiles and self._add(np.flatnonzero(self.earlier.cells < 0), tile_size)
+    def grow(self) -> bool:
+        """Add the tiles to simulate: all of them, once.  False if there are no more."""
+        return not self.tiles and self._add(np.flatnonzero(self.earlier.cells < 0))
 
     def dataset(self) -> xr.Dataset:
         """The labelled dataset over all cells, in memory."""

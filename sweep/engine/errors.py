@@ -19,22 +19,22 @@ the first run.  Figures: docs/explanation/accuracy.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from sweep.engine import final
-from sweep.engine.executor import Work
-from sweep.engine.plan import Part, Plan
-from sweep.engine.repeats import MOST_STEPS, decide_failures
+from sweep.engine import ending
+from sweep.engine.cells import Cells
+from sweep.engine.failures import MOST_STEPS
+from sweep.engine.lives import COMPANION, ERRORS, Lives
+from sweep.engine.plan import Plan
 from sweep.grid import Array
 from sweep.kernels.measures.margin import EXTREMES
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.methods import METHODS
-from sweep.kernels.status import FAILURES, IMPOSSIBLE, RUNNING, SETTLED
-from sweep.models.model import take
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED
+from sweep.models.model import stack
 
 ROUNDS = 3
 """Largest number of repeats of a cell."""
@@ -107,38 +107,58 @@ class Errors(NamedTuple):
         return np.asarray(np.fmax(self.spin, self.least))
 
 
-def keep_tolerance(job: Plan, work: Work) -> Errors:
-    """Find the error of each cell of `job`, whose runs have all ended, and repeat cells above the tolerance, in place.
+def accompany(lives: Lives, rows: Array) -> None:
+    """Let the companions of the cells `rows` run, whose own runs are put aside."""
+    run = lives.take(rows)
+    lives.aside[rows] = run.images
+    lives.enter(rows, COMPANION, companions(run))
+
+
+def after_companion(lives: Lives, rows: Array) -> Array:
+    """Find the errors of the cells `rows`, whose companions have ended; those above the tolerance run again.
 
     A step that the configuration fixes stays, and so does that of a search.  Otherwise it is made shorter, `ROUNDS`
     times at most, until the error is below `AIM` times what the tolerance allows.  A cell whose error stays above the
     tolerance is `MISSED`.
 
-    While `work` goes on, the cells whose error is not known yet are `RUNNING`.
+    Returns
+    -------
+    The indices of the cells that do not run again.
     """
-    found = Errors(*np.full((len(Errors._fields), sum(grid.size for grid in job.grids)), np.nan))
-    waiting = []
-    for part in job.parts:
-        rows = np.flatnonzero(~part.failed)
-        first, table = part.take(rows), part.kernel.table(part.images)
-        waiting.append((part, rows, first))
-        table["status"][rows] = RUNNING
-        met = np.flatnonzero(table["failed_at"] > 0)
-        found.spin[part.cells[met]] = table["failed_error"][met]
-    for part, rows, first in waiting:
-        _keep(part, rows, first, found, work)
-    found.spin[np.isinf(found.spin)] = np.nan
-    return found
+    notes, rules, method = lives.notes, lives.cells.rules, METHODS[lives.cells.method]
+    now, other = lives.cells.take(rows, lives.aside[rows]), lives.take(rows)
+    errors, limit, most = compare(now, other), allowed(now), notes["most_error"][rows]
+    shorter = np.fmax((errors.spin / (AIM * limit)) ** (1 / _ORDER), 1.0)
+    large = errors.spin > AIM * limit
+    by_chance = ~large & (OF_RATTLE * errors.rattle > AIM * limit)
+    shorter = np.where(np.isinf(errors.spin) | by_chance, method.companion, shorter)
+    hopeless = (shorter > SHORTEST) | (errors.spin > most)
+    hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
+    long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
+    again = (large | by_chance) & ~hopeless & ~long & (notes["repeats"][rows] < ROUNDS) & rules.repeats
+    if not rules.fixed:
+        missed = rows[~again & (errors.told > limit)]
+        notes["step_rule"][missed] = MISSED
+    lives.cells.images[rows] = now.images
+    lives.note(rows, ERRORS, stack(errors).T)
+    on = rows[again]
+    notes["most_error"][on] = np.where(by_chance, np.inf, errors.spin / shorter**_LEAST_ORDER)[again]
+    notes["repeats"][on] += 1
+    lives.note(on, ERRORS, np.nan)
+    notes["step_rule"][on] = REPEAT
+    notes["step"][on] /= shorter[again]
+    ending.begin(lives, on, lives.take(on).start())
+    return rows[~again]
 
 
-def allowed(part: Part) -> Array:
+def allowed(part: Cells) -> Array:
     """Error in spin that the tolerance allows at the ends of the runs, in the model's units, shape (cells,)."""
-    unit = part.config.equations.spin_unit(part.columns)
+    unit = part.model.spin_unit(part.columns)
     longer = np.maximum(part.times * unit / TOLERANCE_TIME, 1)
-    return np.asarray(max(part.config.integrator.tolerance, ROUND_OFF) * longer * unit)
+    return np.asarray(max(part.rules.tolerance, ROUND_OFF) * longer * unit)
 
 
-def imbalance(part: Part) -> Array:
+def imbalance(part: Cells) -> Array:
     """Error of the energy balance as one in spin, at the fastest spin that the energy allows, shape (cells,).
 
     Infinite if the run does not measure it.
@@ -151,53 +171,20 @@ def imbalance(part: Part) -> Array:
     return np.asarray(np.divide(table["violation"], scale, out=np.zeros(len(scale)), where=scale > 0))
 
 
-def _keep(part: Part, rows: Array, now: Part, found: Errors, work: Work) -> None:
-    """Decide the cells of `part` with the indices `rows`; `now` are these cells after their first run.
-
-    Their errors are put into those `found`, which are over all cells.
-    """
-    rules, most = part.step_rule[rows], np.full(len(rows), np.inf)
-    for round_ in range(ROUNDS + 1):
-        name = f"{part.method} repeat {round_}"
-        other = companions(now)
-        work.run(f"{name} companion", other.kernel, other.images)
-        errors, limit = compare(now, other), allowed(now)
-        shorter = np.fmax((errors.spin / (AIM * limit)) ** (1 / _ORDER), 1.0)
-        large = errors.spin > AIM * limit
-        by_chance = ~large & (OF_RATTLE * errors.rattle > AIM * limit)
-        shorter = np.where(np.isinf(errors.spin) | by_chance, METHODS[part.method].companion, shorter)
-        hopeless = (shorter > SHORTEST) | (errors.spin > most)
-        hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
-        long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
-        again = (large | by_chance) & ~hopeless & ~long & (round_ < ROUNDS) & (not part.fixed) & part.config.repeats
-        missed = (errors.told > limit) & (not part.fixed)
-        done = now.take(~again)
-        part.put(rows[~again], done, np.where(missed, MISSED, rules)[~again])
-        for whole, some in zip(found, take(errors, ~again), strict=True):
-            whole[part.cells[rows[~again]]] = some
-        if not again.any():
-            return
-        most = np.where(by_chance, np.inf, errors.spin / shorter**_LEAST_ORDER)[again]
-        rows = rows[again]
-        now = now.take(again).start(shorter[again])
-        rules = np.full(len(rows), REPEAT)
-        name = f"{part.method} repeat {round_ + 1}"
-        final.run(now, work, name)
-        decide_failures(now, work, name)
-        failed = now.failed
-        part.put(rows[failed], now.take(failed), now.step_rule[failed])
-        rows, now, most, rules = rows[~failed], now.take(~failed), most[~failed], rules[~failed]
+def companions(part: Cells) -> Array:
+    """Images of the companions of cells, none of which has failed, at t = 0."""
+    return part.start(part.kernel.table(part.images)["step"] * _ratio(part), part.times)
 
 
-def companions(part: Part) -> Part:
-    """The companions at t = 0 of all cells of `part`, none of which has failed."""
-    if not len(part.cells):
-        return part
-    step = part.kernel.table(part.images)["step"] * _ratio(part)
-    return replace(part, images=part.kernel.images(part.columns, step, part.times, part.stable))
+def told(lives: Lives) -> Errors:
+    """The errors of all cells, as far as known."""
+    table = lives.cells.kernel.table(lives.cells.images)
+    errors = Errors(*lives.notes.columns(ERRORS).T)
+    spin = np.where(np.isinf(errors.spin), np.nan, errors.spin)
+    return errors._replace(spin=np.where(table["failed_at"] > 0, table["failed_error"], spin))
 
 
-def compare(part: Part, companion: Part) -> Errors:
+def compare(part: Cells, companion: Cells) -> Errors:
     """Compare the cells of `part` with their companions, when all have ended."""
     kernel, both = part.kernel, (part.images, companion.images)
     table, other = map(kernel.table, both)
@@ -221,29 +208,33 @@ def compare(part: Part, companion: Part) -> Errors:
     return Errors(spin, rattle, _least(part, rattle), np.where(failed, np.nan, counts), apart, *margins)
 
 
-def _least(part: Part, rattle: Array) -> Array:
+def _least(part: Cells, rattle: Array) -> Array:
     """What the errors of the cells of `part` are at least, shape (cells,), if that of the rattle is `rattle`."""
     share, balance = METHODS[part.method].least_error, imbalance(part)
-    known = np.isfinite(balance + rattle) & (share > 0) & (not part.fixed)
+    known = np.isfinite(balance + rattle) & (share > 0) & (not part.rules.fixed)
     expected = np.sqrt(np.where(known, balance, 0.0) * allowed(part))
     return np.where(known, share * expected, OF_RATTLE * rattle)
 
 
-def _ratio(part: Part) -> Array:
+def _ratio(part: Cells) -> Array:
     """Ratio of the companions' steps to those of the cells, shape (cells,), within what is stable."""
     method, ratio = METHODS[part.method], np.full(len(part.cells), METHODS[part.method].companion)
     if method.stable_step is None:
         return ratio
     with np.errstate(divide="ignore"):
-        stable = _NEARER * method.stable_step(part.config.equations, part.columns)
+        stable = _NEARER * method.stable_step(part.model, part.columns)
     return np.asarray(np.clip(stable / part.kernel.table(part.images)["step"], _NEARER, ratio))
 
 
-def results(job: Plan, errors: Errors | None) -> dict[str, Array]:
-    """Collect what was simulated and, with `errors`, how exact it is: by name, each over all cells of `job`."""
+def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
+    """Collect what was simulated and, where cells were run twice, how exact it is: by name, over all cells of `job`."""
     found = job.results()
-    if errors is None:
+    if not any(part.rules.twice for part in job.parts):
         return found
+    errors = Errors(*np.full((len(Errors._fields), len(found["status"])), np.nan))
+    for each in lives:
+        for whole, part in zip(errors, told(each), strict=True):
+            whole[each.cells.cells] = part
     found["spin_error"] = errors.told
     if "reversals" in found:
         sound = ~np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
@@ -264,7 +255,7 @@ def _consistent(job: Plan, found: Mapping[str, Array]) -> Array:
     """Tell where the parity of the count is that of the signs of the spin at the start and the end, shape (cells,)."""
     consistent = np.zeros(len(found["reversals"]), bool)
     for part in job.parts:
-        model = part.config.equations
+        model = part.model
         start, _, _ = model.energy(model.start(part.columns), model.constants.of(part.columns))
         turned = start * found["spin_final"][part.cells]
         odd = found["reversals"][part.cells] % 2 == 1

@@ -8,9 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from sweep.config import Config
+from sweep.engine.cells import Cells
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import BATCH
-from sweep.engine.plan import Choice, choose, kernels
+from sweep.engine.plan import choose, kernels
 from sweep.faults import duration
 from sweep.grid import Array
 from sweep.kernels.build import compile_seconds, missing
@@ -63,7 +64,7 @@ def estimate(config: Config) -> str:
     )
 
 
-def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share: float) -> Iterator[Array]:
+def _works(config: Config, chosen: tuple[Cells, ...], steps: list[Array], share: float) -> Iterator[Array]:
     """The work for each cell, in steps of dopri5 alone: for each method."""
     if not chosen:
         return  # no body of the sample is possible

@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from dataclasses import replace
 
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine import final
-from sweep.engine.errors import keep_tolerance, results
-from sweep.engine.executor import Work
+from sweep.engine.errors import results
+from sweep.engine.life import begin, live, progress
 from sweep.engine.misfits import misfits
 from sweep.engine.plan import plan
-from sweep.engine.repeats import decide_failures
 from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
-from sweep.kernels.status import FAILURES, RUNNING, SETTLED
+from sweep.kernels.status import SETTLED
 from sweep.prediction import predict
 from sweep.results.provenance import this_cpu
 from sweep.results.store import Running, Store
 
 BATCH = 32_768
 """Cells simulated together (50 MB of images).  Lanes idle only at the end of such a batch of tiles."""
-
-_FIRST = 0.6
-"""The share of a cell's work that its first run is, where a second one tells its error."""
-
 
 Done = tuple[int, dict[str, Array]]
 """The number of a finished tile, and by name its results, each of shape (cells,), its cost and the type of CPU."""
@@ -61,32 +55,20 @@ def run_batch(
     for part in job.parts:
         part.kernel.advancing.compile()
     began = time.perf_counter() - (left.seconds if left else 0)
-    work, twice = Work(left.tables if left else None), config.integrator.estimate_errors
-    first = _FIRST if twice else 1.0
-    # Through `work`, which calls it, `save` would keep itself and the images of the batch alive until Python looks for
-    # cycles: 10⁶ cells took 629 MiB, 10⁵ 366.
-    kept = work.kept
+    lives = begin(job.parts)
+    for each in lives:
+        each.resume(left.tables if left else {})
 
-    def save(share: float, before: float = 0.0, *, decided: bool = True) -> None:
-        """Save the images, and report as done a share of each cell, and of each that has ended another one."""
+    def report() -> None:
         # Images are saved only between two chunks: anywhere else an interrupt may find half of them advanced.
         if store:
-            store.save_running(Running(list(batch), kept, time.perf_counter() - began))
-        status = np.concatenate([part.status for part in job.parts])
-        ended, failed = int((status != RUNNING).sum()), int(np.isin(status, FAILURES).sum())
-        # What looks like a failure is decided only after all cells have ended.
-        ended, failed = (ended, failed) if decided else (ended - failed, 0)
-        after_chunk(before * len(status) + share * ended, failed)
+            tables = {name: table for each in lives for name, table in each.saved().items()}
+            store.save_running(Running(list(batch), tables, time.perf_counter() - began))
+        after_chunk(*progress(lives))
 
-    work.after_chunk = partial(save, first, decided=False)
-    for part in job.parts:
-        final.run(part, work, part.method)
-    work.after_chunk = partial(save, first)
-    for part in job.parts:
-        decide_failures(part, work, part.method)
-    work.after_chunk = partial(save, 1 - first, first)
-    errors = keep_tolerance(job, work) if twice else None
-    found = results(job, errors) | misfits(job)
+    live(lives, report)
+    job = replace(job, parts=tuple(each.cells for each in lives))
+    found = results(job, lives) | misfits(job)
     cost = {"seconds": np.array((time.perf_counter() - began) / len(batch)), "cpu": cpu}
     for i, arrays in zip(batch, job.by_grid(found), strict=True):
         yield i, arrays | cost

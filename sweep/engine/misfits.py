@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from sweep.config import Config
 from sweep.config.film import Film
-from sweep.engine.plan import Part, Plan, steps_of
+from sweep.engine.cells import Cells
+from sweep.engine.plan import Plan, steps_of
 from sweep.grid import Array
 from sweep.interrupt import point
 from sweep.jit import threads
@@ -30,14 +32,14 @@ def misfits(job: Plan) -> dict[str, Array]:
     found = np.full(sum(grid.size for grid in job.grids), np.nan)
     for part in job.parts:
         if len(sound := np.flatnonzero(~part.failed)):
-            found[part.cells[sound]] = _of_part(part, sound, film)
+            found[part.cells[sound]] = _of_part(job.config, part, sound, film)
     return {Misfit.name: found}
 
 
-def _of_part(part: Part, rows: Array, film: Film) -> Array:
+def _of_part(config: Config, part: Cells, rows: Array, film: Film) -> Array:
     """Misfits of the cells of `part` with the indices `rows`, in the same order."""
-    model, columns = part.config.equations, part.columns
-    usual, _ = steps_of(part.method, part.config, columns)
+    model, columns = part.model, part.columns
+    usual, _ = steps_of(part.method, config, columns)
     # A cell that was repeated in shorter steps needs them here too.
     step = automatic_step(PLAIN, model, columns)[0] * np.minimum(part.step / usual, 1.0)
     steps = len(film.time) + film.time[-1] / step[rows]

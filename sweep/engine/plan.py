@@ -1,4 +1,4 @@
-"""Turns the cells of grids into images: the method, step, limits and start of each, before any step is taken."""
+"""Gives each cell of grids its method, step, limits and start, before any step is taken."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from sweep.config import Config
+from sweep.engine.cells import Cells, Rules
 from sweep.grid import Array, Grid
 from sweep.jit import on_all_threads
 from sweep.kernels import methods
@@ -16,87 +17,13 @@ from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import FIXED
 from sweep.kernels.methods import AUTO, METHODS
-from sweep.kernels.status import FAILURES, IMPOSSIBLE
+from sweep.kernels.status import IMPOSSIBLE
 from sweep.models.model import Columns
 from sweep.prediction import Prediction, predict
 from sweep.results import dataset
 
 # Each kernel is made once in a process, because its machine code takes a second to load.
 _kernel = cache(methods.make_kernel)
-
-
-@dataclass(frozen=True)
-class Choice:
-    """The cells that one method runs, and the steps that it takes."""
-
-    kernel: Kernel
-    cells: Array
-    """Their indices among all cells, shape (cells,)."""
-    columns: Columns
-    """Physical parameters by name, each of shape (cells,)."""
-    step: Array
-    """The longest step wanted, in sqrt(c/g), shape (cells,)."""
-    step_rule: Array
-    """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
-
-    @property
-    def method(self) -> str:
-        return self.kernel.method
-
-
-@dataclass(frozen=True)
-class Part(Choice):
-    """The cells that one method runs, with their images."""
-
-    config: Config
-    stable: Array
-    """The ranges of spin in which the rattle decays, as `Kernel.images` takes them, shape (6, cells)."""
-    images: Array
-    """Shape (cells, rows)."""
-
-    @property
-    def status(self) -> Array:
-        return np.asarray(self.kernel.table(self.images)["status"])
-
-    @property
-    def failed(self) -> Array:
-        """Tell which runs failed."""
-        return np.isin(self.status, FAILURES)
-
-    def take(self, rows: Array) -> Part:
-        """Some of these cells, with a copy of their images."""
-        columns = {name: values[rows] for name, values in self.columns.items()}
-        return replace(
-            self, cells=self.cells[rows], columns=columns, step=self.step[rows], step_rule=self.step_rule[rows],
-            stable=self.stable[:, rows], images=self.images[rows],
-        )  # fmt: skip
-
-    @property
-    def settles(self) -> bool:
-        """Tell whether runs end where the spin can reverse no more."""
-        return self.config.integrator.stop_when_settled
-
-    @property
-    def fixed(self) -> bool:
-        """Tell whether the configuration gives the step, which is then never changed."""
-        return self.config.integrator.step != "auto"
-
-    @property
-    def times(self) -> Array:
-        """Times in sqrt(c/g) at which the runs have ended, shape (cells,)."""
-        return self.kernel.times(self.images, self.config.integrator.t_end)
-
-    def start(self, shorter: float | Array = 1.0) -> Part:
-        """These cells at t = 0, with steps that are shorter by a factor, a number or of shape (cells,)."""
-        step = self.step / shorter
-        if not len(step):
-            return replace(self, step=step, images=np.empty((0, len(self.kernel.layout.names))))
-        images = self.kernel.images(self.columns, step, self.config.integrator.t_end, self.stable)
-        return replace(self, step=step, images=images)
-
-    def put(self, rows: Array, other: Part, rule: int | Array) -> None:
-        """Replace the runs of the cells `rows` by those of `other`, in place; `rule` says what set their steps."""
-        self.images[rows], self.step[rows], self.step_rule[rows] = other.images, other.step, rule
 
 
 @dataclass(frozen=True)
@@ -107,7 +34,7 @@ class Plan:
     grids: tuple[Grid, ...]
     """The cells are those of the first grid, followed by those of the next, and so on."""
     predictions: tuple[Prediction, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[Cells, ...]
     """One part, unless the configuration has the method chosen for each cell (`method: auto`).  Cells of impossible
     bodies are in none."""
 
@@ -147,11 +74,11 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     build(kernels(config, chosen), *also)
     predictions = tuple(on_all_threads(lambda grid: predict(config.equations, grid, config.measure), grids))
     stable = np.concatenate([each.ranges for each in predictions], axis=1)
-    parts = [Part(**vars(each), config=config, stable=stable[:, each.cells], images=np.empty(0)) for each in chosen]
-    return Plan(config, grids, predictions, tuple(part.start() for part in parts))
+    parts = [replace(each, stable=stable[:, each.cells]) for each in chosen]
+    return Plan(config, grids, predictions, tuple(replace(part, images=part.start()) for part in parts))
 
 
-def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
+def kernels(config: Config, chosen: Sequence[Cells] = ()) -> list[Kernel]:
     """The kernels that run the cells of `chosen`, or all that a run may need."""
     method = config.integrator.method
     names = [each.method for each in chosen] or (methods.allowed(config.equations) if method == AUTO else [method])
@@ -163,8 +90,8 @@ def kernel_of(method: str, config: Config) -> Kernel:
     return _kernel(method, config.equations, config.measure, config.integrator.tolerance)
 
 
-def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
-    """Give each cell of `grids` that has a possible body its method and step; no kernel is compiled for it.
+def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
+    """Give each cell of `grids` that has a possible body its method and step; no kernel is compiled, no image made.
 
     Without any there is one choice, of no cells.
     """
@@ -174,7 +101,7 @@ def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
     possible = np.flatnonzero(~model.impossible(columns))
     columns = {name: values[possible] for name, values in columns.items()}
     if not len(possible):
-        return (Choice(kernels(config)[0], possible, columns, np.empty(0), np.empty(0)),)
+        return (_cells(kernels(config)[0], config, possible, columns, np.empty(0), np.empty(0)),)
     if integrator.method == AUTO:
         chosen, steps, rules = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
     else:
@@ -183,8 +110,14 @@ def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
     for method in METHODS:
         if len(cells := np.flatnonzero(chosen == method)):
             theirs = {name: values[cells] for name, values in columns.items()}
-            choices.append(Choice(kernel_of(method, config), possible[cells], theirs, steps[cells], rules[cells]))
+            kernel = kernel_of(method, config)
+            choices.append(_cells(kernel, config, possible[cells], theirs, steps[cells], rules[cells]))
     return tuple(choices)
+
+
+def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step: Array, rules: Array) -> Cells:
+    blank = np.full((6, len(cells)), np.nan), np.empty((0, 0))
+    return Cells(kernel, config.equations, Rules.of(config), cells, columns, step, rules, *blank)
 
 
 def steps_of(method: str, config: Config, columns: Columns) -> tuple[Array, Array]:

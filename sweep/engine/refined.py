@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import prod
 
 import numpy as np
@@ -46,11 +46,8 @@ class Refined(Some):
         self._open = [*range(len(self._maps))]
         """Maps that are not complete."""
 
-    def grow(self, tile_size: Callable[[int], int]) -> bool:
-        """Add the nodes to simulate next, judging by the results of all tiles so far.  False if there are none.
-
-        `tile_size` as for `Whole.grow`.
-        """
+    def grow(self) -> bool:
+        """Add the nodes to simulate next, judging by the results of all tiles so far.  False if there are none."""
         known = {**self._outcomes._asdict(), **self._margins}
         for i in range(self._learned, len(self.tiles)):
             found, cells = self.store.load(i), self.cells[self.tiles[i]]
@@ -59,7 +56,7 @@ class Refined(Some):
         self._learned = len(self.tiles)
         asked = {i: self._searched(i) for i in self._open}
         self._open = [i for i, nodes in asked.items() if len(nodes)]
-        return self._add(np.sort(np.concatenate([*asked.values()])), tile_size)
+        return self._add(np.sort(np.concatenate([*asked.values()])))
 
     def _searched(self, i: int) -> Nodes:
         """The nodes of a map to simulate next; keep what is known of all its nodes."""

@@ -44,6 +44,7 @@ class Count:
     def __init__(self, reporter: Reporter) -> None:
         self.reporter, self.began = reporter, time.perf_counter()
         self.cells = self.before = self.done = self.failed = 0
+        self._farthest = 0.0
 
     def expect(self, cells: int, todo: int) -> None:
         """Of `cells` in all, `todo` are still to do; the others not counted so far are an earlier run's."""
@@ -52,7 +53,8 @@ class Count:
 
     def chunk(self, done: float, failed: int) -> None:
         """Report how many of the cells being computed are done, and how many have failed."""
-        self._report(self.done + done, self.failed + failed)
+        self._farthest = max(self._farthest, self.done + done)  # a guess of what is left may grow
+        self._report(self._farthest, self.failed + failed)
 
     def tile(self, status: Array) -> None:
         """Count a finished tile by the statuses of its cells, and report."""

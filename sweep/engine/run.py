@@ -14,7 +14,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import xarray as xr
 
 from sweep.config import Config, ConfigError, ConfigLike, load_config
@@ -26,7 +25,6 @@ from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.grid import Tile
 from sweep.interrupt import deferred, point
-from sweep.kernels.methods import METHODS
 from sweep.models.user.blame import blamed
 from sweep.plots import quantities
 from sweep.results import dataset
@@ -42,11 +40,6 @@ if TYPE_CHECKING:
 
 LARGE = 2_000_000
 """Cells of the largest dataset that is loaded into memory unasked."""
-
-
-def tile_size(cells: int) -> int:
-    """Cells per tile, of which a worker that dies loses one, and the file stores one in a piece."""
-    return int(np.clip(cells // 32, 1024, 8192))
 
 
 @deferred()
@@ -151,7 +144,7 @@ def carry_out(result: Whole, store: Store, reporter: Reporter, client: Client | 
     """Run the tiles of `result` that `store` does not have, until it asks for no more."""
     count, running = Count(reporter), store.load_running()
     with blamed(result.config.origin):
-        while result.grow(tile_size):
+        while result.grow():
             if not count.cells and (store.done or running):
                 reporter.note(_kept(result, store, running))
             _run_tiles(result.simulated(), result.tiles, store, count, client)
@@ -161,7 +154,7 @@ def _kept(result: Whole, store: Store, running: Running | None) -> str:
     """Find what an earlier run left."""
     grid = result.simulated().grid
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
-    started = sum(len(table) for name, table in running.tables.items() if name in METHODS) if running else 0
+    started = sum(len(table) for name, table in running.tables.items() if name.endswith("images")) if running else 0
     more = f", {started} under way" if running else ""
     return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,11 @@ from sweep.results.provenance import provenance
 from sweep.results.store import Store
 
 
+def tile_size(cells: int) -> int:
+    """Cells per tile, of which a worker that dies loses one, and the file stores one in a piece."""
+    return int(np.clip(cells // 32, 1024, 8192))
+
+
 class Whole:
     """All cells of a configuration, in tiles."""
 
@@ -26,13 +31,8 @@ class Whole:
         self.grid = config.grid
         self.tiles: list[Tile] = []
 
-    def grow(self, tile_size: Callable[[int], int]) -> bool:
-        """Add the tiles to simulate next: all of them, once.  False if there are no more.
-
-        Parameters
-        ----------
-        tile_size : cells per tile, by the number of cells
-        """
+    def grow(self) -> bool:
+        """Add the tiles to simulate next: all of them, once.  False if there are no more."""
         if self.tiles:
             return False
         self.tiles = self.grid.tiles(tile_size(self.grid.size))
@@ -63,7 +63,7 @@ class Whole:
         pieces = (piece for tile, arrays in self._finished() for piece in dataset.pieces(self.grid, tile, arrays))
         netcdf.write(path, self._labelled(empty), sizes, pieces)
 
-    def _cut(self, cells: int, tile_size: Callable[[int], int]) -> bool:
+    def _cut(self, cells: int) -> bool:
         """Simulate so many cases more, in tiles of their own; False if there are none."""
         first, step = self.tiles[-1][0].stop if self.tiles else 0, tile_size(cells)
         self.tiles += [(slice(i, min(i + step, first + cells)),) for i in range(first, first + cells, step)]
@@ -110,10 +110,10 @@ class Some(Whole):
         """Write the labelled dataset, which has to fit into memory."""
         netcdf.write(path, self.dataset())
 
-    def _add(self, cells: Array, tile_size: Callable[[int], int]) -> bool:
+    def _add(self, cells: Array) -> bool:
         """Simulate these cells too, in tiles of their own; False if there are none."""
         self.cells = np.concatenate([self.cells, cells])
-        return self._cut(len(cells), tile_size)
+        return self._cut(len(cells))
 
     def _place(self, cells: Array, found: Mapping[str, Array], arrays: dict[str, Array]) -> None:
         """Write what was `found` for `cells`, as cases, into `arrays` over all cells or bodies, undefined elsewhere."""

@@ -63,7 +63,16 @@ def call_all(name: str, arguments: str, functions: Sequence[Any]):
 
 def all_true(name: str, arguments: str, functions: Sequence[Any]):
     """Compiled (arguments) -> bool: whether each of `functions` is true; True if there is none."""
-    calls = " & ".join(f"f{i}({arguments})" for i in range(len(functions))) or "True"
+    return _joined(name, arguments, functions, " & ", "True")
+
+
+def any_true(name: str, arguments: str, functions: Sequence[Any]):
+    """Compiled (arguments) -> bool: whether one of `functions` is true; False if there is none."""
+    return _joined(name, arguments, functions, " | ", "False")
+
+
+def _joined(name: str, arguments: str, functions: Sequence[Any], operator: str, without: str):
+    calls = operator.join(f"f{i}({arguments})" for i in range(len(functions))) or without
     names = {f"f{i}": function for i, function in enumerate(functions)}
     return compile_inline(name, arguments, [f"return {calls}"], names)
 

@@ -15,17 +15,21 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import Cached, inline, parallel, threads
-from sweep.kernels.codegen import all_true, call_all, make_load
-from sweep.kernels.lanes import STABLE, make_advance, make_look
-from sweep.kernels.layout import Layout, Table, constants_of
+from sweep.kernels.codegen import all_true, any_true, call_all, make_load
+from sweep.kernels.lanes import make_advance, make_look
+from sweep.kernels.layout import STABLE, Layout, Table, constants_of
 from sweep.kernels.measures.measurement import RIPPLE, Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
 FAILURE = ("failed_at", "failed_spin", "failed_error")
-"""Time of a failure, spin at that time, and its estimated error, which the engine finds out (`sweep.engine.repeats`); 0
+"""Time of a failure, spin at that time, and its estimated error, which the engine finds out (`sweep.engine.failures`); 0
 if there is none."""
 
-_BASE = ("step", "stable_step", "goal", "done", "status", "energy_start", "energy", *FAILURE, *STABLE)
+_PROGRESS = ("steps", "goal", "settles", "done", "status")
+"""How many steps lead to t_end, after how many the image stops, whether it stops (not zero) as soon as its spin can
+reverse no more, how many steps it has done, and its status."""
+
+_BASE = ("step", "stable_step", *_PROGRESS, "energy_start", "energy", *FAILURE, *STABLE)
 """Quantities of every image."""
 
 STRETCH = 100.0
@@ -72,7 +76,7 @@ class Stepper:
 
     def reached(self, table: Table, t_end: float | Array) -> Array:
         """Times of the states, shape (cells,)."""
-        return np.asarray(table["done"] * t_end / table["goal"])
+        return np.asarray(table["done"] * t_end / table["steps"])
 
     def model_states(self, states: Array, constants: Any) -> Array:
         """The states as the right-hand side of the model takes them, shape (states, cells)."""
@@ -108,12 +112,13 @@ class Kernel:
 
     def _make_advancing(self) -> Cached:
         may_settle = all_true("may_settle", "group, lane, spin, at_rest", self.hooks("make_may_settle"))
+        shown = any_true("shown", "group, lane", self.hooks("make_settled"))
         measure = call_all("measure", "group, lane, seen", self.hooks("make_look"))
-        look = make_look(self.model, self.layout, may_settle, measure, self.stepper.energy_gain)
+        look = make_look(self.model, self.layout, may_settle, shown, measure, self.stepper.energy_gain)
         advance = make_advance(self.stepper.make_run_block(self), look, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
-        return parallel(advance, "(f8[:, ::1], i8[::1], i8, b1, i8)", name)
+        return parallel(advance, "(f8[:, ::1], i8[::1], i8, i8, i8, i8[::1])", name)
 
     def make_watch(self):
         """Inline (group, lane, accepted, y, p, spin, work, h, now): what all measurements do after a step.
@@ -163,7 +168,8 @@ class Kernel:
         images[:, : len(states)] = states.T
         table.set_columns(self.constants, stack(constants).T)
         spin, rattle, inertia = self.model.energy(states, constants)
-        table["goal"], table["stable_step"], table["step"] = goal, stable_step, step
+        table["steps"] = table["goal"] = goal
+        table["stable_step"], table["step"] = stable_step, step
         table["energy_start"] = table["energy"] = rattle + 0.5 * inertia * spin**2
         table.set_columns(STABLE, np.nan if stable is None else stable.T)
         if self._ripples:
@@ -173,12 +179,21 @@ class Kernel:
                 table[name] = values
         return images
 
-    def advance(self, images: Array, cells: Array, blocks: int, stop_when_settled: bool) -> None:
+    def advance(self, images: Array, cells: Array, blocks: int, least: int | None = None) -> int:
         """Advance the trajectories `cells` (indices into `images`), in place.
 
-        Returns after `blocks` blocks of steps in every lane, or earlier when all cells have ended.
+        Parameters
+        ----------
+        blocks : of steps in every lane, after which to stop
+        least : blocks after which to stop where lanes have become idle; by default only when all cells have ended
+
+        Returns
+        -------
+        The blocks that the groups of lanes have taken in all.
         """
-        self.advancing(images, cells, blocks, stop_when_settled, threads())
+        done = np.zeros(threads(), np.int64)
+        self.advancing(images, cells, blocks, blocks if least is None else least, len(done), done)
+        return int(done.sum())
 
     def carry(self, images: Array) -> None:
         """Carry the images that are `QUIET` to where steps are needed again."""

@@ -11,20 +11,17 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width, inline
 from sweep.kernels.codegen import make_access, make_rest
-from sweep.kernels.layout import LANES, Layout
+from sweep.kernels.layout import BEYOND, LANES, PACK, STABLE, Layout
 from sweep.kernels.measures.measurement import Look
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.model import ENERGY, Model, never_decided
-
-STABLE = ("stable_from", "stable_to", "below_from", "below_to", "above_from", "above_to")
-"""Ends of the ranges of spin in which the rattle decays: the range about zero, and the next below and above it."""
 
 # A trajectory settles only if its rattle could not carry the spin across a limit even with this many times its
 # energy.
 SETTLE_MARGIN = 4.0
 
-# A spin beyond n_c1 by less than this factor can reverse no more, although the rattle grows there.
-BEYOND = 1.5
+# A group returns early once at most this share of the lanes that had a cell at first still have one.
+_AT_WORK = 0.75
 
 # Energies beyond this count as not finite.
 MAX_ENERGY = 1e300
@@ -35,13 +32,14 @@ NEGLIGIBLE = 1e-120
 
 
 def make_advance(run_block, look, layout: Layout):
-    """Python function to be compiled: (images, cells, blocks, stop_when_settled, groups) -> None.
+    """Python function to be compiled: (images, cells, blocks, least, groups, done) -> None, see `Kernel.advance`.
 
-    `run_block`, (group) -> None, and `look`, (group, stop_when_settled) -> None, are compiled functions.
+    `run_block`, (group) -> None, and `look`, (group) -> None, are compiled functions; `done`, of shape (groups,), is
+    filled with the blocks that each group has taken.
     """
     from numba import prange
 
-    n_rows, lanes, status, wide = len(layout.names), LANES, layout.at("status"), full_width()
+    n_rows, lanes, pack, status, wide = len(layout.names), LANES, PACK, layout.at("status"), full_width()
 
     @exactly_compiled
     def take(images, cells, position, group, lane, held):
@@ -61,7 +59,7 @@ def make_advance(run_block, look, layout: Layout):
             images[held[lane], row] = group[row * lanes + lane]
 
     @exactly_compiled
-    def run_group(images, cells, blocks, stop_when_settled):
+    def run_group(images, cells, blocks, least):
         wide()
         # An idle lane computes on zeros.  What comes out is meaningless but harmless: its status keeps it from
         # being stored.
@@ -70,9 +68,13 @@ def make_advance(run_block, look, layout: Layout):
         position = 0
         for lane in range(lanes):
             position = take(images, cells, position, group, lane, held)
-        for _ in range(blocks):
-            run_block(group)
-            look(group, stop_when_settled)
+        at_work = min(lanes, len(cells))
+        packs = (at_work + pack - 1) // pack
+        block = 0
+        while block < blocks:
+            run_block(group, packs)
+            look(group)
+            block += 1
             idle = 0
             for lane in range(lanes):
                 if group[status + lane] != RUNNING:
@@ -80,26 +82,28 @@ def make_advance(run_block, look, layout: Layout):
                         release(images, group, lane, held)
                         position = take(images, cells, position, group, lane, held)
                     idle += held[lane] < 0
-            if idle == lanes:
+            if idle == lanes or (block >= least and idle >= lanes - _AT_WORK * at_work):
                 break
         for lane in range(lanes):
             if held[lane] >= 0:
                 release(images, group, lane, held)
+        return block
 
-    def advance(images, cells, blocks, stop_when_settled, groups):
+    def advance(images, cells, blocks, least, groups, done):
         for g in prange(groups):
             wide()
-            run_group(images, cells[g::groups].copy(), blocks, stop_when_settled)
+            done[g] = run_group(images, cells[g::groups].copy(), blocks, least)
 
     return advance
 
 
-def make_look(model: Model, layout: Layout, may_settle, measure, energy_gain: float):
-    """Compiled (group, stop_when_settled) -> None: checks all lanes between two blocks, and decides which ones end.
+def make_look(model: Model, layout: Layout, may_settle, shown, measure, energy_gain: float):
+    """Compiled (group) -> None: checks all lanes between two blocks, and decides which ones end.
 
     Parameters
     ----------
     may_settle : inline (group, lane, spin, at_rest) -> whether all measurements allow the trajectory to settle
+    shown : inline (group, lane) -> whether a measurement has shown that the spin can reverse no more
     measure : inline (group, lane, seen), what the measurements do at a look (see `Measurement.make_look`)
     energy_gain : share by which the energy of a body may apparently grow from one look to the next
     """
@@ -109,14 +113,16 @@ def make_look(model: Model, layout: Layout, may_settle, measure, energy_gain: fl
     will_settle = _make_will_settle(layout, may_settle, saturates)
     FAINT = layout.at(f"constant.{model.faint}") if saturates else 0
     decides, decided = model.decided is not never_decided, model.decided
-    GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP = map(layout.at, ("goal", "done", "status", "energy", "stable_step"))
+    GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP, SETTLES = map(
+        layout.at, ("goal", "done", "status", "energy", "stable_step", "settles")
+    )  # fmt: skip
     lanes, allowed, conserved = LANES, 1.0 + energy_gain, ENERGY in model.offers
     wide = full_width()
     pauses = "quiet_energy" in layout
     QUIET_ENERGY, QUIET_AFTER = (layout.at(f"quiet_{name}") if pauses else 0 for name in ("energy", "after"))
 
     @exactly_compiled
-    def look(group, stop_when_settled):
+    def look(group):
         wide()
         for lane in range(lanes):
             y = load_states(group, lane)
@@ -132,12 +138,14 @@ def make_look(model: Model, layout: Layout, may_settle, measure, energy_gain: fl
                 settled = settled & (rattle < group[FAINT + lane])
             if decides:
                 settled = settled | (decided(y, load_constants(group, lane)) & followed)
-            ends = SETTLED if settled & stop_when_settled else RUNNING
+            settled = settled | (shown(group, lane) & followed)
+            stops = group[SETTLES + lane] != 0.0
+            ends = SETTLED if settled & stops else RUNNING
             if pauses:
                 small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])
                 # A rattle that can only decay needs no leap: it settles.  And no leap begins while a measurement has
                 # yet to follow the spin: a reversal just before it would go uncounted.
-                ends = QUIET if small & followed & (not ((bounded | settled) & stop_when_settled)) else ends
+                ends = QUIET if small & followed & (not ((bounded | settled) & stops)) else ends
             ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends != SETTLED) else ends
             status = ends if running else status
             failed = (status == LIFT_OFF) | (status == PARADOX)

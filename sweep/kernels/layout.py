@@ -16,9 +16,19 @@ from sweep.models.model import Array, Model
 # 24.4 ns with 32.  In plain Python idle lanes would cost as much as the others.
 LANES = 1 if INTERPRETED else 16
 
+# A group computes a whole number of packs.
+PACK = 1 if INTERPRETED else 8
+
 # Steps between two looks at a lane.  With 128, looks add 1 % to the cost of a step on the slip model, and a
 # trajectory that has settled runs on for 64 steps on average, out of 10^5.
 BLOCK = 128
+
+
+STABLE = ("stable_from", "stable_to", "below_from", "below_to", "above_from", "above_to")
+"""Ends of the ranges of spin in which the rattle decays: the range about zero, and the next below and above it."""
+
+# A spin beyond n_c1 by less than this factor can reverse no more, although the rattle grows there.
+BEYOND = 1.5
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> 
 
 def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:
     """The kernel of a method, not compiled yet, for a model and for measurements given by their specs."""
-    return Kernel(METHODS[method].stepper(model, tolerance), measures.chosen(measure))
+    return Kernel(METHODS[method].stepper(model, tolerance), measures.with_decay(measures.chosen(measure), model))
 
 
 def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from sweep.kernels import tangent
 from sweep.kernels.codegen import compile_inline, make_access, tuple_of
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
-from sweep.kernels.layout import BLOCK, LANES
+from sweep.kernels.layout import BLOCK, PACK
 from sweep.kernels.measures.measurement import TANGENT
 from sweep.kernels.method import TOLERANCE, Method
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
@@ -56,8 +56,8 @@ class RungeKutta(Stepper):
         follow = tangent.make_follow(step, self.model, kernel.layout)
 
         @exactly_compiled
-        def run_both(group):
-            run_block(group)
+        def run_both(group, packs):
+            run_block(group, packs)
             follow(group)
 
         return run_both
@@ -68,13 +68,13 @@ class RungeKutta(Stepper):
         load_states, load_constants, store_states = make_access(model, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), kernel.make_watch()
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
-        block, lanes, wide = BLOCK, LANES, full_width()
+        block, pack, wide = BLOCK, PACK, full_width()
 
         @exactly_compiled
-        def run_block(group):
+        def run_block(group, packs):
             wide()
             for _ in range(block):
-                for lane in range(lanes):
+                for lane in range(pack * packs):
                     y = load_states(group, lane)
                     p = load_constants(group, lane)
                     h, done, status = group[STEP + lane], group[DONE + lane], group[STATUS + lane]

@@ -13,4 +13,4 @@ IMPOSSIBLE = 8
 
 FAILURES = (LIFT_OFF, DIVERGED, PARADOX, TOPPLED)
 """Ends before the time limit.  A kernel gives the first three as first impressions, from the stages of a step that may
-have been too long; what really happened is found out by `sweep.kernels.failure` and `sweep.engine.repeats`."""
+have been too long; what really happened is found out by `sweep.kernels.failure` and `sweep.engine.failures`."""

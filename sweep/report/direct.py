@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from sweep.config import load_config
-from sweep.engine.executor import Work, execute
-from sweep.engine.plan import Part
-from sweep.engine.repeats import decide_failures
+from sweep.engine.cells import Cells, Rules
+from sweep.engine.executor import execute
+from sweep.engine.life import begin, live
 from sweep.grid import Array, Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.build import build
@@ -89,11 +88,11 @@ def simulate(
     stable = predict(chosen, Grid({}, {}, dict(columns))).ranges if ranges else None
     steps = np.broadcast_to(steps, cells).astype(float)
     images = kernel.images(columns, steps, t_end, stable)
-    execute(kernel, images, stop_when_settled=settle)
     if decide and stable is not None:
-        first = {name: float(columns[name][0]) for name in chosen.parameters}
-        settings = {"t_end": t_end, "tolerance": tolerance, "stop_when_settled": settle}
-        config, rules = load_config({"model": model, "integrator": settings}, first), np.zeros(cells)
-        part = Part(kernel, np.arange(cells), columns, steps, rules, config=config, stable=stable, images=images)
-        decide_failures(part, Work(), method)
+        rules = Rules(t_end, tolerance, settles=settle)
+        lives = begin([Cells(kernel, chosen, rules, np.arange(cells), columns, steps, np.zeros(cells), stable, images)])
+        live(lives)
+        return Ends(kernel, lives[0].cells.images, t_end)
+    kernel.table(images)["settles"] = settle
+    execute(kernel, images)
     return Ends(kernel, images, t_end)

@@ -7,7 +7,7 @@ is.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -94,7 +94,7 @@ class Search(Whole):
         integrator = self.config.integrator.model_copy(update=update)
         return replace(self.config, parameters=constants, cases=cases, integrator=integrator)
 
-    def grow(self, tile_size: Callable[[int], int]) -> bool:
+    def grow(self) -> bool:
         """Add the cells to simulate next, judging by all results so far; False if the search has ended."""
         if self.tiles:
             new = [self.store.load(i) for i in range(self._learned, len(self.tiles))]
@@ -105,7 +105,7 @@ class Search(Whole):
         cells = len(next(iter(asked.values())))
         if cells:
             self.rounds.append(asked)
-        return self._cut(cells, tile_size)
+        return self._cut(cells)
 
     def sharp(self, width: float) -> float:
         """The tolerance with which brackets are narrowed to a width."""

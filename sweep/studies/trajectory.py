@@ -17,11 +17,12 @@ from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.document import is_number, plain_data
 from sweep.config.schema import FOREVER
 from sweep.config.values import numbers_of
-from sweep.engine import executor, final
-from sweep.engine.errors import keep_tolerance, results
-from sweep.engine.executor import UNTIL_ALL_STOP, Work, nominal_seconds
+from sweep.engine import ending, executor
+from sweep.engine.cells import Cells
+from sweep.engine.errors import results
+from sweep.engine.executor import UNTIL_ALL_STOP, nominal_seconds
+from sweep.engine.life import begin, live
 from sweep.engine.plan import plan, steps_of
-from sweep.engine.repeats import decide_failures
 from sweep.engine.reporter import Progress, Reporter
 from sweep.faults import duration, fault_of, refusal, suggestion
 from sweep.grid import SAMPLE, Array, Grid
@@ -163,27 +164,33 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     """`trajectory` of all cells of `chosen`."""
     job = plan(chosen, also=[PATH])
     (part,), (grid,) = job.parts, job.grids
-    kernel, images, columns = part.kernel, part.images, grid.columns()
-    t_end, settles, began = chosen.integrator.t_end, chosen.integrator.stop_when_settled, time.perf_counter()
+    (each,), kernel, columns = begin([part]), part.kernel, grid.columns()
+    images, steps = each.cells.images, part.step.copy()
+    t_end, began = chosen.integrator.t_end, time.perf_counter()
+
+    farthest = 0.0
 
     def report() -> None:
+        nonlocal farthest
         table = kernel.table(images)
         covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
+        farthest = max(farthest, float(covered))  # companions begin at t = 0 again
         seconds = time.perf_counter() - began
         unit = named(u.TIME, chosen.units) or "of time"
-        reporter.chunk(Progress(len(images) * t_end, float(covered), 0, 0, seconds, unit))
+        reporter.chunk(Progress(len(images) * t_end, farthest, 0, 0, seconds, unit))
 
-    marks, steps = _run(kernel, images, settles, report), part.step.copy()
-    work = Work(after_chunk=report)
-    decide_failures(part, work, part.method)
-    errors = keep_tolerance(job, work) if chosen.integrator.estimate_errors else None
-    if (part.step != steps).any():
-        marks = _run(kernel, part.start().images, settles)
-    _judge(kernel, images)
-    final.settle(part)
+    marks = _run(each.cells, images, report)
+    live([each], report)
+    if (each.cells.step != steps).any():
+        again = each.cells.start()
+        kernel.table(again)["settles"] = each.cells.rules.settles
+        marks = _run(each.cells, again)
+    _judge(each.cells)
+    ending.settle(each.cells)
+    job = replace(job, parts=(each.cells,))
     times = _times(kernel, images, every or intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
-    (found,) = job.by_grid(results(job, errors))
+    (found,) = job.by_grid(results(job, [each]))
     made = provenance(chosen, time.perf_counter() - began, grid.size, of=TRAJECTORY)
     labelled = dataset.label(chosen, grid, found, made)
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
@@ -260,11 +267,9 @@ Marks = list[Array]
 """Copies of all images at some moments of a run, each of shape (trajectories, rows)."""
 
 
-def _run(
-    kernel: Kernel, images: Array, stop_when_settled: bool, after_chunk: Callable[[], None] = lambda: None
-) -> Marks:
+def _run(cells: Cells, images: Array, after_chunk: Callable[[], None] = lambda: None) -> Marks:
     """Run `images` to their ends, in place, and mark moments between which samples can be taken side by side."""
-    marks = [images.copy()]
+    marks, kernel = [images.copy()], cells.kernel
 
     def mark() -> None:
         marks.append(images.copy())
@@ -272,19 +277,21 @@ def _run(
 
     longest = kernel.table(images)["goal"].max() / BLOCK
     blocks = max(_BLOCKS, int(np.ceil(longest * len(images) / _MARKS)))
-    executor.execute(kernel, images, stop_when_settled=stop_when_settled, after_chunk=mark, chunk_blocks=blocks)
-    kernel.table(images)["status"][executor.too_early(kernel, images)] = RUNNING
-    executor.execute(kernel, images, stop_when_settled=False, after_chunk=mark, chunk_blocks=blocks)
+    executor.execute(kernel, images, after_chunk=mark, chunk_blocks=blocks)
+    early, table = ending.too_early(replace(cells, images=images)), kernel.table(images)
+    table["status"][early], table["settles"][early] = RUNNING, False
+    executor.execute(kernel, images, after_chunk=mark, chunk_blocks=blocks)
     return marks
 
 
-def _judge(kernel: Kernel, images: Array) -> None:
+def _judge(cells: Cells) -> None:
     """Give trajectories that have come to their time limit the status `SETTLED` if a sweep would end them there."""
-    looked, at_end = images.copy(), np.flatnonzero(kernel.table(images)["status"] == TIME_LIMIT)
-    kernel.table(looked)["status"][at_end] = RUNNING
-    kernel.advance(looked, at_end, 1, True)
-    kernel.table(looked)["status"][executor.too_early(kernel, looked)] = TIME_LIMIT
-    kernel.table(images)["status"] = kernel.table(looked)["status"]
+    kernel, looked, at_end = cells.kernel, cells.images.copy(), np.flatnonzero(cells.status == TIME_LIMIT)
+    table = kernel.table(looked)
+    table["status"][at_end], table["settles"] = RUNNING, True
+    kernel.advance(looked, at_end, 1)
+    table["status"][ending.too_early(replace(cells, images=looked))] = TIME_LIMIT
+    kernel.table(cells.images)["status"] = table["status"]
 
 
 def _times(kernel: Kernel, ends: Array, interval: float) -> Array:
@@ -319,6 +326,7 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Arr
     counts = np.diff(firsts, append=len(steps))
     stretches = np.array([marks[mark[i]][which[i]] for i in firsts])
     table, series = kernel.table(stretches), dict[str, Array]()
+    table["settles"] = False
     states = np.empty((len(kernel.model.states), len(which)))
 
     def put(found: dict[str, Array], samples: Array) -> None:
@@ -337,7 +345,7 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Arr
         active = np.flatnonzero(counts > i)
         samples = firsts[active] + i
         table["goal"][active], table["status"][active] = steps[samples], RUNNING
-        kernel.advance(stretches, active, UNTIL_ALL_STOP, False)
+        kernel.advance(stretches, active, UNTIL_ALL_STOP)
         waiting.append((samples, stretches[active]))
         if i == most - 1 or sum(len(some) for some, _ in waiting) >= _TOGETHER:
             look(*map(np.concatenate, zip(*waiting, strict=True)))
@@ -389,7 +397,7 @@ def _go_on(kernel: Kernel, images: Array, times: Array) -> None:
     between = np.flatnonzero(rest > _SAME_STEP * table["step"])
     table["step"][between], table["goal"][between] = rest[between], table["done"][between] + 1
     table["status"][between] = RUNNING
-    kernel.advance(images, between, UNTIL_ALL_STOP, False)
+    kernel.advance(images, between, UNTIL_ALL_STOP)
 
 
 def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:

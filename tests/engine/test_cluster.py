@@ -112,7 +112,7 @@ def test_workers_that_come_go_hang_and_lag_cost_only_their_tiles(
     config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Fault, lost: int
 ) -> None:
     """One worker of two is slow from the beginning; the fault comes with the first tile."""
-    monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: cells // SMALL_TILES)
+    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: cells // SMALL_TILES)
     expected = sweep.run(config)
     with (
         dask.config.set({"distributed.scheduler.worker-ttl": "15s"}),

@@ -35,7 +35,7 @@ TILE = 3
 @pytest.fixture(scope="module", autouse=True)
 def _many_tiles() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sweep.engine.run.tile_size", lambda cells: TILE)  # noqa: ARG005
+        patch.setattr("sweep.engine.whole.tile_size", lambda cells: TILE)  # noqa: ARG005
         patch.setattr(local, "BATCH", 2 * TILE)
         patch.setattr("sweep.engine.run._draw", lambda *_: None)  # `test_faults` has pictures
         yield

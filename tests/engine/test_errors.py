@@ -12,10 +12,10 @@ from support.runs import lengthen, run_cells, same_numbers
 
 import sweep
 from sweep.config import load_config
-from sweep.engine import errors, final
-from sweep.engine.executor import Work
+from sweep.engine import errors
+from sweep.engine.executor import execute
+from sweep.engine.life import begin, live
 from sweep.engine.plan import kernel_of, plan, steps_of
-from sweep.engine.repeats import decide_failures
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -150,15 +150,14 @@ def test_spins_differ_from_the_plain_method_at_half_its_step_as_estimated(name: 
     config = load_config(ROOT / "configs" / f"{name}.yaml", {"t_end": 1000.0})
     grid = config.grid
     job = plan(config, grid.take(np.linspace(0, grid.size - 1, 40).astype(int)))
-    for part in job.parts:
-        final.run(part, Work(), part.method)
-        decide_failures(part, Work(), part.method)
-    found = errors.results(job, errors.keep_tolerance(job, Work()))
+    lives = begin(job.parts)
+    live(lives)
+    found = errors.results(replace(job, parts=tuple(each.cells for each in lives)), lives)
     sound = np.isin(found["status"], (SETTLED, TIME_LIMIT))
     columns = {name: values[sound] for name, values in job.grids[0].columns().items()}
     kernel, times = kernel_of(PLAIN, config), found["t_stop"][sound]
     images = kernel.images(columns, steps_of(PLAIN, config, columns)[0] / 2, times)
-    Work().run("plain", kernel, images)
+    execute(kernel, images)
     difference = np.abs(measured(kernel, images, times)["spin_final"] - found["spin_final"][sound])
     ratio = difference / found["spin_error"][sound]
     assert sound.mean() > 0.9

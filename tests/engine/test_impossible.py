@@ -12,7 +12,7 @@ from support.runs import Heard, Stop, same_numbers
 import sweep
 from sweep import ConfigError
 from sweep.config import load_config
-from sweep.engine import local, run
+from sweep.engine import local
 from sweep.engine.estimate import estimate
 from sweep.kernels.status import IMPOSSIBLE
 from sweep.plots.marks import BLANK, legend, marks
@@ -76,7 +76,7 @@ def test_maps_leave_them_blank(edge: xr.Dataset) -> None:
 def test_tiles_of_impossible_bodies_and_a_resumed_run(
     edge: xr.Dataset, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
-    monkeypatch.setattr(run, "tile_size", lambda cells: size)  # noqa: ARG005
+    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: size)  # noqa: ARG005
     monkeypatch.setattr(local, "BATCH", size)
     with pytest.raises(KeyboardInterrupt):
         sweep.run(write(TEXT), tmp_path, reporter=Stop(3))

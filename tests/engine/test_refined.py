@@ -294,7 +294,7 @@ def test_resumes_and_recomputes_nothing(
 ) -> None:
     ran = counted(monkeypatch)
     monkeypatch.setattr(local, "BATCH", 20)
-    monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: 20)  # noqa: ARG005
+    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: 20)  # noqa: ARG005
     result, interruptions, last = in_sittings(3, file, tmp_path / "out")
     assert interruptions > 3
     assert len(ran) > 5

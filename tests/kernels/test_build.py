@@ -47,10 +47,10 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
     measure = ("reversals", "resting_spin")
     build(kernel(method, measure=measure) for method in ("adams", "dopri5", "adams"))
     assert started == [
-        ("kernel", "adams", "slip", "reversals"),
+        ("kernel", "adams", "slip", "reversals", "decay"),
         ("images", "adams", "slip"),
         ("endings", "dopri5", "slip"),
-        ("kernel", "dopri5", "slip", "reversals"),
+        ("kernel", "dopri5", "slip", "reversals", "decay"),
     ]
 
 

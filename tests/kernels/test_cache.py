@@ -25,7 +25,7 @@ for measure in sys.argv[1:]:
     kernel = make_kernel("dopri5", MODELS["averaged"], measure.split("+"))
     found = kernel.advancing.is_compiled()
     images = kernel.images(body, np.array([0.1]), 50.0)
-    execute(kernel, images, stop_when_settled=False)
+    execute(kernel, images)
     print("found" if found else "compiled", repr(float(kernel.model.energy(*kernel.unpack(images))[0][0])))
 """
 

@@ -78,7 +78,7 @@ def test_energy_error_is_the_largest_violation() -> None:
     worst, before = 0.0, of(table, "energy_start")[0]
     blocks = 0
     while of(table, "status")[0] == 0:
-        DOPRI.advance(table, np.array([0]), 1, True)
+        DOPRI.advance(table, np.array([0]), 1)
         n, rattle, inertia = slip.energy(*DOPRI.unpack(table))
         worst = max(worst, abs(rattle + 0.5 * inertia * n**2 + of(table, "work") - before)[0])
         blocks += 1

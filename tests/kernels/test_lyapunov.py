@@ -152,7 +152,7 @@ def test_it_does_not_depend_on_how_a_run_is_divided() -> None:
     finish(made, whole, settle=False)
     cells = np.arange(2)
     for _ in range(300):
-        made.advance(pieces, cells[made.table(pieces)["status"] == 0], 1, False)
+        made.advance(pieces, cells[made.table(pieces)["status"] == 0], 1)
     np.testing.assert_array_equal(whole, pieces)
 
 

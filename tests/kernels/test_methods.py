@@ -12,7 +12,7 @@ from sweep.kernels.adams import start_up
 from sweep.kernels.adams.step import HISTORY, names
 from sweep.kernels.codegen import compile_lanes
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.layout import LANES
+from sweep.kernels.layout import LANES, PACK
 from sweep.kernels.methods import METHODS, automatic_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
 from sweep.models import MODELS
@@ -166,7 +166,7 @@ def assembly(function: Any, *arguments: Any) -> str:
 )  # fmt: skip
 def test_the_loop_over_lanes_is_vector_instructions(method: str, model: str) -> None:
     made: Any = make(method, model)
-    found = assembly(made.stepper.make_run_block(made), np.zeros(len(made.layout.names) * LANES))
+    found = assembly(made.stepper.make_run_block(made), np.zeros(len(made.layout.names) * LANES), LANES // PACK)
     # Twelve square roots and divisions a step of dopri5; the stiff method has a scalar loop as well, for a history that
     # overlaps the group, which it never does.
     divisions, roots = (12, 12) if method == "dopri5" else (3, 2)

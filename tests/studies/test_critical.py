@@ -44,7 +44,7 @@ def simulated_growth(bodies: Columns, spin: Array) -> Array:
         states[component, i :: len(rattle)] = 1e-30
     spins, energy, inertia = model.energy(*dopri5.unpack(images))
     dopri5.table(images)["energy"] = energy + 0.5 * inertia * spins**2
-    execute(dopri5, images, stop_when_settled=False)
+    execute(dopri5, images)
     assert (dopri5.table(images)["status"] == TIME_LIMIT).all()
     propagator = dopri5.states(images)[rattle].reshape(len(rattle), len(spin), len(rattle)).swapaxes(0, 1) / 1e-30
     return np.asarray(np.log(np.abs(np.linalg.eigvals(propagator)).max(axis=-1)) / period)

@@ -55,7 +55,8 @@ def images_of(
 
 def finish(kernel: Kernel, table: np.ndarray, *, settle: bool = True, **options: Any) -> np.ndarray:
     """Run all images to their ends, in place."""
-    execute(kernel, table, stop_when_settled=settle, **options)
+    kernel.table(table)["settles"] = settle
+    execute(kernel, table, **options)
     return table
 
 

@@ -23,8 +23,7 @@ from numba.np.ufunc import parallel
 
 from support.same import contents
 from sweep.cli import main
-from sweep.engine import executor, local
-from sweep.engine import run as engine_run
+from sweep.engine import executor, local, whole
 
 TILE = 3
 """Cells a tile; of twelve cells there are then six tiles in two groups."""
@@ -114,7 +113,7 @@ def command(
         os.dup2(stream.fileno(), 2)
     faulthandler.enable()
     executor.CHUNK_SECONDS = 0.004
-    engine_run.tile_size = lambda cells: TILE  # noqa: ARG005
+    whole.tile_size = lambda cells: TILE  # noqa: ARG005
     local.BATCH = 2 * TILE
     if unprivileged:
         _drop_capabilities()

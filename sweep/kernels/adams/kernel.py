@@ -39,7 +39,7 @@ from sweep.kernels.adams.step import (
 )
 from sweep.kernels.codegen import compile_inline
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
-from sweep.kernels.layout import BLOCK, LANES, Table
+from sweep.kernels.layout import BLOCK, LANES, PACK, Table
 from sweep.kernels.measures.measurement import WORK, Stretch
 from sweep.kernels.method import Method
 from sweep.kernels.status import DIVERGED, RUNNING
@@ -102,7 +102,7 @@ class Adams(Stepper):
 
     def reached(self, table: Table, t_end: float | Array) -> Array:
         reached = table["begin"] + table["done"] * table["step"]
-        return np.where(table["done"] == table["goal"], t_end, reached)
+        return np.where(table["done"] == table["steps"], t_end, reached)
 
     def _set_method(self, table: Table, constants) -> None:
         """Set the weights of the formulas and the matrix P."""
@@ -162,12 +162,12 @@ class Adams(Stepper):
             f"for i in range({HISTORY * size}):",
             f"    history[i] = group[{first} + i]",
             f"for oldest in range(0, {BLOCK * size}, {size}):",
-            f"    for lane in range({LANES}):",
+            f"    for lane in range({PACK} * packs):",
             *(f"        {line}" for line in self._step_lines(kernel)),
             f"for i in range({HISTORY * size}):",
             f"    group[{first} + i] = history[{BLOCK * size} + i]",
         ]
-        return compiled(compile_inline("run_block", "group", lines, known))
+        return compiled(compile_inline("run_block", "group, packs", lines, known))
 
     def _step_lines(self, kernel: Kernel) -> list[str]:
         """The source of one step, from eight points of the history, of which the first is at `oldest`, to the ninth.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from sweep.kernels.measures.cycles import Cycles
+from sweep.kernels.measures.decay import Decay
 from sweep.kernels.measures.energy import EnergyError
 from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.measures.lyapunov import Lyapunov
@@ -34,6 +35,12 @@ def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
         kind(int(settings[name])) if kind.bounds and settings[name] else kind()  # type: ignore[call-arg]
         for name, kind in found.items()
     )
+
+
+def with_decay(measurements: tuple[Measurement, ...], tier: Tier) -> tuple[Measurement, ...]:
+    """`measurements`, and `Decay` where they ask for a count that it can make final."""
+    counted = {*Decay.needs} <= {each.name for each in measurements}
+    return (*measurements, Decay()) if counted and Decay.asks in tier.offers else measurements
 
 
 def possible(tier: Tier) -> tuple[str, ...]:

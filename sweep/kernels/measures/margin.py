@@ -17,6 +17,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
+from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import SETTLED
@@ -26,9 +27,6 @@ from sweep.units import SPIN
 EXTREMES = ("overshoot", "nearest_approach")
 """The quantities that hold the margins, as far as the trajectory has come."""
 
-WOUND = "spin_when_wound_down"
-"""The least spin that is left when a rattle that rolls round has wound down (`sweep.engine.winding`); else zero."""
-
 
 class Margin(Measurement):
     name = "margin"
@@ -37,7 +35,7 @@ class Margin(Measurement):
     needs = ("reversals",)
     by_default = True
     quantities = (
-        *EXTREMES, WOUND, "counted", "window_time", "window_size", "window_time_before", "window_size_before",
+        *EXTREMES, "counted", "window_time", "window_size", "window_time_before", "window_size_before",
     )  # fmt: skip
 
     variables = {
@@ -54,7 +52,7 @@ class Margin(Measurement):
     }  # fmt: skip
 
     def make_look(self, layout: Layout):
-        OVERSHOOT, NEAREST, _, COUNTED, TIME, SIZE, TIME_BEFORE, SIZE_BEFORE = map(layout.at, self.quantities)
+        OVERSHOOT, NEAREST, COUNTED, TIME, SIZE, TIME_BEFORE, SIZE_BEFORE = map(layout.at, self.quantities)
         CLOSED, PERIOD, COUNT = map(layout.at, ("closed_window", "period", "reversals"))
         DONE, STEP, PHASE, SHIFTED = map(layout.at, ("done", "step", "phase", "shifted"))
 
@@ -92,7 +90,8 @@ class Margin(Measurement):
         left = endings(table, settled)
         further = left.overshoot > overshoot
         nearest = np.where(further, left.nearest_approach, np.fmin(nearest, left.nearest_approach))
-        nearest = np.where(table[WOUND] > 0, np.fmin(nearest, table[WOUND]), nearest)
+        if WOUND in table.layout:
+            nearest = np.where(table[WOUND] > 0, np.fmin(nearest, table[WOUND]), nearest)
         return {
             "margin_more": np.where(settled, nearest, np.nan),
             "margin_fewer": np.where(table["reversals"] > 0, np.fmax(overshoot, left.overshoot), np.nan),

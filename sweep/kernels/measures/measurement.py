@@ -11,6 +11,7 @@ them in hooks, all of which are optional:
     make_step          for one lane after every step
     make_at_reversal   for one lane after every step, by way of the measurement `reversals`
     make_may_settle    for one lane at every look, before it is decided whether the trajectory ends
+    make_settled       the same
     make_look          for one lane at every look, after that decision
     skip               for many images, when they have covered a stretch without steps
     mode_lost          for many images, when the lift of a mode has failed
@@ -148,7 +149,7 @@ class Measurement:
     @property
     def in_kernel(self) -> bool:
         """True if a kernel with it differs from one without: it has a quantity, or a hook in the loop."""
-        hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_look")
+        hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_settled", "make_look")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
         return bool(self.quantities or own or self.follows)
 
@@ -182,6 +183,12 @@ class Measurement:
 
         A trajectory settles only if this holds for all measurements.  `at_rest` says that spin and rattle are
         exactly zero.
+        """
+
+    def make_settled(self, layout: Layout):
+        """Inline (group, lane) -> bool: whether it has shown that the spin can reverse no more.
+
+        A trajectory settles if this holds for one measurement, and the other hook for all.
         """
 
     def make_look(self, layout: Layout):

@@ -126,8 +126,9 @@ def growth_coefficients(columns: Columns) -> Array:
     """
     reach = np.exp2(np.ceil(8 * np.log2(np.maximum(linear.fastest_spin(slip.MODEL, columns), 1e-6))) / 8)
     bodies, which = np.unique(stack((*(columns[name] for name in _BODY), reach)), axis=1, return_inverse=True)
-    constants = slip.Constants.of(dict(zip(_BODY, bodies, strict=False)))
-    fit = linear.through_nodes([linear.rocking_rates(slip.MODEL, constants, n * bodies[-1]) for n in linear.NODES])
+    constants = slip.Constants.of(dict(zip(_BODY, np.tile(bodies, len(linear.NODES)), strict=False)))
+    rates = linear.rocking_rates(slip.MODEL, constants, np.outer(linear.NODES, bodies[-1]).ravel())
+    fit = linear.through_nodes(rates.reshape(2, len(linear.NODES), -1).swapaxes(0, 1))
     powers = bodies[-1] ** np.arange(len(fit))[:, None, None]
     return np.asarray((fit / powers).swapaxes(0, 1)[:, :, which.reshape(-1)])
 

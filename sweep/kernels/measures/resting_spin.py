@@ -15,6 +15,7 @@ import numpy as np
 
 from sweep.jit import on_all_threads
 from sweep.kernels.layout import Table, constants_of
+from sweep.kernels.measures.decay import FORESEEN
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.status import SETTLED
 from sweep.models.ladder import slip
@@ -47,10 +48,19 @@ class RestingSpin(Measurement):
 
 
 def endings(table: Table, which: Array) -> Ending:
-    """How the trajectories of a mask end that is left to their rattle; arrays over all, NaN where that is not known."""
-    result = Ending(*np.full((4, len(table.images)), np.nan))
+    """How the trajectories of a mask end that is left to their rattle; arrays over all, NaN where that is not known.
+
+    A table that has a place for it keeps what was foreseen of a state.
+    """
+    result, keeps = Ending(*np.full((4, len(table.images)), np.nan)), FORESEEN[0] in table.layout
     if set(table.layout.names) >= _NEEDED:
-        cells = np.flatnonzero(which & np.isfinite(table.columns(_states(table))).all(axis=1))
+        new = which & np.isfinite(table.columns(_states(table))).all(axis=1)
+        if keeps:
+            kept = new & (table[FORESEEN[0]] == table["done"] + 1)
+            new &= ~kept
+            for whole, name in zip(result, FORESEEN[1:], strict=True):
+                whole[kept] = table[name][kept]
+        cells = np.flatnonzero(new)
 
         def find(first: int) -> None:
             some = cells[first : first + _AT_A_TIME]
@@ -59,6 +69,9 @@ def endings(table: Table, which: Array) -> Ending:
                 whole[some] = part
 
         on_all_threads(find, range(0, len(cells), _AT_A_TIME))
+        if keeps:
+            for name, values in zip(FORESEEN, (table["done"] + 1, *result), strict=True):
+                table[name][cells] = values[cells]
     return result
 
 

@@ -80,13 +80,12 @@ def ending(states: Array, constants: Constants) -> Ending:
 
 def _fits(constants: Constants, reach: Array) -> tuple[Array, Array, Array]:
     """Coefficients of r_k and s_k, shape (cells, powers of n / `reach`, 2), and whether the modes are apart."""
-    apart, nodes = np.ones(len(reach), bool), []
-    for node in NODES:
-        rates, slopes, sound = slow_rates(constants, node * reach)
-        gap = np.abs(np.diff(rates.imag, axis=1))[:, 0]
-        apart &= sound & (gap > _APART * np.abs(rates.real).max(axis=1))
-        nodes.append((rates.real, slopes))
-    fits = [np.ascontiguousarray(through_nodes(values).swapaxes(0, 1)) for values in zip(*nodes, strict=True)]
+    cells = np.tile(np.arange(len(reach)), len(NODES))
+    rates, slopes, sound = slow_rates(take(constants, cells), np.outer(NODES, reach).ravel())
+    gap = np.abs(np.diff(rates.imag, axis=1))[:, 0]
+    apart = (sound & (gap > _APART * np.abs(rates.real).max(axis=1))).reshape(len(NODES), -1).all(axis=0)
+    nodes = (values.reshape(len(NODES), -1, 2) for values in (rates.real, slopes))
+    fits = [np.ascontiguousarray(through_nodes(values).swapaxes(0, 1)) for values in nodes]
     return fits[0], fits[1], apart
 
 

@@ -27,12 +27,10 @@ def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, wh
     They are computed by complex steps of 1e-30: accurate to the last digit, because no difference is taken, and without
     deriving the equations a second time.
     """
-    columns = []
-    for i in which:
-        shifted = states.astype(complex)
-        shifted[i] += 1e-30j
-        columns.append(stack(function(shifted))[list(which)].imag / 1e-30)
-    return np.moveaxis(np.stack(columns, axis=-1), 0, 1)
+    each, some = np.arange(len(which)), list(which)
+    shifted = np.repeat(states.astype(complex)[:, None], len(which), axis=1)
+    shifted[some, each] += 1e-30j
+    return np.moveaxis(stack(function(shifted))[some].imag / 1e-30, -1, 0)
 
 
 def growth_rate(model: Model, constants, spin: Array) -> Array:
@@ -122,7 +120,7 @@ With three, rates were off by half at b = 6, where the modes nearly meet.
 _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
 
 
-def through_nodes(values: Sequence[Array]) -> Array:
+def through_nodes(values: Array) -> Array:
     """Coefficients of the polynomials through values at `NODES`, lowest power first, along a first axis.
 
     Not a matrix product: how BLAS rounds a cell depends on how many other cells there are.

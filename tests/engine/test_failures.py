@@ -3,7 +3,6 @@
 import csv
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -12,8 +11,10 @@ from support.kernels import threads
 from support.runs import Heard, interrupt, lengthen, run_cells, same_numbers
 
 import sweep
-from sweep.engine import local, repeats
-from sweep.engine.executor import Work
+from sweep.engine import failures
+from sweep.engine.executor import execute
+from sweep.engine.life import begin, live
+from sweep.engine.lives import APPROACH, COMPANION, Lives
 from sweep.engine.plan import plan
 from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, SETTLED, TIME_LIMIT, TOPPLED
@@ -71,19 +72,19 @@ def test_a_failure_is_confirmed_however_long_the_whole_run_would_be(method: str)
 def test_failures_on_the_way_of_a_run_that_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is repeated to where it failed; a false one is not called a failure of the body."""
     expected = run_cells(ENDS.values(), method="dopri5", t_end=50.0)
-    monkeypatch.setattr(repeats, "MOST_STEPS", 2 * 50.0 / float(expected.step.max()))
+    monkeypatch.setattr(failures, "MOST_STEPS", 2 * 50.0 / float(expected.step.max()))
     found = run_cells(ENDS.values(), method="dopri5", t_end=5000.0)
     assert found.status.values.tolist() == list(ENDS)
     np.testing.assert_allclose(found.t_stop, expected.t_stop, rtol=0, atol=1e-6)
     lengthen(monkeypatch, 50)
-    monkeypatch.setattr(repeats, "MOST_STEPS", 1e4)
+    monkeypatch.setattr(failures, "MOST_STEPS", 1e4)
     false = run_cells([THIN], method="dopri5", t_end=100.0)
     assert int(false.status[0]) == DIVERGED
     assert float(false.t_stop[0]) < 100.0
 
 
 def test_without_a_second_look_both_would_be_paradoxes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local, "decide_failures", lambda *_: None)
+    monkeypatch.setattr(failures, "look_at", lambda lives, rows: rows)  # noqa: ARG005
     found = run_cells([THIN, STIFF], method="adams", t_end=14.5)
     assert found.status.values.tolist() == [PARADOX, PARADOX]
 
@@ -95,7 +96,7 @@ def test_one_run_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     def claim(model: Any, states: Any, constants: Any, stretch: Any) -> Any:  # noqa: ARG001
         return np.full(len(stretch), next(claims)), stretch / 2, *np.zeros((2, len(stretch)))
 
-    monkeypatch.setattr(repeats, "approach", claim)
+    monkeypatch.setattr(failures, "approach", claim)
     lengthen(monkeypatch, 50)
     found = run_cells([THIN], method="dopri5", t_end=1.0)
     assert int(found.status[0]) == TIME_LIMIT
@@ -111,18 +112,21 @@ def test_a_failure_is_approached_beyond_where_the_cell_settled_first(monkeypatch
         begun.append(states[:, 0])
         return np.full(1, PARADOX), stretch, *np.zeros((2, 1))
 
-    Work().run("first", part.kernel, part.images, settle=True)
-    assert part.status == SETTLED
-    table = part.kernel.table(part.images)
-    end, table["status"] = table["done"] + 1000, RUNNING
-    Work().run("on", part.kernel, part.images, most=end - 8)
-    before = part.kernel.model_states(part.images)[:, 0].copy()
-    table["status"] = RUNNING
-    Work().run("to the failure", part.kernel, part.images, most=end)
+    lives = begin([part])
+    kernel, images = part.kernel, lives[0].cells.images
+    table = kernel.table(images)
+    execute(kernel, images)
+    assert table["status"] == SETTLED
+    end = table["done"] + 1000
+    reached = []
+    for goal in (end - 8, end):
+        table["status"], table["settles"], table["goal"] = RUNNING, False, goal
+        execute(kernel, images)
+        reached.append(kernel.model_states(images)[:, 0].copy())
     table["status"] = PARADOX
-    monkeypatch.setattr(repeats, "approach", approach)
-    repeats.decide_failures(part, Work(), "first")
-    np.testing.assert_array_equal(begun[0], before)
+    monkeypatch.setattr(failures, "approach", approach)
+    live(lives)
+    np.testing.assert_array_equal(begun[0], reached[0])
 
 
 def test_a_fixed_step_stays() -> None:
@@ -156,7 +160,7 @@ def test_tiles_and_threads_do_not_touch_the_numbers(monkeypatch: pytest.MonkeyPa
     whole = run_cells(MIXED, **settings)
     assert {TIME_LIMIT, *ENDS} <= set(whole.status.values.tolist())
     assert REPEAT in whole.step_rule
-    monkeypatch.setattr("sweep.engine.run.tile_size", lambda cells: size)  # noqa: ARG005
+    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: size)  # noqa: ARG005
     monkeypatch.setattr("sweep.engine.local.BATCH", 2 * size)
     with threads(1):
         same_numbers(run_cells(MIXED, **settings), whole)
@@ -168,18 +172,19 @@ def test_tiles_and_threads_do_not_touch_the_numbers(monkeypatch: pytest.MonkeyPa
 @pytest.mark.usefixtures("short_chunks")
 def test_an_interrupt_while_cells_are_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = {"method": "adams", "t_end": 5.0}
-    whole, heard, out = run_cells(MIXED, **settings), Heard(), tmp_path / "out"
-    for name in ("decide_failures", "keep_tolerance"):
-        again = getattr(local, name)
+    whole, heard, out, plain = run_cells(MIXED, **settings), Heard(), tmp_path / "out", Lives.enter
+    for wanted in (APPROACH, COMPANION):
 
-        def repeat(*arguments: Any) -> Any:
-            with patch.object(heard, "act", interrupt):
-                return again(*arguments)  # noqa: B023
+        def enter(lives: Lives, rows: np.ndarray, stage: int, *rest: Any, wanted: int = wanted, **more: Any) -> None:
+            plain(lives, rows, stage, *rest, **more)
+            if stage == wanted and len(rows):
+                heard.act = interrupt
 
-        monkeypatch.setattr(local, name, repeat)
+        monkeypatch.setattr(Lives, "enter", enter)
         with pytest.raises(KeyboardInterrupt):
             run_cells(MIXED, out, reporter=heard, **settings)
-        monkeypatch.setattr(local, name, again)
+        monkeypatch.setattr(Lives, "enter", plain)
+        heard.act = lambda: None
         assert [path.name for path in out.iterdir()] == ["cells.checkpoint"]
     same_numbers(run_cells(MIXED, out, reporter=heard, **settings), whole)
     # A failure is reported only when it is certain, and no progress is taken back.

@@ -1,0 +1,147 @@
+"""Decides when a run is over: when the count is final, or when nothing tells when that will be.
+
+The kernel lets a cell settle by a bound on what the energy of its rattle can do to the spin (`sweep.kernels.lanes`), or
+by how a rattle that rolls round and round winds down (`sweep.kernels.measures.decay`).  Where the bound fails, the cell
+goes on.  A cell that has not settled by the configuration's `patience` goes on to `t_end` only if its spin will reverse
+once more by the slow equations, or if its rattle will have wound down before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.engine.cells import Cells
+from sweep.engine.lives import RUN, Lives
+from sweep.engine.winding import watch, whole_blocks, winds_down
+from sweep.grid import Array
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.layout import Table
+from sweep.kernels.measures.decay import WOUND
+from sweep.kernels.measures.resting_spin import endings
+from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
+from sweep.models.ladder import slip
+from sweep.models.model import MODES
+from sweep.models.stiff.form import subset
+from sweep.models.stiff.modes import bending
+from sweep.models.theory import linear
+
+FIRST, LATER = range(2)
+"""Legs of a run: to `patience`, and to `t_end`."""
+
+# How many times the change of the spin at the present rates may be exceeded, where no slow equations hold.
+_REACH = 4.0
+
+# Error of the slow equations in spin, relative to the fastest spin that the energy allows: at least this, and so many
+# times what they neglect.  Of 576 cells of `configs/mu_b.yaml` at n0 = 0.05, stopped at t = 5000 and at 30 000, none
+# that this settled had another count at t = 10⁶.
+_LEAST, _NEGLECTED = 0.02, 3.0
+
+# Where the error is larger than this share, the slow equations foresee nothing.
+_LARGEST = 0.2
+
+
+def begin(lives: Lives, rows: Array, images: Array, most: Array | float = np.inf) -> None:
+    """Let `images` at t = 0 run to their ends, or until `most` steps are done."""
+    rules, table = lives.cells.rules, lives.cells.kernel.table(images)
+    first = most if rules.patience is None else np.minimum(most, whole_blocks(rules.patience / table["step"]))
+    if rules.settles:
+        watch(lives.take(rows), images)
+    lives.note(rows, ("leg", "wary"), 0)
+    lives.notes["most"][rows] = most
+    lives.enter(rows, RUN, images, settles=rules.settles, goal=first)
+
+
+def over(lives: Lives, rows: Array) -> Array:
+    """Find the runs that are over, out of those of the cells `rows`, which have stopped; the others go on.
+
+    Returns
+    -------
+    The indices of their cells.
+    """
+    rules, run = lives.cells.rules, lives.take(rows)
+    early = too_early(run, lives.notes["wary"][rows] == 0)
+    foreseen = settle(run, ~early & rules.settles)
+    first = (lives.notes["leg"][rows] == FIRST) & ~early & (rules.settles and rules.patience is not None)
+    later = first & _late(run) & (foreseen | winds_down(run))
+    lives.cells.images[rows] = run.images
+    _go_on(lives, rows[early], settles=False)
+    _go_on(lives, rows[later], settles=True)
+    return np.asarray(rows[~early & ~later])
+
+
+def _go_on(lives: Lives, rows: Array, *, settles: bool) -> None:
+    """Let the cells `rows` run on, to `t_end` if they may settle, and else on the same leg without settling."""
+    table = lives.table(rows)
+    table["status"], table["settles"] = RUNNING, settles
+    lives.notes["wary"][rows] = not settles
+    if settles:
+        table["goal"], lives.notes["leg"][rows] = np.minimum(table["steps"], lives.notes["most"][rows]), LATER
+    lives.cells.images[rows] = table.images
+
+
+def too_early(cells: Cells, which: Array | bool = True) -> Array:
+    """Tell which cells of a mask have settled although their spin may reverse once more, shape (cells,).
+
+    The bound of the kernel fails where a strong rattle hardly decays, and turns the spin all the while, and where
+    friction is too weak to stop the slip.  The slow equations foresee what comes; where they do not hold, the spin must
+    keep its sign, and the rattle decay, even if the rattle changes the spin `_REACH` times as much as at its present
+    rates; unless it rolls round, and was watched.
+    """
+    settled = which & (cells.status == SETTLED)
+    if MODES not in cells.kernel.model.offers or not settled.any():
+        return np.zeros(len(settled), bool)
+    table = cells.kernel.table(cells.images)
+    left = endings(table, settled).reversals
+    wound = _wound(table)
+    early, unknown = left > 0, np.flatnonzero(settled & np.isnan(left) & ~wound)
+    early[wound] &= _error(cells)[0][wound] < _LARGEST
+    if len(unknown):
+        early[unknown] = ~_stays(cells.kernel, cells.images[unknown])
+    return np.asarray(early)
+
+
+def _stays(kernel: Kernel, images: Array) -> Array:
+    """Tell where the spin keeps its sign and the rattle decays even at `_REACH` times the change foreseen."""
+    constants = subset(slip.Constants, kernel.unpack(images)[1])
+    states = kernel.model_states(images)
+    spin, _, _ = slip.MODEL.energy(tuple(states), constants)
+    farthest = spin + _REACH * (linear.resting_spin(slip.MODEL, constants, states) - spin)
+    known = np.isfinite(farthest)
+    growth = linear.growth_rate(slip.MODEL, constants, np.where(known, farthest, spin))
+    return np.asarray(known & (spin * farthest > 0) & (growth < 0))
+
+
+def _late(cells: Cells) -> Array:
+    """Tell which cells are at their limit of time, and can be shown to have settled, shape (cells,)."""
+    known = MODES in cells.kernel.model.offers and "reversals" in cells.kernel.measure
+    return np.asarray((cells.status == TIME_LIMIT) & known)
+
+
+def settle(cells: Cells, which: Array | bool = True) -> Array:
+    """Settle those cells of a mask, at their limit of time, that can be shown to reverse no more, in place.
+
+    Returns
+    -------
+    Where a further reversal can be foreseen, shape (cells,).
+    """
+    table, late = cells.kernel.table(cells.images), which & _late(cells)
+    if not late.any():
+        return late
+    left = endings(table, late)
+    error, fastest = _error(cells)
+    final = (left.reversals == 0) & (left.nearest_approach > error * fastest)
+    foreseen = late & ~final & np.isfinite(left.reversals) & (error < _LARGEST)
+    table["status"][late & ~foreseen & (final | _wound(table))] = SETTLED
+    return np.asarray(foreseen)
+
+
+def _error(cells: Cells) -> tuple[Array, Array]:
+    """Relative error of what the slow equations foresee, and the fastest spin that the energy allows, (cells,)."""
+    _, _, inertia = cells.kernel.model.energy(*cells.kernel.unpack(cells.images))
+    fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.images)["energy"], 0) / inertia)
+    return np.maximum(_NEGLECTED * bending(cells.columns) * fastest**2, _LEAST), fastest
+
+
+def _wound(table: Table) -> Array:
+    """Tell which rattles were watched, and will wind down without a reversal, shape (cells,)."""
+    return np.asarray(table[WOUND] > 0) if WOUND in table.layout else np.zeros(len(table.images), bool)

@@ -1,0 +1,206 @@
+"""Looks again at cells whose run failed, with a shorter step, and finds out what is true.
+
+A failure is a statement about physics, so one run does not settle it: with too long a step a body seems to lift off, to
+jam or to topple that does nothing of the kind.  Two runs have to agree, the second with half the step of the first.
+Each is stopped a few steps ahead of its failure and followed from there (`sweep.kernels.failure`); the failure is true
+if both meet the same one at the same time.
+
+Each cell is judged by its own results alone, so nothing depends on which cells were repeated with it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sweep.engine import ending
+from sweep.engine.cells import Cells
+from sweep.engine.lives import APPROACH, MET, Lives
+from sweep.grid import Array
+from sweep.interrupt import point
+from sweep.kernels.build import APPROACH as COMPILED
+from sweep.kernels.build import build
+from sweep.kernels.failure import approach
+from sweep.kernels.kernel import FAILURE
+from sweep.kernels.layout import BLOCK
+from sweep.kernels.method import MISSED, REPEAT
+from sweep.kernels.methods import METHODS
+from sweep.kernels.status import DIVERGED, FAILURES, RUNNING
+from sweep.models.model import stack, take
+
+ROUNDS, FALSE_ROUNDS = 3, 8
+"""Largest number of repeats, each with half the step of the one before; and the same where every run so far has failed
+falsely, because then its numbers are worth nothing."""
+
+MOST_STEPS = 1e8
+"""Steps beyond which a repeat is not tried: a minute for one cell, or for all that fill the lanes beside it.  If only
+the way to a failure is shorter, that alone is repeated."""
+
+SAME = 1e-6
+"""Largest difference of the times at which two runs meet the same failure, in sqrt(c/g)."""
+
+UNSOUND = 0.01
+"""Relative error of the energy balance beyond which a run is never called sound."""
+
+# How many steps ahead of a failure, and how many beyond it, a run is followed in short steps.  The longest history of a
+# method has eight points: so far back no point comes from the failure.
+_AHEAD, _BEYOND = 8, 2
+
+# Cells that are followed between two calls of `after_chunk`: half a second at most friction.
+_AT_A_TIME = 64
+
+
+class Met(NamedTuple):
+    """Holds what runs that failed have met, as the approach in short steps tells it."""
+
+    kind: Array
+    """`LIFT_OFF`, `PARADOX`, `TOPPLED`, or `DIVERGED` where no step is short enough; `RUNNING` where a run has met
+    nothing, shape (cells,)."""
+    time: Array
+    """When, in sqrt(c/g), shape (cells,)."""
+    spin: Array
+    """The spin at that time, shape (cells,)."""
+    doubt: Array
+    """How much the spin may change in what the approach leaves of that time, shape (cells,)."""
+
+    @classmethod
+    def nothing(cls, cells: int) -> Met:
+        """What so many runs have met that did not fail."""
+        return cls(np.full(cells, RUNNING), *np.zeros((3, cells)))
+
+    def agrees(self, other: Met, within: float | Array) -> Array:
+        """Tell where both have met the same failure, at times that differ by at most `within`, shape (cells,)."""
+        near = np.abs(self.time - other.time) <= within
+        return np.asarray((self.kind != RUNNING) & (self.kind == other.kind) & near)
+
+
+def unsound(cells: Cells) -> Array:
+    """Tell where the energy balance is so wrong that no number of the run can be right, shape (cells,)."""
+    if "energy_error" not in cells.kernel.measure:
+        return np.zeros(len(cells.cells), bool)
+    table = cells.kernel.table(cells.images)
+    return np.asarray(~(table["violation"] <= UNSOUND * table["energy_start"]))
+
+
+def look_at(lives: Lives, rows: Array) -> Array:
+    """Look at the runs of the cells `rows`, which are over: at those that failed again, until it is known what is true.
+
+    A failure gets its true status, its time and the spin at that time.  Where two runs do not meet the same one, the
+    step is halved again, at most `ROUNDS` times, until a run ends soundly.  That run takes the place of the first.  A
+    run that still fails without meeting the same failure twice has `DIVERGED`, and so has every run whose energy
+    balance is off by more than `UNSOUND`.
+
+    Returns
+    -------
+    The indices of the cells of which this is known now; the others go on.
+    """
+    cells, begun = lives.take(rows), lives.notes["halvings"][rows] > 0
+    failed = cells.failed
+    open_ = begun | failed if cells.rules.fixed else begun | failed | unsound(cells)
+    fresh = rows[open_ & ~begun]
+    lives.note(fresh, (*MET, "brief"), np.array([RUNNING, 0, 0, 0, 0]))
+    at_start, nothing = _approach(lives, rows[failed]), rows[open_ & ~failed]
+    concluded = after_approach(lives, at_start), _conclude(lives, nothing, Met.nothing(len(nothing)))
+    return np.concatenate([rows[~open_], *concluded])
+
+
+def _approach(lives: Lives, rows: Array) -> Array:
+    """Let failed cells run again to a few steps ahead of their failures.
+
+    Returns
+    -------
+    The indices of those that fail so early that there is nothing to run again.
+    """
+    cells = lives.take(rows)
+    goal = cells.kernel.table(cells.images)["done"] - _AHEAD
+    lives.aside[rows] = cells.images
+    late = goal > 0
+    lives.enter(rows[late], APPROACH, cells.take(late).start(), goal=goal[late])
+    return rows[~late]
+
+
+def after_approach(lives: Lives, rows: Array) -> Array:
+    """Follow cells from where they are ahead of a failure, and conclude; result as of `look_at`."""
+    if not len(rows):
+        return rows
+    met, cells = Met.nothing(len(rows)), lives.cells.take(rows, lives.aside[rows])
+    model, table, constants = cells.model, cells.kernel.table(cells.images), cells.model.constants.of(cells.columns)
+    late = table["done"] > _AHEAD
+    begin = np.where(late, cells.times - _AHEAD * table["step"], 0.0)
+    states = stack(model.start(cells.columns))
+    states[:, late] = cells.kernel.model_states(lives.cells.images[rows[late]])
+    stretch = cells.times + _BEYOND * table["step"] - begin
+    build([cells.kernel], COMPILED)
+    for first in range(0, len(rows), _AT_A_TIME):
+        some = slice(first, first + _AT_A_TIME)
+        found = approach(model, states[:, some], take(constants, some), stretch[some])
+        met.kind[some], passed, met.spin[some], met.doubt[some] = found
+        met.time[some] = begin[some] + passed
+        point()
+    lives.cells.images[rows] = cells.images
+    return _conclude(lives, rows, met)
+
+
+def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
+    """Decide what is true of the cells `rows`, whose runs have `met` something; result as of `look_at`."""
+    notes, now = lives.notes, lives.take(rows)
+    table, rules = now.kernel.table(now.images), now.rules
+    halvings, before = notes["halvings"][rows], Met(*notes.columns(MET)[rows].T)
+    if rules.fixed:
+        last, within = halvings == 1, notes["step_before"][rows]
+    else:
+        rounds = np.where(now.failed & ~met.agrees(before, np.inf), FALSE_ROUNDS, ROUNDS)
+        long, failed_late = 2 * table["steps"] > MOST_STEPS, 2 * table["done"] > MOST_STEPS
+        last = (halvings >= rounds) | (long & (~now.failed | failed_late))
+        within = np.where(last & ~unsound(now), np.inf, SAME)
+    true = met.agrees(before, within)
+    doubtful = ~true & (now.failed | unsound(now))
+    over = ~doubtful | last
+    # With a fixed step the run in half the step only confirms; a brief run that did not fail is no result.
+    back = over & ((halvings > 0) if rules.fixed else (notes["brief"][rows] > 0) & ~true)
+    here = rows[over]
+    step, images = now.step[over], now.images[over]
+    step[back[over]], images[back[over]] = notes["step_before"][rows[back]], lives.before[rows[back]]
+    _set_true(lives, here, images, take(met, over), take(before, over), true[over])
+    notes["step"][here] = step
+    if not rules.fixed:
+        rule = np.where(doubtful[over], MISSED, REPEAT)
+        notes["step_rule"][here] = np.where((halvings[over] > 0) | doubtful[over], rule, notes["step_rule"][here])
+    _halve(lives, rows[~over], take(met, ~over), np.zeros(1) if rules.fixed else long[~over])
+    return np.asarray(here)
+
+
+def deny_unsound(lives: Lives, rows: Array) -> None:
+    """Let those of the cells `rows` diverge whose energy balance is wrong, although they did not fail."""
+    cells = lives.take(rows)
+    wrong = rows[unsound(cells) & ~cells.failed]
+    lives.cells.kernel.table(lives.cells.images)["status"][wrong] = DIVERGED
+
+
+def _set_true(lives: Lives, rows: Array, images: Array, met: Met, before: Met, true: Array) -> None:
+    """Let `images` stand for the cells `rows`, with statuses that are true.
+
+    A failure that is not `true` is one of the integration.  `before` is what the runs in steps of twice the length have
+    met.
+    """
+    table, method = lives.cells.kernel.table(images), METHODS[lives.cells.method]
+    error = np.maximum(np.abs(met.spin - before.spin) / (2**method.error_order - 1), met.doubt)
+    failed = np.isin(table["status"], FAILURES)
+    table["status"] = np.where(true, met.kind, np.where(failed, DIVERGED, table["status"]))
+    for name, values in zip(FAILURE, (met.time, met.spin, error), strict=True):
+        table[name] = np.where(true, values, 0.0)
+    lives.cells.images[rows], lives.notes["halvings"][rows] = images, 0
+
+
+def _halve(lives: Lives, rows: Array, met: Met, brief: Array) -> None:
+    """Run the cells `rows` again in half the step; where `brief`, to where the run before failed, and no further."""
+    notes, now = lives.notes, lives.take(rows)
+    # A run may be stopped before the failure that lies ahead of it.
+    steps = np.maximum(now.times, met.time) / now.kernel.table(now.images)["step"]
+    most = np.where(brief, 2 * (steps + _BEYOND) + BLOCK, np.inf)
+    lives.note(rows, MET, stack(met).T)
+    notes["halvings"][rows] += 1
+    notes["brief"][rows], notes["step_before"][rows], lives.before[rows] = brief, now.step, now.images
+    notes["step"][rows] = now.step / 2
+    ending.begin(lives, rows, lives.take(rows).start(), most)

@@ -1,0 +1,71 @@
+"""The life of a cell, from its start to a result that can be believed.
+
+    run → is it over → did it fail truly → companion → is it within its tolerance → again in shorter steps, or done
+
+Each stage decides for all cells at once that have come to its end, and each cell by its own results alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from sweep.engine import ending, errors, failures
+from sweep.engine.cells import Cells
+from sweep.engine.executor import keep_busy
+from sweep.engine.lives import APPROACH, COMPANION, DONE, RUN, Lives
+from sweep.grid import Array
+from sweep.kernels.methods import METHODS
+
+
+def begin(parts: Sequence[Cells]) -> list[Lives]:
+    """Begin the lives of cells whose images are at t = 0."""
+    lives = [Lives(part) for part in parts]
+    for each in lives:
+        every = np.arange(len(each.cells.cells))
+        ending.begin(each, every, each.cells.images.copy())
+    return lives
+
+
+def live(lives: Sequence[Lives], after_chunk: Callable[[], None] = lambda: None) -> None:
+    """Let all cells live to their ends; `after_chunk` as of `keep_busy`."""
+    keep_busy(lives, proceed, after_chunk)
+
+
+def proceed(lives: Lives, rows: Array) -> None:
+    """Let the cells `rows`, whose stages have ended, enter the next."""
+    stage = lives.stage[rows]
+    over = ending.over(lives, rows[stage == RUN])
+    known = [failures.look_at(lives, over), failures.after_approach(lives, rows[stage == APPROACH])]
+    run = np.concatenate(known)
+    failures.deny_unsound(lives, run)
+    failed = lives.take(run).failed
+    sound, done = run[~failed], [run[failed]]
+    if lives.cells.rules.twice:
+        errors.accompany(lives, sound)
+    else:
+        done.append(sound)
+    done.append(errors.after_companion(lives, rows[stage == COMPANION]))
+    lives.notes["stage"][np.concatenate(done)] = DONE
+
+
+def progress(lives: Sequence[Lives]) -> tuple[float, int]:
+    """The share of the work that is done, as a number of cells, and how many cells have failed.
+
+    How long a run will be that has not ended is guessed from those that have.
+    """
+    cells = failed = 0
+    done, left = 0.0, 0.0
+    for each in lives:
+        kernel, stage = each.cells.kernel, each.stage
+        now, before = kernel.table(each.cells.images), kernel.table(each.aside)["done"]
+        first = np.isin(stage, (RUN, APPROACH))
+        again = 1 / METHODS[each.cells.method].companion if each.cells.rules.twice else 0.0
+        ended = np.where(stage == COMPANION, before, now["done"])[~first]
+        usual = np.maximum(ended.mean() if len(ended) else now["goal"][first].mean(), now["done"][first])
+        done += now["done"].sum() + before[stage == COMPANION].sum() + again * now["done"][stage == DONE].sum()
+        left += ((1 + again) * usual - now["done"][first]).sum()
+        left += (now["goal"] - now["done"])[stage == COMPANION].sum()
+        cells, failed = cells + len(stage), failed + int((each.cells.failed & (stage == DONE)).sum())
+    return cells * (done / (done + left) if done else 0.0), failed
