@@ -22,8 +22,8 @@ from sweep.kernels.measures.measurement import RIPPLE, Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
 FAILURE = ("failed_at", "failed_spin", "failed_error")
-"""Time of a failure, spin at that time, and its estimated error, which the engine finds out (`sweep.engine.failures`); 0
-if there is none."""
+"""Time of a failure, spin at that time, and its estimated error, which the engine finds (`sweep.engine.failures`); 0 if
+there is none."""
 
 _PROGRESS = ("steps", "goal", "settles", "done", "status")
 """How many steps lead to t_end, after how many the image stops, whether it stops (not zero) as soon as its spin can

@@ -14,6 +14,9 @@ from sweep.models.model import Array, Columns, Model, stack
 # Amplitude at which the change of the spin is evaluated: the terms beyond its quadratic form are 1e-16 of it.
 _SMALL = 1e-8
 
+# Columns of a Jacobian that are computed in one call, times cells: few calls for few cells, and many stay in the cache.
+_TOGETHER = 1024
+
 
 def jacobian(model: Model, constants, spin: Array) -> Array:
     """Jacobian of the rattle at upright spin, shape (cells, m, m), where m is the number of states without the spin."""
@@ -27,10 +30,14 @@ def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, wh
     They are computed by complex steps of 1e-30: accurate to the last digit, because no difference is taken, and without
     deriving the equations a second time.
     """
-    each, some = np.arange(len(which)), list(which)
-    shifted = np.repeat(states.astype(complex)[:, None], len(which), axis=1)
-    shifted[some, each] += 1e-30j
-    return np.moveaxis(stack(function(shifted))[some].imag / 1e-30, -1, 0)
+    columns, states, some = [], states.astype(complex)[:, None], list(which)
+    together = max(1, _TOGETHER // states.shape[2])
+    for first in range(0, len(some), together):
+        shifts = some[first : first + together]
+        shifted = np.repeat(states, len(shifts), axis=1)
+        shifted[shifts, np.arange(len(shifts))] += 1e-30j
+        columns.append(stack(function(shifted))[some].imag / 1e-30)
+    return np.moveaxis(np.concatenate(columns, axis=1), -1, 0)
 
 
 def growth_rate(model: Model, constants, spin: Array) -> Array:
