@@ -21,6 +21,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx_click",
+    "sphinx_copybutton",
     "console",
     "docstrings",
     "rooms",
@@ -43,11 +44,14 @@ nb_merge_streams = True
 nb_output_stderr = "remove"  # where progress is shown
 
 default_role = "code"
+smartquotes_action = "qe"  # quotes and ellipses, but no dashes: `--fresh` is an option
 add_module_names = False
 autodoc_member_order = "bysource"
 autodoc_mock_imports = ["bokeh"]  # of the extra `explore`
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
+
+copybutton_prompt_text = "$ "
 
 html_theme = "furo"
 html_title = "sweep"

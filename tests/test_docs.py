@@ -40,7 +40,7 @@ def _name(page: Path) -> str:
 
 _FENCE = re.compile(
     r"(?:<!-- (?P<when>not run|campaign): [^\n]+ -->\n+)?"
-    r"^(?P<indent> *)```(?P<kind>\S*)\n(?P<text>.*?)^(?P=indent)```$",
+    r"^(?P<indent> *)```(?P<kind>\S*)[^\n]*\n(?P<text>.*?)^(?P=indent)```$",
     re.MULTILINE | re.DOTALL,
 )
 _LINK = re.compile(r"!?\[[^\]]*\]\((?P<target>[^)\s]+)\)")

@@ -24,6 +24,11 @@ BUILD = ROOT / "build" / "docs"
 # Typesetting is over, or its fault.
 TYPESET = "window.MathJax?.startup?.promise.then(() => null, String)"
 
+# How far text reaches to the right, but for formulas, tables and pictures that scroll by themselves.
+WIDTH = """Math.max(...[...document.querySelectorAll('article :is(h1, p, li, dd, dt, pre, table)')]
+    .filter(each => !each.closest('.table-wrapper, .cell_output, .math'))
+    .map(each => each.getBoundingClientRect().right))"""
+
 
 @pytest.fixture(scope="module")
 def pages() -> list[Path]:
@@ -56,6 +61,9 @@ def faults(offline: BrowserContext, path: Path) -> list[str]:
         said.append(f"{typeset} of {written} formulas are typeset")
     if wrong := page.locator("mjx-container:has([data-mjx-error], [data-mml-node=merror])").count():
         said.append(f"{wrong} formulas are wrong")
+    page.set_viewport_size({"width": 420, "height": 900})
+    if (width := page.evaluate(WIDTH)) > 421:
+        said.append(f"text reaches to {width:.0f} px on a page of 420 px")
     page.close()
     return said
 
@@ -64,3 +72,9 @@ def test_every_page_opens_with_all_its_formulas_and_without_a_network(
     pages: list[Path], offline: BrowserContext
 ) -> None:
     assert not {path.relative_to(BUILD): found for path in pages if (found := faults(offline, path))}
+
+
+def test_options_keep_their_two_dashes(pages: list[Path]) -> None:  # noqa: ARG001
+    text = (BUILD / "reference" / "commands.html").read_text(encoding="utf-8")
+    assert "--fresh" in text
+    assert "–fresh" not in text

@@ -1,11 +1,12 @@
-"""Commands and what they print: ```{console} runs its lines that begin with `$ ` while the pages are built.
+"""Commands, their output and pictures: ```{console} runs its lines that begin with `$ ` while the pages are built.
 
-The commands of a page run one after the other, in a folder of its own that holds the repository's `configs`.  Bars of
-progress are left out.
+The commands of a page run one after the other, in a folder of its own that holds the repository's `configs`.  Progress
+bars are left out.  ```{picture} shows an image file that an earlier command of the page has written.
 """
 
 from __future__ import annotations
 
+import os
 import shlex
 import shutil
 import subprocess
@@ -13,10 +14,19 @@ import sys
 from pathlib import Path
 
 from docutils import nodes
+from docutils.parsers.rst.directives.images import Image
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 _CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+class Picture(Image):
+    def run(self) -> list[nodes.Node]:
+        env = self.state.document.settings.env
+        path = env.current_document["console"] / self.arguments[0]
+        self.arguments[0] = os.path.relpath(path, Path(env.doc2path(env.docname)).parent)
+        return [nodes.container("", *super().run(), classes=["cell_output"])]
 
 
 class Console(SphinxDirective):
@@ -59,4 +69,5 @@ class Console(SphinxDirective):
 
 def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("console", Console)
+    app.add_directive("picture", Picture)
     return {"parallel_read_safe": True}

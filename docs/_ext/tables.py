@@ -5,6 +5,7 @@ Each directive is named after its table and takes no arguments: see `setup`.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +13,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+import sweep
 from sweep.config import messages, schema
 from sweep.kernels import measures, methods
 from sweep.kernels.status import FAILURES
@@ -127,6 +129,16 @@ def _models() -> tuple[Row, list[Row]]:
     return ("model", "description", "states", "methods", "measures"), rows
 
 
+def _functions() -> tuple[Row, list[Row]]:
+    """Functions first, in the order of their names, then classes."""
+    public = sorted((inspect.isclass(getattr(sweep, name)), name) for name in sweep.__all__)
+    rows = []
+    for is_class, name in public:
+        summary = inspect.getdoc(getattr(sweep, name)).partition("\n")[0]
+        rows.append((f"{{py:{'class' if is_class else 'func'}}}`~sweep.{name}`", summary))
+    return ("name", "purpose"), rows
+
+
 def _directive(make: Callable[[], tuple[Row, list[Row]]]) -> type[SphinxDirective]:
     class Table(SphinxDirective):
         def run(self) -> list[nodes.Node]:
@@ -148,6 +160,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ("measurements", _measurements),
         ("methods", _methods),
         ("models", _models),
+        ("functions", _functions),
     ):
         app.add_directive(name, _directive(make))
     return {"parallel_read_safe": True}
