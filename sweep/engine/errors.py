@@ -146,8 +146,7 @@ def imbalance(part: Part) -> Array:
     if "energy_error" not in part.kernel.measure:
         return np.full(len(part.cells), np.inf)
     table = part.kernel.table(part.images)
-    _, _, inertia = part.kernel.model.energy(*part.kernel.unpack(part.images))
-    scale = np.sqrt(2 * inertia * table["energy_start"])
+    scale = np.sqrt(2 * part.inertia * table["energy_start"])
     return np.asarray(np.divide(table["violation"], scale, out=np.zeros(len(scale)), where=scale > 0))
 
 
@@ -194,7 +193,7 @@ def companions(part: Part) -> Part:
     if not len(part.cells):
         return part
     step = part.kernel.table(part.images)["step"] * _ratio(part)
-    return replace(part, images=part.kernel.images(part.columns, step, part.times, part.stable))
+    return replace(part, images=part.starting(step, part.times))
 
 
 def compare(part: Part, companion: Part) -> Errors:

@@ -67,8 +67,7 @@ def settle(part: Part) -> Array:
     if not late.any():
         return late
     left = endings(table, late)
-    _, _, inertia = part.kernel.model.energy(*part.kernel.unpack(part.images))
-    fastest = np.sqrt(2 * np.maximum(table["energy"], 0) / inertia)
+    fastest = np.sqrt(2 * np.maximum(table["energy"], 0) / part.inertia)
     error = np.maximum(_NEGLECTED * bending(part.columns) * fastest**2, _LEAST)
     final = (left.reversals == 0) & (left.nearest_approach > error * fastest)
     table["status"][late & final] = SETTLED

@@ -86,13 +86,23 @@ class Part(Choice):
         """Times in sqrt(c/g) at which the runs have ended, shape (cells,)."""
         return self.kernel.times(self.images, self.config.integrator.t_end)
 
+    @property
+    def inertia(self) -> Array:
+        """The third part of `Model.energy` at the states of these cells, shape (cells,); NaN where one has failed."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.kernel.model.energy(*self.kernel.unpack(self.images))[2])
+
     def start(self, shorter: float | Array = 1.0) -> Part:
         """These cells at t = 0, with steps that are shorter by a factor, a number or of shape (cells,)."""
         step = self.step / shorter
         if not len(step):
             return replace(self, step=step, images=np.empty((0, len(self.kernel.layout.names))))
-        images = self.kernel.images(self.columns, step, self.config.integrator.t_end, self.stable)
-        return replace(self, step=step, images=images)
+        return replace(self, step=step, images=self.starting(step, self.config.integrator.t_end))
+
+    def starting(self, step: Array, t_end: float | Array) -> Array:
+        """Make the images of these cells at t = 0; a cell may fail within the start-up of a method."""
+        with np.errstate(invalid="ignore"):
+            return self.kernel.images(self.columns, step, t_end, self.stable)
 
     def put(self, rows: Array, other: Part, rule: int | Array) -> None:
         """Replace the runs of the cells `rows` by those of `other`, in place; `rule` says what set their steps."""
