@@ -153,14 +153,14 @@ SPECIAL = {
 
 
 @cache
-def _fields() -> dict[str, Any]:
+def fields() -> dict[str, Any]:
     schema = schema_of(None).model_json_schema()
     sections = {key: schema["$defs"][value["$ref"].rpartition("/")[2]]["properties"]
                 for key, value in schema["properties"].items() if "$ref" in value}  # fmt: skip
     return flattened(sections) | {key: v for key, v in schema["properties"].items() if key not in sections}
 
 
-OTHERWISE = [path for path in _fields() if path in PATHS and path not in PHYSICAL and path != "model_sha256"]
+OTHERWISE = [path for path in fields() if path in PATHS and path not in PHYSICAL and path != "model_sha256"]
 """Keys of what is not physical: each counts as much as all parameters together, which are alike."""
 
 
@@ -169,7 +169,7 @@ def setting(path: str, number: int, units: str = PAPER_UNITS) -> Any:
     random = Random(f"{path} {number}")
     if path in PHYSICAL:
         return _physical(PHYSICAL[path], random, units)
-    return SPECIAL[path](random) if path in SPECIAL else _of_schema(_fields()[path], random)
+    return SPECIAL[path](random) if path in SPECIAL else _of_schema(fields()[path], random)
 
 
 def accepted(flat: Flat, base: str = "paper") -> tuple[Flat, Config]:

@@ -179,8 +179,10 @@ class Machine(RuleBasedStateMachine):
     @rule(number=NUMBER, places=st.lists(NUMBER, min_size=1, max_size=4, unique=True))
     def as_cases(self, number: int, places: list[int]) -> None:
         """Some cells in any order have the same numbers alone and as cases, be they samples or of a grid."""
-        config, ran = self.config, np.flatnonzero(oracles.simulated(self.found))
-        cells = list(dict.fromkeys(int(ran[n % len(ran)]) for n in places)) if len(ran) else [0]
+        config, possible = self.config, self.rows["status"] != IMPOSSIBLE
+        if not len(ran := np.flatnonzero(oracles.simulated(self.found) & possible)):
+            return
+        cells = list(dict.fromkeys(int(ran[n % len(ran)]) for n in places))
         columns = {name: self.rows[name][cells].tolist() for name in self.varying or config.tier.parameters[:1]}
         keys = {config.table[name].path: column[0] for name, column in columns.items()}
         several = [path for path in self.scene.flat if path in draws.PHYSICAL and path not in keys]
