@@ -59,7 +59,8 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
     upper, lower = n_c1[:, possible] if "mu" in model.parameters else np.zeros((2, len(possible)))
     surface = model.variant.surface if model.variant else ELLIPSOID
     theirs = {name: values[possible] for name, values in columns.items()}
-    time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
+    with np.errstate(divide="ignore", invalid="ignore"):  # where no upright spin is steady
+        time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
     return {"t_first_reversal_predicted": time, "reversal_time_reason": reason}
 
 

@@ -9,12 +9,12 @@ import os
 from itertools import islice
 from random import Random, SystemRandom
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import HealthCheck, Phase, seed, settings
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis.internal.conjecture.providers import AVAILABLE_PROVIDERS, PrimitiveProvider
 from hypothesis.stateful import run_state_machine_as_test
 from machine import draws, oracles, words
 from machine.rules import Machine
@@ -25,26 +25,52 @@ from sweep.cli import main
 from sweep.config import load_config
 from sweep.config.schema import PATHS
 
-POOL = [(method, model, draws.compiled(measure)) for method, model, measure in SHARED]
-STEPS, BATCH = 12, 9
+POOL = {(method, model, draws.compiled(measure)) for method, model, measure in SHARED}
+STEPS = 6
 
 
-def run_machine(number: int, runs: int, kernels: int = 0, **parts: Any) -> None:
-    """Let the machine do `runs` times `STEPS` things, with so many kernels more than tests share."""
+class Even(PrimitiveProvider):
+    """Draws each choice evenly: what the seed alone decides, and no examples that change little in earlier ones."""
+
+    seed = 0
+
+    def __init__(self, data: Any) -> None:
+        super().__init__(data)
+        self.random = Random(self.seed)
+
+    def draw_boolean(self, p: float = 0.5) -> bool:
+        return self.random.random() < p
+
+    def draw_integer(self, min_value: Any = None, max_value: Any = None, **_: Any) -> int:
+        return self.random.randint(min_value, max_value)
+
+    def draw_float(self, *, min_value: float, max_value: float, **_: Any) -> float:
+        return self.random.uniform(min_value, max_value)
+
+    def draw_string(self, *_: Any, **__: Any) -> str:
+        raise NotImplementedError
+
+    def draw_bytes(self, *_: Any, **__: Any) -> bytes:
+        raise NotImplementedError
+
+
+def run_machine(number: int, runs: int, kernels: int = 0, **parts: Any) -> int:
+    """Let the machine do `STEPS` things with each of `runs` configurations; returns how many it has done.
+
+    `kernels` configurations more than tests share have kernels of their own.
+    """
     print(f"SWEEP_MACHINE_SEED={number}")
-    pool = [*POOL, *islice(draws.further(Random(number)), kernels)]
-    # Of each ten and more, Hypothesis makes most by changing little in others.
-    for batch in range(0, runs, BATCH):
-        kind = seed(number + 10**6 * batch)(type("TheMachine", (Machine,), {"pool": pool, **parts}))
-        how = settings(
-            max_examples=min(BATCH, runs - batch), stateful_step_count=STEPS, deadline=None, database=None,
-            derandomize=False, suppress_health_check=list(HealthCheck),
-            phases=[Phase.generate, *([Phase.shrink] if os.environ.get("SWEEP_MACHINE_SEED", "new") != "new" else [])],
-        )  # fmt: skip
-        # Hypothesis draws constants of the modules that happen to be loaded, which other tests change.
-        constant = "hypothesis.internal.conjecture.providers.HypothesisProvider._maybe_draw_constant"
-        with patch(constant, lambda *_, **__: None):
-            run_state_machine_as_test(kind, settings=how)
+    pool = POOL.union(*islice(draws.further(Random(number)), kernels))
+    kind = type("TheMachine", (Machine,), {"pool": pool, "bases": draws.bases(pool), **parts})
+    AVAILABLE_PROVIDERS["even"] = type("Seeded", (Even,), {"seed": number})
+    how = settings(
+        max_examples=runs, stateful_step_count=STEPS, deadline=None, database=None, backend="even", derandomize=False,
+        suppress_health_check=list(HealthCheck),
+        phases=[Phase.generate, *([Phase.shrink] if os.environ.get("SWEEP_MACHINE_SEED", "new") != "new" else [])],
+    )  # fmt: skip
+    run_state_machine_as_test(kind, settings=how)
+    print(f"{kind.done} combinations")
+    return kind.done
 
 
 def asked(name: str, usual: int) -> int:
@@ -53,18 +79,18 @@ def asked(name: str, usual: int) -> int:
 
 
 def test_some_combinations() -> None:
-    run_machine(9, 5)
+    assert run_machine(9, 12) > 60
 
 
 @pytest.mark.campaign
 def test_many_combinations(client: Any) -> None:
     """With kills and a cluster."""
-    run_machine(asked("SEED", 1), asked("RUNS", 6), asked("KERNELS", 2), far=True, client=client)
+    run_machine(asked("SEED", 1), asked("RUNS", 12), asked("KERNELS", 2), far=True, client=client)
 
 
 @pytest.mark.browser
 def test_many_combinations_in_the_explorer() -> None:
-    run_machine(asked("SEED", 2), asked("RUNS", 4), browser=True)
+    run_machine(asked("SEED", 2), asked("RUNS", 8), browser=True)
 
 
 # Each refers to what only a user can bring.
@@ -75,7 +101,8 @@ NOT_ALONE = {"model_sha256"}
 def test_each_key_of_a_configuration_is_drawn(path: str) -> None:
     """With a shipped configuration, or with one other choice beside the paper's, some drawn value is accepted."""
     others = [(name, flat) for name, flat in draws.shipped().items()]
-    others += [("paper", draws.shipped()["paper"] | {key: value}) for key, value in draws.choices()]
+    words = [(key, word) for key, field in draws.fields().items() for word in field.get("enum", ())]
+    others += [("paper", draws.shipped()["paper"] | {key: word}) for key, word in words]
     some = (draws.accepted(flat | {path: draws.setting(path, n)}, base) for n in range(9) for base, flat in others)
     assert any(path in flat for flat, _ in some)
 

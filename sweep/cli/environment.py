@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from importlib import import_module
 
 from sweep.cli.faults import refuse
 from sweep.faults import either, refusal
@@ -17,9 +18,18 @@ _ALLOWED = {
 }
 """A pattern of what each may be, and the same in words."""
 
+_POOLS = {"tbb": "numba.np.ufunc.tbbpool", "omp": "numba.np.ufunc.omppool"}
+"""The modules of Numba that need a library which may be missing, by threading layer."""
+
 
 def check() -> None:
     """Raise a `ConfigError` for the first variable that is set to what Numba does not take."""
     for name, (pattern, words) in _ALLOWED.items():
         if (given := os.environ.get(name, "").strip()) and not re.fullmatch(pattern, given):
             refuse(name, refusal(given, words))
+    layer = os.environ.get("NUMBA_THREADING_LAYER", "").strip()
+    if pool := _POOLS.get(layer):
+        try:
+            import_module(pool)
+        except ImportError as error:
+            refuse("NUMBA_THREADING_LAYER", f"{layer} cannot be loaded: {error}; install it, or unset the variable")

@@ -48,6 +48,18 @@ def of_option(option: str, known: Mapping[str, Parameter]) -> Iterator[None]:
         raise ConfigError(list(map(named, error.faults))) from None
 
 
+def _in_options(error: ConfigError, command: click.Command) -> ConfigError:
+    """Name the options of a command in faults of the arguments that they gave."""
+    options = {name: each.opts[0] for each in command.params if isinstance(each, click.Option)
+               for name in (each.name, each.opts[0].lstrip("-"))}  # fmt: skip
+
+    def named(fault: Fault) -> Fault:
+        first, *rest = fault.path or ("",)
+        return fault if fault.file or first not in options else replace(fault, path=(options[str(first)], *rest))
+
+    return ConfigError(map(named, error.faults))
+
+
 @contextmanager
 def needs_bokeh(what: str) -> Iterator[None]:
     """Make a missing Bokeh a fault that tells how to install it."""
@@ -96,6 +108,8 @@ class Commands(click.Group):
             if not _of_user(error):
                 raise
             say(f"{error.filename or 'standard output'}: {error.strerror or error}", err=True)
+        except ConfigError as error:
+            say(str(_in_options(error, self.commands[ctx.invoked_subcommand or ""])), err=True)
         except Refused as error:
             say(str(error), err=True)
         sys.exit(WRONG_INPUT)

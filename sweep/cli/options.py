@@ -78,14 +78,18 @@ announce = partial(say, err=True)
 
 
 def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """The values of `--at` by parameter."""
-    given: dict[str, list[float]] = {}
+    """The values of `--at` by parameter, such as 60 or "12 cm"."""
+    from sweep.config.document import number
+
+    given: dict[str, list[float | str]] = {}
     for text in texts:
-        name = text.partition("=")[0]
+        name, equals, value = text.partition("=")
         if name not in known:
             meant = suggestion(name, known)
             refuse(f"--at {brief(text)}", f"unknown parameter{meant}; the parameters are {', '.join(known)}")
-        given.setdefault(name, []).append(parse_pair(text, "--at")[1])
+        if not (equals and value.strip()):
+            refuse(f"--at {brief(text)}", "must be NAME=VALUE, such as mu=60 or a=12cm")
+        given.setdefault(name, []).append(value if (parsed := number(value)) is None else parsed)
     return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
 
 

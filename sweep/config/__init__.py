@@ -224,7 +224,9 @@ def _parameters(
 ) -> dict[str, Values]:
     """Order the parameters of the model as axes, with defaults; columns of the table and missing ones are left out."""
     found = {}
-    order = dict.fromkeys((*FIRST_AXES, *given, *model.parameters))
+    # Distributions keep the order of the document, in which they are drawn.
+    first = [name for name in FIRST_AXES if not (name in given and given[name].distribution)]
+    order = dict.fromkeys((*first, *given, *model.parameters))
     for name in (name for name in order if name in model.parameters):
         default = None if known[name] in physics.required else known[name].default
         if name in given:

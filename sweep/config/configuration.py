@@ -187,7 +187,8 @@ class Config:
         table = self.table
         # In the order of axes and samples, so that they keep it when the document is read again.
         varying = [name for name, value in self.parameters.items() if value.is_axis or value.distribution]
-        written = [table[name].place[0] for name in varying if name not in FIRST_AXES]
+        kept = [name for name in varying if name not in FIRST_AXES or name in self.distributions]
+        written = [table[name].place[0] for name in kept]
         found: dict[str, Any] = {key: {} for key in (*written, *sections(table))}
         top: dict[str, Any] = {"model_sha256": self.origin.digest} if self.origin else {}
         if self.units != PAPER_UNITS and self.of_rattlebacks:

@@ -15,7 +15,7 @@ import numpy as np
 from sweep.config import tables
 from sweep.config.document import text_of
 from sweep.config.tables import GAPS, SEPARATORS, Table
-from sweep.faults import ConfigError, brief, either, fault_of
+from sweep.faults import ConfigError, brief, counted, either, fault_of
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
 from sweep.units import ANGLE, SPIN, TIME, Unit
@@ -51,6 +51,12 @@ class Film:
     """Which these are, in words."""
     clock: str | None = None
     """The unit of time that the table gives, or "" if it gives none; None for a film that is no table."""
+
+    @property
+    def omitted(self) -> str:
+        """Which rows are left out, in words; "" if none."""
+        verb = "is" if self.left_out == 1 else "are"
+        return f"{counted(self.left_out, 'row')} of the film {verb} left out: {self.why}" if self.left_out else ""
 
     @property
     def errors(self) -> Array:
@@ -145,7 +151,7 @@ def _why(missing: int, gaps: Mapping[int, str], whole: int, every: int) -> str:
     """Say which rows of a film are left out: those of `gaps`, and all but `every` so-manieth of the `whole` ones."""
     example = next((text for text in gaps.values() if text.lower() not in GAPS), "")
     words = (
-        [f"{missing} rows without a number" + (f" (one has '{brief(example, 40)}')" if example else "")]
+        [f"{counted(missing, 'row')} without a number" + (f" (one has '{brief(example, 40)}')" if example else "")]
         if missing
         else []
     )

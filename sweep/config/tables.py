@@ -90,6 +90,10 @@ class Table:
         return [cell if (value := number(cell)) is None else value for cell in cells]
 
 
+Lines = list[tuple[int, list[str]]]
+"""The cells of lines, each with its number."""
+
+
 def read(file: str, text: str) -> Table:
     """Take a table apart: a line of names, perhaps one of units, and rows with a cell for each name.
 
@@ -98,34 +102,50 @@ def read(file: str, text: str) -> Table:
     ConfigError
         if a line has another number of cells than the first, or a column is given two units.
     """
+    separator, ((top, header), *rows) = _lines(file, text)
+    _require_even(file, (top, header), rows, separator)
+    named = [re.fullmatch(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", cell, re.DOTALL) for cell in header]
+    names, units = ([(each[part] or "").strip() if each else "" for each in named] for part in (1, 2))
+    under = top
+    if len(rows) > 1 and _is_of_units(rows[0][1]):
+        under, below = rows.pop(0)
+        units = _united(file, names, (top, units), (under, [cell.strip("()[] ") for cell in below]))
+    return Table(file, separator, top, names, units, under, [line for line, _ in rows], [row for _, row in rows])
+
+
+def _lines(file: str, text: str) -> tuple[str, Lines]:
+    """Divide the lines that are not empty into cells, and find their separator; a `ConfigError` if there are none."""
     try:
         separator = _separator(text)
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True, strict=True)
         lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
     except csv.Error as error:
         raise fault_of(f"not a readable CSV file: {error}", file=file) from None
-    lines = [(line, row) for line, row in lines if len(row) > 1 or any(row)]
-    if not lines:
+    if not (found := [(line, row) for line, row in lines if len(row) > 1 or any(row)]):
         raise fault_of("empty; its first line has to name the columns, such as mu,n0", file=file)
-    (top, header), *rows = lines
-    if ragged := [(line, len(row)) for line, row in rows if len(row) != len(header)]:
-        line, values = ragged[0]
-        words = f"{values} values, but {len(header)} columns in line {top}, with {SEPARATORS[separator]} between them"
-        words += f"; so it is in {len(ragged)} of {len(rows)} rows" if len(ragged) > 1 else ""
-        decimal = "; put semicolons if numbers have decimal commas" if separator == "," and values > len(header) else ""
-        raise fault_of(words + decimal, file=file, line=line)
-    named = [re.fullmatch(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", cell, re.DOTALL) for cell in header]
-    names, units = ([(each[part] or "").strip() if each else "" for each in named] for part in (1, 2))
-    under = top
-    if len(rows) > 1 and _is_of_units(rows[0][1]):
-        under, below = rows.pop(0)
-        below = [cell.strip("()[] ") for cell in below]
-        for column, (unit, own) in enumerate(zip(units, below, strict=True)):
-            if unit and own and unit != own:
-                words = f"is in '{brief(unit, 20)}' in line {top}, and in '{brief(own, 20)}' here; give one unit"
-                raise ConfigError([Fault(file, under, column + 1, (names[column],), words)])
-        units = [unit or own for unit, own in zip(units, below, strict=True)]
-    return Table(file, separator, top, names, units, under, [line for line, _ in rows], [row for _, row in rows])
+    return separator, found
+
+
+def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separator: str) -> None:
+    """Raise a `ConfigError` if a row has another number of cells than the header."""
+    top, columns = header[0], len(header[1])
+    if not (ragged := [(line, len(row)) for line, row in rows if len(row) != columns]):
+        return
+    line, values = ragged[0]
+    words = f"{values} values, but {columns} columns in line {top}, with {SEPARATORS[separator]} between them"
+    words += f"; so it is in {len(ragged)} of {len(rows)} rows" if len(ragged) > 1 else ""
+    words += "; put semicolons if numbers have decimal commas" if separator == "," and values > columns else ""
+    raise fault_of(words, file=file, line=line)
+
+
+def _united(file: str, names: list[str], over: tuple[int, list[str]], under: tuple[int, list[str]]) -> list[str]:
+    """Return the units in the header, `over`, and in the row below it; a `ConfigError` where these differ."""
+    (top, units), (line, below) = over, under
+    for column, (unit, own) in enumerate(zip(units, below, strict=True)):
+        if unit and own and unit != own:
+            words = f"is in '{brief(unit, 20)}' in line {top}, and in '{brief(own, 20)}' here; give one unit"
+            raise ConfigError([Fault(file, line, column + 1, (names[column],), words)])
+    return [unit or own for unit, own in zip(units, below, strict=True)]
 
 
 def _separator(text: str) -> str:

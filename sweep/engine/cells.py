@@ -78,6 +78,12 @@ class Cells:
         """Times in sqrt(c/g) at which the runs have ended, shape (cells,)."""
         return self.kernel.times(self.images, self.rules.t_end)
 
+    @property
+    def inertia(self) -> Array:
+        """The third part of `Model.energy` at the states of these cells, shape (cells,); NaN where one has failed."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.kernel.model.energy(*self.kernel.unpack(self.images))[2])
+
     def take(self, rows: Array, images: Array | None = None) -> Cells:
         """Some of these cells, with their own images, or with others."""
         columns = {name: values[rows] for name, values in self.columns.items()}
@@ -91,4 +97,5 @@ class Cells:
         if not len(self.cells):
             return np.empty((0, len(self.kernel.layout.names)))
         wanted, until = (self.step if step is None else step), (self.rules.t_end if t_end is None else t_end)
-        return self.kernel.images(self.columns, wanted, until, self.stable)
+        with np.errstate(invalid="ignore"):  # a cell may fail within the start-up of a method
+            return self.kernel.images(self.columns, wanted, until, self.stable)

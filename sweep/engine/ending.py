@@ -137,8 +137,7 @@ def settle(cells: Cells, which: Array | bool = True) -> Array:
 
 def _error(cells: Cells) -> tuple[Array, Array]:
     """Relative error of what the slow equations foresee, and the fastest spin that the energy allows, (cells,)."""
-    _, _, inertia = cells.kernel.model.energy(*cells.kernel.unpack(cells.images))
-    fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.images)["energy"], 0) / inertia)
+    fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.images)["energy"], 0) / cells.inertia)
     return np.maximum(_NEGLECTED * bending(cells.columns) * fastest**2, _LEAST), fastest
 
 

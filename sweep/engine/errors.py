@@ -166,8 +166,7 @@ def imbalance(part: Cells) -> Array:
     if "energy_error" not in part.kernel.measure:
         return np.full(len(part.cells), np.inf)
     table = part.kernel.table(part.images)
-    _, _, inertia = part.kernel.model.energy(*part.kernel.unpack(part.images))
-    scale = np.sqrt(2 * inertia * table["energy_start"])
+    scale = np.sqrt(2 * part.inertia * table["energy_start"])
     return np.asarray(np.divide(table["violation"], scale, out=np.zeros(len(scale)), where=scale > 0))
 
 

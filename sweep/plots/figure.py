@@ -64,7 +64,7 @@ _OF_CONSTANTS, _LONGEST = 1 / 13, 90
 _UNIT, _PARAMETER = r"(?<= )\(.*\)$|\S+ = \S+", "[^, ][^,]*"
 """What stays on one line: in a label, brackets at its end, such as its unit, and a value; a constant with its unit."""
 
-_HIGHER = (1.0, 1.25, 1.6, 2.0, 2.5)
+_HIGHER = (1.25, 1.6, 2.0, 2.5)
 """How many times as high a figure becomes at most whose width alone is asked for."""
 
 _SPARE = 0.97
@@ -72,6 +72,9 @@ _SPARE = 0.97
 
 _LEAST = 2.1
 """Inches of a map across, at least."""
+
+_NARROWEST = 0.1
+"""Inches of a panel across on a page without room, which is found too small once it is drawn."""
 
 
 def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
@@ -172,7 +175,12 @@ class Picture(Figure):
     def has_room(self, *, taller: bool) -> bool:
         """Tell whether the panels have room, perhaps after the figure has become higher."""
         wide, high = self.get_size_inches()
-        return any(self._holds(wide, factor * high) for factor in (_HIGHER if taller else (1.0,)))
+        if self._holds(wide, high):
+            return True
+        # What has no room in the highest figure has none in a lower one.
+        if not taller or not self._holds(wide, _HIGHER[-1] * high):
+            return False
+        return any(self._holds(wide, factor * high) for factor in _HIGHER)
 
     def _holds(self, wide: float, high: float) -> bool:
         """Give the figure this size in inches, and tell whether its panels have room."""
@@ -255,7 +263,7 @@ def panel_width(columns: int, widest: float, around: float) -> float:
     ----------
     around : inches across of what stands around the panels
     """
-    width = (page() - around) / columns
+    width = max((page() - around) / columns, _NARROWEST)
     return width if is_asked() else min(width, widest)
 
 

@@ -17,6 +17,7 @@ from sweep.config.document import is_number, plain_data
 from sweep.faults import fault_of
 from sweep.plots import labels
 from sweep.plots.quantities import COMPARISONS, derivable, field, first_picture, subject
+from sweep.results.kind import odd_axis
 
 MAX_PANELS = 8
 """Panels that a figure may have."""
@@ -131,11 +132,11 @@ def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:
     """Raise a `ConfigError` if a variable cannot be drawn over these dimensions."""
     if name == "probability" and "count" not in dataset.coords:
         raise fault_of("the probabilities have lost their axis count; reduce the dataset along other axes", "variable")
+    if odd := odd_axis(dataset, dims):
+        raise fault_of(odd)
     for d in dims:
-        if not dataset.sizes[d]:
-            raise fault_of(f"{name} has no cells: the axis {d} is empty; select at least one value")
         if dataset[d].dtype.kind not in "fiub" or not np.isfinite(dataset[d].values).all():
-            raise fault_of(f"the values of the axis {d} are not finite numbers; unstack it, or give it numbers")
+            raise fault_of(f"the values of the axis {d} are not finite numbers; give it numbers")
 
 
 def indices(dataset: xr.Dataset, dims: list[str]) -> list[Panel]:

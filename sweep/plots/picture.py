@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from functools import partial
-from itertools import count
-from math import ceil
+from math import ceil, isfinite
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,7 +16,8 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sweep.faults import fault_of
+from sweep.config.document import is_number, plain_data
+from sweep.faults import fault_of, refusal
 from sweep.plots import (
     boundaries,
     critical,
@@ -35,7 +36,7 @@ from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
 from sweep.results.dataset import VARIABLES
-from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, Kind, kind
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, Kind, kind, require_whole
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 from sweep.units import LENGTH, quantity
@@ -48,15 +49,14 @@ _NARROWEST, _WIDEST = 0.05, 1.0
 _GROWTH = 1.15
 """Steps in which the size is sought that has room."""
 
-_OWN: dict[Kind, tuple[Callable[[xr.Dataset], Picture], tuple[str, ...], tuple[str, ...]]] = {
-    TRAJECTORY: (trajectories.draw, ("spin",), ("trajectory", "time")),
-    CRITICAL: (critical.draw, ("critical_reason",), ()),
-    BOUNDARIES: (boundaries.draw, ("level", "curve", "closed", "outcome", "x", "y"), ("point",)),
-    FIT: (fit.draw, ("seen", "fitted"), ("time",)),
-    INDICES: (indices.draw, ("first_order", "total_order"), ("quantity", "parameter")),
+_OWN: dict[Kind, Callable[[xr.Dataset], Picture]] = {
+    TRAJECTORY: trajectories.draw,
+    CRITICAL: critical.draw,
+    BOUNDARIES: boundaries.draw,
+    FIT: fit.draw,
+    INDICES: indices.draw,
 }
-"""How the kinds of dataset are drawn that are not drawn as maps or curves, and what each needs: variables and
-attributes, and the axes of the first of these."""
+"""How the kinds of dataset are drawn that are not drawn as maps or curves."""
 
 
 def plot(
@@ -103,10 +103,10 @@ def plot(
     Raises
     ------
     ConfigError
-        if the dataset has no such variable or axis, has lost what the picture needs, would need too many panels, or
-        there is no such format or width; if the size is too small.  With `ax`, if there are several panels.
+        if the dataset has no such variable or axis, would need too many panels, or there is no such format or width; if
+        the size is too small.  With `ax`, if there are several panels.
     StoreError
-        if the file is not a dataset, or `output` cannot be written.
+        if the file is not a dataset, if the dataset has lost what its figure needs, or `output` cannot be written.
 
     Examples
     --------
@@ -116,8 +116,12 @@ def plot(
     """
     if output is not None and suffix(Path(output)) not in PICTURES:
         raise fault_of(f"{output}: unknown format; write a {A_PICTURE}", "output")
-    if limits is not None and not limits[0] < limits[1]:
-        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give a lower and a higher number", "limits")
+    if limits is not None and not (_is_pair(limits) and limits[0] < limits[1]):
+        raise fault_of(refusal(limits, "a lower and a higher finite number, such as (0, 5)"), "limits")
+    if figsize is not None and not (_is_pair(figsize) and min(figsize) > 0):
+        raise fault_of(refusal(figsize, "a width and a height in inches, such as (6, 4)"), "figsize")
+    if sel is not None and not isinstance(sel, Mapping):
+        raise fault_of(refusal(sel, "values by axis, such as {'n0': 0.05}"), "sel")
     if cmap is not None:
         scales.colour_map(cmap)  # raises if there is none
     if variable is None and isinstance(dataset, xr.DataArray):
@@ -155,9 +159,8 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
         options = {"variable": variable if found != TRAJECTORY else None, **axes, **how}
         if given := [name for name, value in options.items() if value]:
             raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
-        draw, needs, axes_of_first = _OWN[found]
-        _require_whole(dataset, found, needs, axes_of_first)
-        return draw(dataset) if variable is None else trajectories.draw(dataset, variable)
+        require_whole(dataset)
+        return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
     chosen = panels.choose(dataset, variable, **axes)
     _require_scale(chosen, **how)
     if len(chosen.across) == 2:
@@ -194,7 +197,10 @@ def _of_size(
     figure, room = of(1.0)
     if room:
         return figure
-    scale = next(scale for k in count(1) if of(scale := _GROWTH**k)[1])
+    enough = 1
+    while not of(_GROWTH**enough)[1]:
+        enough *= 2
+    scale = _GROWTH ** bisect_left(range(enough), True, enough // 2 + 1, key=lambda k: of(_GROWTH**k)[1])
     wide = across or float(mpl.rcParams["figure.figsize"][0])
     told, needed = (
         f"{size[0] * by:.3g} × {size[1] * by:.3g} inches" if size else f"{ceil(wide * by * 25.4 - 1e-6)}mm"
@@ -202,18 +208,6 @@ def _of_size(
     )
     words = f"{told} is too small for this figure; give {needed}, or choose a smaller text"
     raise fault_of(words, "figsize" if size else "width" if across else "figure.figsize")
-
-
-def _require_whole(dataset: xr.Dataset, found: Kind, needs: tuple[str, ...], dims: tuple[str, ...]) -> None:
-    """Raise a `ConfigError` if a dataset of this kind has lost what its picture needs."""
-    words = f"draw {found.words} as the command {found.name} writes them"
-    if missing := [name for name in needs if name not in {*dataset.variables, *dataset.attrs}]:
-        raise fault_of(f"the dataset has no {', '.join(missing)}; {words}")
-    there = dataset[needs[0]].dims
-    if dims and set(there) != set(dims):
-        raise fault_of(f"the axes of {needs[0]} are {', '.join(map(str, there)) or 'lost'}; {words}")
-    if found != BOUNDARIES and (empty := [str(d) for d in dims if not dataset.sizes[d]]):
-        raise fault_of(f"the axis {empty[0]} is empty; {words}")
 
 
 def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> None:
@@ -246,9 +240,15 @@ def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None) -> list[
     return draw(chosen, frames, limits)
 
 
+def _is_pair(given: Any) -> bool:
+    """Tell whether an argument is two finite numbers."""
+    there = plain_data(given)
+    return isinstance(there, list) and len(there) == 2 and all(is_number(n) and isfinite(n) for n in there)
+
+
 def inches(width: str) -> float:
     """Return a length such as "85mm" in inches; `ConfigError` if it is none, or none for a figure."""
-    length, error = quantity(width, LENGTH) or (0.0, 0.0)
+    length, error = quantity(str(width), LENGTH) or (0.0, 0.0)
     if error or not _NARROWEST <= length <= _WIDEST:
         span = f"between {_NARROWEST * 1e3:g} and {_WIDEST * 1e3:g} mm"
         raise fault_of(f"{width}; give a length {span} with its unit, such as 85mm, 8.5cm or 3.3in", "width")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from numbers import Number
 from pathlib import Path
@@ -124,10 +124,8 @@ def fault(dataset: xr.Dataset) -> str:
         return "not a dataset of sweep: no variable of it, such as status"
     if odd := _foreign(dataset):
         return f"{odd}; another program wrote or changed it"
-    if empty := [dim for dim, size in dataset.sizes.items() if not size and dim not in _MAY_BE_EMPTY]:
-        return f"the axis {empty[0]} has no values; select at least one"
-    if stacked := [name for name, index in dataset.indexes.items() if index.nlevels > 1]:
-        return f"the axis {stacked[0]} is stacked; unstack it"
+    if odd := odd_axis(dataset, (dim for dim in dataset.sizes if dim not in _MAY_BE_EMPTY)):
+        return odd
     needs, there = _needs(dataset, found), {name: {*variable.dims} for name, variable in dataset.variables.items()}
     lacks = [f"the variable {name}" for name in needs if name not in there]
     lacks += [f"the attribute {name}" for name in found.attributes if name not in dataset.attrs]
@@ -141,6 +139,16 @@ def fault(dataset: xr.Dataset) -> str:
     words = [*(f"the further axis {dim}; select one of its values" for dim in further),
              *(f"no whole numbers in {name}: it was averaged" for name in averaged)]  # fmt: skip
     return f"has {words[0]}" if words else ""
+
+
+def odd_axis(dataset: xr.Dataset, dims: Iterable[Hashable]) -> str:
+    """Say which of these dimensions has no values, or is stacked; "" if none."""
+    for dim in dims:
+        if not dataset.sizes[dim]:
+            return f"the axis {dim} has no values; select at least one"
+        if dim in dataset.indexes and dataset.indexes[dim].nlevels > 1:
+            return f"the axis {dim} is stacked; unstack it"
+    return ""
 
 
 def _foreign(dataset: xr.Dataset) -> str:

@@ -55,9 +55,8 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
     long = [name for name, values in config.axes.items() if len(values) > 1]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in long:
-            raise fault_of(
-                f"{option}: {name} is no axis of more than one value; the axes are {', '.join(long) or 'none'}"
-            )
+            words = f"{name} is not an axis of more than one value; the axes are {', '.join(long) or 'none'}"
+            raise fault_of(words, option)
     rest = (name for name in long if name not in (x, y))
     up = y or next(rest, None)
     right = x or next(rest, None)

@@ -79,8 +79,8 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
     if reason := unlike(config, film):
         raise fault_of(f"the film {reason}")
     began = time.perf_counter()
-    if film.left_out:
-        note(f"{film.left_out} rows of the film are left out: {film.why}")
+    if film.omitted:
+        note(film.omitted)
     ranges = {name: theirs.get(name) or _range(config, name) for name in free}
     if len(ranges) >= len(film.time):
         raise fault_of(f"{len(ranges)} parameters are free, and the film has {len(film.time)} rows; free fewer")

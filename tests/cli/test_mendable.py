@@ -13,6 +13,7 @@ from support import ROOT, Write
 from support.cli import invoke, refused
 
 import sweep
+from sweep.cli import environment
 from sweep.results.writing import replacing
 
 TEXT = "name: quick\nmodel: averaged\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
@@ -77,6 +78,12 @@ def test_nonsense_in_the_environment_is_a_line(name: str, monkeypatch: pytest.Mo
         refused(invoke("examples"), f"{name}: must be ", f"not '{value}'")
     monkeypatch.setenv(name, "")
     assert invoke("examples").exit_code == 0
+
+
+def test_a_threading_layer_whose_library_is_missing_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(environment._POOLS, "tbb", "no_such_module")
+    monkeypatch.setenv("NUMBA_THREADING_LAYER", "tbb")
+    refused(invoke("examples"), "NUMBA_THREADING_LAYER: tbb cannot be loaded: No module named", "unset the variable")
 
 
 def test_a_backend_that_is_not_installed_is_not_asked_for(file: Path) -> None:

@@ -32,19 +32,29 @@ MEANT = {
     "trajectory c.yaml --at mu=-3 --dry-run": "--at mu: must be a finite number >= 0 and < 1e+12, not -3",
     "trajectory c.yaml --at mu=3 --at mu=-3": "--at mu[1]: must be a finite number >= 0",
     "run c.yaml --set mu=20..60:0": "--set mu.num: must be a whole number >= 1 and <= 1000000, not 0",
+    "trajectory c.yaml --at mu=": "--at mu=: must be NAME=VALUE, such as mu=60 or a=12cm",
+    "trajectory c.yaml --at a=12cm": "--at a: is in c here; give the number without cm, or set units: SI",
+    "boundaries c.yaml --set n0=[0.02,0.05] --x q": "--x: q is not an axis of more than one value; the axes are mu, n0",
+    "plot d.nc --var reversls": "--var: there is no variable reversls (did you mean reversals?)",
+    "plot d.nc --sel n9=1": "--sel: there is no axis n9; the axes are mu",
+    "plot d.nc --var status --limits 0..3": "--limits: status is drawn as ",
+    "plot d.nc --width 3": "--width: 3; give a length",
     "run c.yaml --set mu": "--set mu: not a setting; write PATH=VALUE, such as friction.mu=60",
     "run c.yaml --set friction.mu=[": "not YAML",
     "run c.yaml --set name.first=3": "--set name.first: name is a value, not a section; name a key such as friction.mu",
     "run c.yaml --set mu=1..2:100000 --set n0=1..2:100000": "0 cells are too many",
     "critical c.yaml --set x0=[0.01,0.02]": "--set x0: cannot be an axis of critical spins; give one number",
     "critical c.yaml --set model=analytic": "the analytic model is a formula and cannot be simulated; choose slip",
-    "trajectory c.yaml --at mu": "NAME=NUMBER",
+    "trajectory c.yaml --at mu": "--at mu: must be NAME=VALUE",
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("command", MEANT)
 def test_a_refusal_says_what_may_be_meant(command: str, write: Write, tmp_path: Path) -> None:
-    result = invoke(*command.replace("c.yaml", f"{write(TEXT)} --output {tmp_path / 'out'}").split())
+    if "d.nc" in command:
+        sweep.run(write(TEXT)).to_netcdf(tmp_path / "d.nc")
+    files = {"c.yaml": f"{write(TEXT)} --output {tmp_path / 'out'}", "d.nc": str(tmp_path / "d.nc")}
+    result = invoke(*" ".join(files.get(word, word) for word in command.split()).split())
     assert (result.exit_code, MEANT[command] in result.stderr) == (2, True), result.output
     assert "Usage: " in result.stderr or len(result.stderr.splitlines()) == 1
     assert not (tmp_path / "out").exists()

@@ -154,12 +154,15 @@ def test_what_the_numbers_of_a_paraboloid_mean(read: Read) -> None:
 
 GRAVITY = STONE.replace("gravity: 9.81\n", "") + "gravity: [9.8, 9.9]\n"
 UNCERTAIN = "start: {x0: {uniform: [0, 0.02]}}\nbody: {c: {normal: [1, 0.01]}}\nfriction: {mu: 60}\nsamples: 4\n"
+FIRST = (
+    "start: {x0: {uniform: [0, 0.02]}, n0: {uniform: [0.05, 0.06]}}\nfriction: {mu: {uniform: [50, 60]}}\nsamples: 4\n"
+)
 
 
 @pytest.mark.parametrize(
     "text",
-    [SMALL, STONE, BOWL, GRAVITY.replace("sigma: 1.0e-4", "sigma: [0, 1.0e-4]"), UNCERTAIN],
-    ids=["paper", "ellipsoid", "paraboloid", "axis of gravity", "samples"],
+    [SMALL, STONE, BOWL, GRAVITY.replace("sigma: 1.0e-4", "sigma: [0, 1.0e-4]"), UNCERTAIN, FIRST],
+    ids=["paper", "ellipsoid", "paraboloid", "axis of gravity", "samples", "samples of what would be the first axes"],
 )
 def test_it_survives_its_own_document(text: str, read: Read) -> None:
     config = read(text)

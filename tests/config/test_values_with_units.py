@@ -55,6 +55,14 @@ def test_a_trajectory_is_asked_for_in_any_unit(write: Write) -> None:
         sweep.trajectory(write(SMALL), b="3 cm")
 
 
+def test_the_command_line_takes_them_too(write: Write, tmp_path: Path) -> None:
+    line = ["trajectory", write(STONE), "--set", "t_end=0.1", "--output", tmp_path, "--quiet"]
+    assert invoke(*line, "--at", "c=2 cm", "--at", "c=25mm").exit_code == 0
+    (file,) = tmp_path.glob("*_trajectory.nc")
+    assert sweep.open(file)["c"].values == pytest.approx([0.02, 0.025])
+    refused(invoke("trajectory", write(SMALL), "--at", "b=3cm"), "--at b: is in c here; give the number without cm")
+
+
 def small(old: str, new: str) -> str:
     assert old in SMALL
     return SMALL.replace(old, new)

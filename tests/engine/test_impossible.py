@@ -14,7 +14,7 @@ from sweep import ConfigError
 from sweep.config import load_config
 from sweep.engine import local
 from sweep.engine.estimate import estimate
-from sweep.kernels.status import IMPOSSIBLE
+from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.plots.marks import BLANK, legend, marks
 from sweep.results.summary import describe, failed_fraction
 
@@ -153,6 +153,13 @@ def test_no_number_is_made_up_for_a_body_that_cannot_be(write: Write, change: di
     predicted = sweep.predict(config)["n_c1_plus_linear"].values
     np.testing.assert_array_equal(np.isnan(predicted), [False, True])
     assert sweep.run(config)["status"].values.tolist() == [2, IMPOSSIBLE]
+
+
+def test_a_body_that_fails_within_the_start_up_of_a_method_gives_no_warning() -> None:
+    """Half as long as it is high, it topples at once."""
+    cases = {"a": [0.1225, 9.01, 0.1], "n0": [0.025, 0.025, 0.05]}
+    found = sweep.run({"friction": {"mu": 60}, "cases": cases, "integrator": {"method": "adams", "t_end": 300}})
+    assert np.isin(found.status, FAILURES).tolist() == [True, False, True]
 
 
 def test_a_fixed_step_is_judged_by_the_bodies_that_there_are(write: Write) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import Write, adaptive, columns
 from support.cli import invoke
-from support.runs import same_numbers
+from support.runs import Heard, same_numbers
 
 import sweep
 from sweep.config import ConfigError
@@ -73,6 +73,13 @@ def test_a_run_that_fails_has_none(config: Path) -> None:
     found = sweep.run(config, n0=[0.05, 5.0], mu=60, step="auto")
     assert found.status.values.ravel().tolist() == [TIME_LIMIT, LIFT_OFF]
     assert np.isfinite(found.misfit).values.ravel().tolist() == [True, False]
+
+
+def test_a_run_says_which_rows_of_the_film_are_left_out(write: Write, config: Path) -> None:
+    film(write, np.linspace(0, 150, 301)).open("a", encoding="utf-8").write("151,,0.01\n")
+    heard = Heard()
+    sweep.run(config, reporter=heard)
+    assert heard.notes == ["1 row of the film is left out: 1 row without a number"]
 
 
 def test_workers_get_the_film(config: Path, client: distributed.Client) -> None:

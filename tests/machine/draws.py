@@ -6,8 +6,9 @@ A draw is a name and a small number, which together give a value, so that Hypoth
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
+from itertools import product
 from random import Random
 from typing import Any
 
@@ -26,6 +27,7 @@ from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.plots.quantities import DERIVED, check_pictures
 from sweep.results.dataset import VARIABLES
+from sweep.units import PAPER_UNITS
 
 Flat = dict[str, Any]
 """A configuration: values by path."""
@@ -35,13 +37,10 @@ Draws = list[tuple[str, int]]
 PHYSICAL = {parameter.path: parameter for parameter in PARAMETERS.values()}
 
 
-def draws(names: Mapping[str, Any] | list[str], most: int = 5) -> st.SearchStrategy[Draws]:
+def draws(names: Iterable[str], most: int, least: int = 0) -> st.SearchStrategy[Draws]:
     """Some of the names, each with a number for its value."""
-    return (
-        st.just([])
-        if not names
-        else st.lists(st.tuples(st.sampled_from(sorted(names)), st.integers(0, 999)), max_size=most)
-    )
+    each = st.tuples(st.sampled_from(sorted(names)), st.integers(0, 999))
+    return st.lists(each, min_size=least, max_size=most, unique_by=lambda drawn: drawn[0]) if names else st.just([])
 
 
 def flattened(document: Mapping[str, Any]) -> Flat:
@@ -82,32 +81,32 @@ def shipped() -> dict[str, Flat]:
 
 
 @cache
-def _known(path: str) -> list[float]:
-    numbers = [number for flat in shipped().values() for number in _numbers(flat.get(path, []))]
+def _known(path: str, units: str) -> list[float]:
+    of_units = [flat for flat in shipped().values() if flat.get("units", PAPER_UNITS) == units]
+    numbers = [number for flat in of_units for number in _numbers(flat.get(path, []))]
     return [number for number in numbers if isinstance(number, int | float)]
 
 
-def _physical(parameter: Parameter, random: Random) -> Any:
+def _physical(parameter: Parameter, random: Random, units: str) -> Any:
     """A number, an axis, a range or a distribution; near what a shipped configuration says of it, or anything."""
-    known = _known(parameter.path) or [
-        n for p in PHYSICAL.values() if p.units == parameter.units for n in _known(p.path)
-    ]
-    known = known or [0.01, 0.3, 1.0]
+    alike = [each.path for each in PHYSICAL.values() if each.units == parameter.units]
+    known = _known(parameter.path, units) or [n for path in alike for n in _known(path, units)] or [0.01, 0.3, 1.0]
 
     def number(_: int) -> float:
         near = random.choice(known) * random.choice((1, 1, 0.5, 0.9, 1.1, 2, -1)) + random.choice((0, 0, 0, 0.01))
         return float(f"{next(n for n in (near, abs(near), known[0], 0.5) if parameter.allows(n)):.4g}")
 
-    values = sorted(set(map(number, range(random.choice((2, 3))))))
-    if (form := random.randrange(9)) < 4 or len(values) < 2:
-        return values[0]
-    if form < 6:
+    values = sorted(set(map(number, range(random.choice((1, 2, 3))))))
+    form = random.choice(("number", "list", "list", "range", "distribution"))
+    if form == "list":
         return random.sample(values, len(values))
-    if form == 6:
-        return {"start": values[0], "stop": values[-1], "num": random.choice((1, 2, 3, 5)),
+    if form == "range":
+        return {"start": values[0], "stop": values[-1], "num": random.choice((1, 2, 3, 6)),
                 "spacing": random.choice(("linear", "log"))}  # fmt: skip
+    if form == "number":
+        return values[0]
     family = random.choice(sorted(FAMILIES))
-    return {family: [values[0], values[-1] if family == "uniform" else abs(values[0]) / 10 or 0.1]}
+    return {family: [values[0], 1.1 * values[0] if family == "uniform" else abs(values[0]) / 10 or 0.1]}
 
 
 def _of_schema(field: Mapping[str, Any], random: Random) -> Any:
@@ -133,7 +132,10 @@ def _measure(random: Random) -> Any:
 
 def _cases(random: Random) -> Any:
     names = random.sample(["n0", "mu", "b", random.choice(sorted(PARAMETERS))], random.choice((1, 2)))
-    return {name: [v for _ in range(3) for v in _numbers(_physical(PARAMETERS[name], random))][:3] for name in names}
+    return {
+        name: [v for _ in range(3) for v in _numbers(_physical(PARAMETERS[name], random, PAPER_UNITS))][:3]
+        for name in names
+    }
 
 
 SPECIAL = {
@@ -151,24 +153,23 @@ SPECIAL = {
 
 
 @cache
-def _fields() -> dict[str, Any]:
+def fields() -> dict[str, Any]:
     schema = schema_of(None).model_json_schema()
     sections = {key: schema["$defs"][value["$ref"].rpartition("/")[2]]["properties"]
                 for key, value in schema["properties"].items() if "$ref" in value}  # fmt: skip
     return flattened(sections) | {key: v for key, v in schema["properties"].items() if key not in sections}
 
 
-def choices() -> list[tuple[str, str]]:
-    """Keys that have one of several words, and each of these: laws, models, surfaces, units, methods."""
-    return [(path, word) for path, field in _fields().items() for word in field.get("enum", ())]
+OTHERWISE = [path for path in fields() if path in PATHS and path not in PHYSICAL and path != "model_sha256"]
+"""Keys of what is not physical: each counts as much as all parameters together, which are alike."""
 
 
-def setting(path: str, number: int) -> Any:
+def setting(path: str, number: int, units: str = PAPER_UNITS) -> Any:
     """The value of a key of a configuration that belongs to a number."""
     random = Random(f"{path} {number}")
     if path in PHYSICAL:
-        return _physical(PHYSICAL[path], random)
-    return SPECIAL[path](random) if path in SPECIAL else _of_schema(_fields()[path], random)
+        return _physical(PHYSICAL[path], random, units)
+    return SPECIAL[path](random) if path in SPECIAL else _of_schema(fields()[path], random)
 
 
 def accepted(flat: Flat, base: str = "paper") -> tuple[Flat, Config]:
@@ -200,11 +201,19 @@ def in_yaml(flat: Flat) -> str:
 Piece = tuple[str, str, tuple[str, ...]]
 """Method, model and specs of measurements."""
 
+MOST_CELLS, MOST_STEPS = 40, 5e5
+"""Of a run; a fraction of a second."""
+
 
 def kernels(config: Config) -> set[Piece]:
     """What a run of the configuration may need."""
     methods = allowed(config.equations) if config.integrator.method == AUTO else [config.integrator.method]
     return {(method, config.tier.name, compiled(config.measure)) for method in methods}
+
+
+def compiled(specs: Iterable[str]) -> tuple[str, ...]:
+    """Those of the measurements that are made in a kernel."""
+    return tuple(each.spec for each in chosen(specs) if each.in_kernel)
 
 
 def steps(config: Config) -> float:
@@ -216,30 +225,61 @@ def steps(config: Config) -> float:
     return float((integrator.t_end / (step if integrator.step == "auto" else integrator.step + 0 * step)).sum())
 
 
-def compiled(specs: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of the measurements that are made in a kernel."""
-    return tuple(each.spec for each in chosen(specs) if each.in_kernel)
+def affordable(config: Config, pool: set[Piece]) -> bool:
+    """Whether it takes little time, and no kernel beyond the pool, to run a configuration."""
+    small = config.simulated and config.grid.size <= MOST_CELLS and kernels(config) <= pool
+    return small and steps(config) <= MOST_STEPS
 
 
-def further(random: Random) -> Iterator[Piece]:
-    """Kernels of configurations that are drawn, each once."""
-    seen: set[Piece] = set()
-    while True:
-        base = random.choice(sorted(shipped()))
-        drawn = {path: setting(path, random.randrange(1000)) for path in random.sample(sorted(PATHS), 4)}
-        _, config = accepted(shipped()[base] | drawn, base)
-        if config.simulated and not config.film:
-            new = kernels(config) - seen
-            seen |= new
-            yield from sorted(new)
+def bases(pool: set[Piece]) -> list[Flat]:
+    """The shipped configurations, of any model and method, with what the kernels of a pool measure."""
+    found = []
+    for flat, model in product(shipped().values(), TIERS):
+        there, config = accepted(flat | {"model": model})
+        unit = 1.0 if config.units == PAPER_UNITS else float(np.sqrt(config.grid.columns()["c"].max() / 9.8))
+        for method, name, specs in sorted({(AUTO, *piece[1:]) for piece in pool} | pool):
+            of_pool = {"measure": written(specs), "integrator.method": method, "integrator.t_end": round(300 * unit, 1)}
+            if (model, name) == (config.model, config.tier.name):
+                ours, config = accepted(there | of_pool)
+                if kernels(config) <= pool:
+                    found.append(ours)
+    return found
 
 
-def in_pool(flat: Flat, base: str, pool: list[Piece], number: int) -> tuple[Flat, Config]:
-    """The configuration with a method and measurements of the pool, if its model is there and others are asked for."""
-    flat, config = accepted(flat, base)
-    of_model = [piece for piece in pool if piece[1] == config.tier.name]
-    if config.simulated and of_model and not kernels(config) <= {*pool}:
-        method, _, specs = of_model[number % len(of_model)]
-        measure = [{name: int(n)} if n else name for name, _, n in (spec.partition("=") for spec in specs)]
-        flat, config = accepted(flat | {"measure": measure, "integrator.method": method}, base)
+def scene(base: Flat, changes: Draws, pool: set[Piece]) -> tuple[Flat, Config]:
+    """A configuration with each change that the kernels of the pool can run, and no more cells or steps than usual."""
+    flat, config = accepted(base)
+    for path, number in changes:
+        own = [config.table[name].path for name in config.tier.parameters]
+        if path in PHYSICAL and path not in own and number % 4:  # one of another body
+            path = own[number % len(own)]
+        changed, new = accepted(flat | {path: setting(path, number, config.units)})
+        if new.samples and new.samples > 5:  # as many as by default
+            changed, new = accepted(changed | {"samples": 2 + number % 3})
+        if path in changed and new.simulated and kernels(new) <= pool:
+            flat, config = changed, new
+    while config.grid.size > MOST_CELLS:
+        axis = min(
+            (name for name in config.axes if len(config.axes[name]) > 1), key=lambda name: len(config.axes[name])
+        )
+        flat, config = accepted(flat | {config.table[axis].path: list(config.axes[axis][:-1])})
+    if (all_ := steps(config)) > MOST_STEPS:
+        flat, config = accepted(
+            flat | {"integrator.t_end": float(f"{config.integrator.t_end * MOST_STEPS / all_:.2g}")}
+        )
     return flat, config
+
+
+def written(specs: Iterable[str]) -> list[Any]:
+    """Measurements as a configuration names them."""
+    return [{kind: int(n)} if n else kind for kind, _, n in (spec.partition("=") for spec in specs)]
+
+
+def further(random: Random) -> Iterator[set[Piece]]:
+    """Kernels of configurations that are drawn."""
+    while True:
+        base = shipped()[random.choice(sorted(shipped()))]
+        drawn = {path: setting(path, random.randrange(1000)) for path in random.sample(sorted(PATHS), 4)}
+        _, config = accepted(base | drawn)
+        if config.simulated and not config.film:
+            yield kernels(config)

@@ -1,16 +1,17 @@
-"""The machine draws configurations and runs them, does with datasets what users do, and asks what must hold."""
+"""The machine runs a configuration that was drawn, does with it what users do, and asks what must hold."""
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
-from operator import attrgetter
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -23,9 +24,9 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 from fuzzing import Violation, check_refusal
-from hypothesis import note
+from hypothesis import event, note
 from hypothesis import strategies as st
-from hypothesis.stateful import Bundle, RuleBasedStateMachine, initialize, multiple, precondition, rule
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from matplotlib.figure import Figure
 from support.runs import Stop, same_numbers
 
@@ -38,18 +39,18 @@ from sweep.config.document import parse_value
 from sweep.faults import Refused
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT
 from sweep.plots.formats import PICTURES
-from sweep.results.kind import kind
+from sweep.results.kind import RUN, kind, require_whole
 from sweep.results.summary import contents, describe
 from sweep.units import PAPER_UNITS
 
 NUMBER = st.integers(0, 999)
-KEYS = [*draws.PATHS, *3 * [path for path, _ in draws.choices()]]
-"""The choice of a law or a model decides what else belongs to a configuration, and is drawn more often."""
-BASE = st.sampled_from(sorted(draws.shipped()))
-MOST_STEPS = 3e6
-"""Of all cells of a run together; a second or two."""
+CHANGES = st.tuples(draws.draws(draws.PHYSICAL, 5, 2), draws.draws(draws.OTHERWISE, 5, 2)).map(
+    lambda two: two[0] + two[1]
+)
+PICTURE = draws.draws(words.TAKEN["plot"], 4)
 REPEATED = ["integrator.t_end", "integrator.tolerance"]
 NUMBERS = ("status", "reversals", "t_stop", "spin_final", "t_last_reversal", "margin", "decided")
+STUDIES = ("boundaries", "critical", "indices")
 
 
 @dataclass(frozen=True)
@@ -61,24 +62,7 @@ class Scene:
 
     def with_(self, changes: Flat, *without: str) -> dict[str, Any]:
         """What its file would say with some keys changed, and others left out."""
-        kept = {path: value for path, value in self.flat.items() if path not in without}
-        return draws.nested(kept | changes)
-
-
-@dataclass(frozen=True)
-class Found:
-    """A dataset, perhaps with the configuration that it is of."""
-
-    dataset: xr.Dataset
-    scene: Any = None
-    """The `Scene`, or None."""
-    ran: bool = False
-    """Whether it is the run of that configuration, and no part or prediction of it."""
-
-    @property
-    def compared(self) -> bool:
-        """Whether each cell was simulated, so that it can be elsewhere too."""
-        return self.ran and self.scene.config.simulated and not self.scene.config.refine
+        return draws.nested({path: value for path, value in self.flat.items() if path not in without} | changes)
 
 
 def nothing_drawn(really: bool = True) -> Any:
@@ -94,21 +78,20 @@ class Logged(logging.Handler):
 
 
 class Machine(RuleBasedStateMachine):
-    """Each rule is a combination of features: a configuration that was drawn, and something done with it."""
+    """Each example has one configuration, and each of its rules is a combination: something that is done with it."""
 
-    pool: ClassVar[list[Piece]] = []
+    pool: ClassVar[set[Piece]] = set()
     """The kernels that may be run."""
+    bases: ClassVar[list[Flat]] = []
+    """The configurations that are changed."""
     far: ClassVar[bool] = False
-    """Whether kills, fits and animations are drawn, which take seconds, and runs to the default t_end."""
+    """Whether kills, fits and animations are drawn, which take seconds."""
     client: ClassVar[Any] = None
     """Of a dask cluster, if cells are to be run there too."""
     browser: ClassVar[bool] = False
     """Whether documents of the explorer are built."""
     done: ClassVar[int] = 0
     """Combinations so far."""
-
-    scenes, datasets = Bundle("scenes"), Bundle("datasets")
-    SCENE = scenes.map(attrgetter("scene"))
 
     def __init__(self) -> None:
         super().__init__()
@@ -123,62 +106,22 @@ class Machine(RuleBasedStateMachine):
             logging.getLogger(name).removeHandler(self._logged)
         self._temporary.cleanup()
 
+    @invariant()
+    def count(self) -> None:
+        type(self).done += 1
+
     def ask(self, what: str, call: Callable[[], Any], *files: str) -> Any:
         """What `call` returns; None if it refuses in lines that help.  Anything else is a fault."""
-        type(self).done += 1
         note(f"# {what}")
         try:
             return call()
         except Refused as error:
             check_refusal(error, *files, "")
+            event(f"refused: {what}")
             return None
 
     def _new(self, name: str = "") -> Path:
         return Path(os.path.join(self.folder, f"{len(os.listdir(self.folder))}{name}"))
-
-    # ---- configurations and their runs
-
-    @initialize(targets=(scenes, datasets), base=BASE, changes=draws.draws(KEYS), number=NUMBER)
-    def begin(self, base: str, changes: Draws, number: int) -> Found:
-        return self._configured(base, changes, number)
-
-    @rule(targets=(scenes, datasets), base=BASE, changes=draws.draws(KEYS), number=NUMBER)
-    def configure(self, base: str, changes: Draws, number: int) -> Found:
-        """Draw a configuration that is the same when it is read again, and predict, estimate and run it."""
-        return self._configured(base, changes, number)
-
-    def _configured(self, base: str, changes: Draws, number: int) -> Found:
-        scene = self._scene(base, changes, number)
-        while not self._affordable(scene.config) and number % 8 != 1 and (changes or base != "paper"):
-            base, changes = base if changes else "paper", changes[1:]
-            scene = self._scene(base, changes, number)
-        if scene.config.row != "case" or not scene.config.cases:  # a table stands in no document
-            again = load_config(self._written(scene.config.to_yaml()))
-            assert again.fingerprint() == scene.config.fingerprint(), "read again, another configuration"
-        invoke("run", str(self._written(draws.in_yaml(scene.flat))), "--dry-run")
-        predicted = sweep.predict(scene.config)
-        if not self._affordable(scene.config):
-            return Found(predicted, scene)
-        found = self._run(scene.config, *([self._new()] if number % 8 == 0 else []))
-        for name in predicted.data_vars:
-            xr.testing.assert_equal(predicted[name], found[name])
-        return Found(found, scene, ran=True)
-
-    def _scene(self, base: str, changes: Draws, number: int) -> Scene:
-        """A configuration of few cells and steps, with kernels of the pool if it has such."""
-        drawn = {path: draws.setting(path, n) for path, n in changes}
-        known = {key: value for key, value in draws.shipped()[base].items() if key not in drawn}
-        flat, config = draws.in_pool(known | drawn, base, self.pool, number)
-        unit = 1.0 if config.units == PAPER_UNITS else float(np.sqrt(config.grid.columns()["c"].max() / 9.8))
-        small: Flat = {"samples": 3} if config.samples and config.samples > 5 else {}
-        if config.integrator.t_end > 1000 * unit and not (self.far and config.grid.size < 4 and number % 6 == 0):
-            small["integrator.t_end"] = float(f"{1000 * unit:.2g}")
-        return Scene(*draws.accepted(flat | small, base))
-
-    def _affordable(self, config: Config) -> bool:
-        if not config.simulated or config.grid.size > 60:
-            return not config.simulated
-        return draws.kernels(config) <= {*self.pool} and draws.steps(config) < MOST_STEPS
 
     def _written(self, text: str) -> Path:
         path = self._new(".yaml")
@@ -186,204 +129,336 @@ class Machine(RuleBasedStateMachine):
         return path
 
     def _run(self, config: Any, *where: Any, **how: Any) -> xr.Dataset:
-        found = sweep.run(config, *where, **how)
+        with nothing_drawn():
+            found = sweep.run(config, *where, **how)
         oracles.sound(config if isinstance(config, Config) else load_config(config), found)
         return found
 
+    # ---- configurations and their runs
+
+    @initialize(base=NUMBER, changes=CHANGES, arguments=PICTURE, at=NUMBER)
+    def begin(self, base: int, changes: Draws, arguments: Draws, at: int) -> None:
+        """Draw a configuration and run it; and what costs little is asked of each."""
+        self.scene = Scene(*draws.scene(self.bases[base % len(self.bases)], changes, self.pool))
+        self.config = self.scene.config
+        varies = {*self.config.axes, *self.config.cases}
+        self.varying = [name for name in self.config.tier.parameters if name in varies]
+        note(f"# {json.dumps(self.scene.flat)}")
+        self.found = self._run(self.config)
+        self.rows, self.others = oracles.rows(self.found), [self.found]
+        self._foreseen(self.scene, self.found)
+        self._reopened(self.found)
+        describe(self.found), contents(self.found)
+        self._drawn(self.found, arguments, at)
+
+    @rule(
+        base=st.sampled_from(sorted(draws.shipped())),
+        changes=draws.draws([*draws.PHYSICAL, *3 * draws.OTHERWISE], 6, 2),
+    )
+    def foresee(self, base: str, changes: Draws) -> None:
+        """Any configuration, whatever its kernel, is predicted and estimated."""
+        drawn = {path: draws.setting(path, n) for path, n in changes}
+        scene = Scene(*draws.accepted(draws.shipped()[base] | drawn, base))
+        if scene.config.grid.size <= 5000:
+            self._foreseen(scene)
+
+    def _foreseen(self, scene: Scene, found: xr.Dataset | None = None) -> None:
+        """It is the same when it is read again, and is predicted as it is run."""
+        if scene.config.row != "case" or not scene.config.cases:  # a table stands in no document
+            again = load_config(self._written(scene.config.to_yaml()))
+            assert again.fingerprint() == scene.config.fingerprint(), "read again, another configuration"
+            assert list(again.axes) == list(scene.config.axes)
+        invoke("run", str(self._written(draws.in_yaml(scene.flat))), "--dry-run")
+        predicted = sweep.predict(scene.config)
+        for name in predicted.data_vars if found is not None else ():
+            if name in found or not scene.config.refine:
+                xr.testing.assert_equal(predicted[name], found[name])
+
     # ---- the same cells elsewhere
 
-    @rule(found=datasets, number=NUMBER, places=st.lists(NUMBER, min_size=1, max_size=4, unique=True))
-    def as_cases(self, found: Found, number: int, places: list[int]) -> None:
+    @rule(number=NUMBER, places=st.lists(NUMBER, min_size=1, max_size=4, unique=True))
+    def as_cases(self, number: int, places: list[int]) -> None:
         """Some cells in any order have the same numbers alone and as cases, be they samples or of a grid."""
-        if not found.compared:
+        config, possible = self.config, self.rows["status"] != IMPOSSIBLE
+        if not len(ran := np.flatnonzero(oracles.simulated(self.found) & possible)):
             return
-        config, there = found.scene.config, oracles.rows(found.dataset)
-        cells = [n % len(there["status"]) for n in places]
-        names = [name for name in config.tier.parameters if len(np.unique(there[name])) > 1 or name in config.cases]
-        columns = {name: there[name][cells].tolist() for name in names or config.tier.parameters[:1]}
+        cells = list(dict.fromkeys(int(ran[n % len(ran)]) for n in places))
+        columns = {name: self.rows[name][cells].tolist() for name in self.varying or config.tier.parameters[:1]}
         keys = {config.table[name].path: column[0] for name, column in columns.items()}
+        several = [path for path in self.scene.flat if path in draws.PHYSICAL and path not in keys]
+        several = [path for path in several if isinstance(self.scene.flat[path], list | dict)]  # of other models
         settings = {f"integrator.{key}": value for key, value in config.integrator.model_dump().items()}
         alone = keys if len(cells) == 1 and number % 2 else {"cases": columns}
-        again = self._run(found.scene.with_(settings | alone, *keys, "samples", "cases"))
-        oracles.same(
-            oracles.rows(again), {name: there[name][cells] for name in there if name in found.dataset.data_vars}
+        again = oracles.rows(
+            self._run(self.scene.with_(settings | alone, *keys, *several, "samples", "cases", "refine"))
         )
+        there = {name: self.rows[name][cells] for name in self.rows if name in self.found.data_vars}
+        assert there.keys() - again.keys() <= {"inferred"}
+        oracles.same(again, there)
 
-    @rule(found=datasets)
-    def transposed(self, found: Found) -> None:
+    @precondition(lambda self: len(self.config.axes) > 1 and len(self.config.distributions) < 2)
+    @rule()
+    def transposed(self) -> None:
         """The order of the axes makes no difference."""
-        if found.compared and len(found.scene.config.axes) > 1:
-            document = draws.nested(dict(reversed(found.scene.flat.items())))
-            turned = {key: document[key] for key in reversed(document)}
-            again = self._run(turned).transpose(*found.dataset["status"].dims, ...)
-            oracles.same(oracles.rows(again), oracles.rows(found.dataset))
+        turned = draws.nested(dict(reversed(self.scene.flat.items())))
+        self._compare(self._run({key: turned[key] for key in reversed(turned)}))
 
-    @rule(found=datasets, names=st.sampled_from([oracles.MIRRORED, oracles.TURNED]))
-    def mirrored(self, found: Found, names: tuple[str, ...]) -> None:
+    @precondition(lambda self: self.config.axes)
+    @rule(number=NUMBER)
+    def shuffled(self, number: int) -> None:
+        """Nor does the order of the values along an axis."""
+        name, values = [*self.config.axes.items()][number % len(self.config.axes)]
+        if not self.config.refine:
+            other = Random(number).sample(values, len(values))
+            self._compare(self._run(self.scene.with_({self.config.table[name].path: other})))
+
+    def _compare(self, again: xr.Dataset) -> None:
+        """The numbers of all cells are the same, and the variables."""
+        again = again.transpose(*self.found["status"].dims, ...).reindex_like(self.found)
+        assert {*again.data_vars} == {*self.found.data_vars}
+        oracles.same(oracles.rows(again), self.rows)
+
+    @rule(names=st.sampled_from([oracles.MIRRORED, oracles.TURNED]))
+    def mirrored(self, names: tuple[str, ...]) -> None:
         """A mirror image, or a body turned by half a turn about the vertical, ends and counts alike."""
-        self._elsewhere(found, dict.fromkeys(names, -1.0), {})
+        self._elsewhere(dict.fromkeys(names, -1.0), {})
 
-    @rule(found=datasets)
-    def in_si(self, found: Found) -> None:
+    @precondition(lambda self: self.config.units == PAPER_UNITS)
+    @rule()
+    def in_si(self) -> None:
         """A body of any size, in SI, does so too."""
-        if found.compared and found.scene.config.units == PAPER_UNITS:
-            old, unit = found.scene.config.integrator, oracles.TIME
-            times = {"t_end": old.t_end * unit, "patience": old.patience and old.patience * unit}
-            times |= {} if old.step == "auto" else {"step": old.step * unit}
-            fixed = {"units": "SI", "gravity": oracles.LENGTH / unit**2, "body.mass": oracles.MASS}
-            more = {f"integrator.{key}": value for key, value in times.items()} | fixed
-            self._elsewhere(found, oracles.scales(found.scene.config), more)
+        old, unit = self.config.integrator, oracles.TIME
+        times = {"t_end": old.t_end * unit, "patience": old.patience and old.patience * unit}
+        times |= {} if old.step == "auto" else {"step": old.step * unit}
+        fixed = {"units": "SI", "gravity": oracles.LENGTH / unit**2, "body.mass": oracles.MASS}
+        more = {f"integrator.{key}": value for key, value in times.items()} | fixed
+        self._elsewhere(oracles.scales(self.config), more, 1 / unit)
 
-    def _elsewhere(self, found: Found, factors: dict[str, float], more: Flat) -> None:
+    def _elsewhere(self, factors: dict[str, float], more: Flat, spin: float = 1.0) -> None:
         """The cells of a run as cases, with parameters multiplied, if the kernels are there."""
-        if not found.compared:
-            return
-        there, config = oracles.rows(found.dataset), found.scene.config
-        columns = {name: (there[name] * factors.get(name, 1.0)).tolist() for name in config.tier.parameters}
-        keys = (config.table[name].path for name in columns)
-        try:
-            other = load_config(found.scene.with_({"cases": columns} | more, *keys, "samples", "cases", "picture"))
-        except Refused:  # a measurement that the model in SI does not offer
-            return
-        if self._affordable(other):
-            oracles.alike(oracles.rows(self._run(other)), there)
-
-    @rule(found=datasets, factor=st.sampled_from([1.5, 4.0]))
-    def longer(self, found: Found, factor: float) -> None:
-        """What ended before t_end ends alike if t_end is later."""
-        if found.compared:
-            later = {"integrator.t_end": found.scene.config.integrator.t_end * factor}
-            before, after = oracles.rows(found.dataset), oracles.rows(self._run(found.scene.with_(later)))
-            ended = before["status"] != TIME_LIMIT
-            oracles.alike(*({name: values[ended] for name, values in each.items()} for each in (before, after)))
-
-    @rule(found=datasets, place=NUMBER)
-    def follow(self, found: Found, place: int) -> None:
-        """A cell that is followed in time ends and counts alike."""
-        if found.compared and not found.scene.config.samples:
-            config, there = found.scene.config, oracles.rows(found.dataset)
-            cell = [place % len(there["status"])]
-            values = {name: float(there[name][cell[0]]) for name in (*config.axes, *config.cases)}
-            scene = found.scene.with_({}, "cases")
-            if there["status"][cell[0]] == IMPOSSIBLE:
-                with pytest.raises(ConfigError):
-                    sweep.trajectory(scene, **values)
+        columns = {name: (self.rows[name] * factors.get(name, 1.0)).tolist() for name in self.config.tier.parameters}
+        keys = (self.config.table[name].path for name in columns)
+        document = self.scene.with_({"cases": columns} | more, *keys, "samples", "cases", "picture", "refine")
+        for method, _, specs in [("", "", ()), *sorted(self.pool)]:  # its own if it can be
+            own = (
+                {"measure": draws.written(specs), "integrator": document["integrator"] | {"method": method}}
+                if method
+                else {}
+            )
+            if self._allowed(document | own):
+                ran = oracles.simulated(self.found)
+                oracles.alike(oracles.rows(self.found, ran), oracles.rows(self._run(document | own), ran), spin)
                 return
-            followed = sweep.trajectory(scene, stop_when_settled=True, **values)
-            oracles.alike(oracles.rows(followed), {name: column[cell] for name, column in there.items()})
+
+    def _allowed(self, document: Any) -> bool:
+        """Whether a configuration is accepted and takes little time."""
+        with suppress(Refused):
+            return draws.affordable(load_config(document), self.pool)
+        return False
+
+    @rule(factor=st.sampled_from([1.5, 4.0]))
+    def longer(self, factor: float) -> None:
+        """What ended before t_end ends alike if t_end is later."""
+        later = self._run(self.scene.with_({"integrator.t_end": self.config.integrator.t_end * factor}))
+        ended = (self.rows["status"] != TIME_LIMIT) & oracles.simulated(self.found) & oracles.simulated(later)
+        oracles.alike(*(oracles.rows(each, ended) for each in (self.found, later)))
+
+    @rule(place=NUMBER, every=st.sampled_from([None, 5.0]))
+    def follow(self, place: int, every: float | None) -> None:
+        """A cell that is followed in time ends and counts alike."""
+        config, cell = self.config, [place % len(self.rows["status"])]
+        values = {name: float(self.rows[name][cell[0]]) for name in self.varying}
+        scene = self.scene.with_({}, "cases", "samples", "refine")
+        if self.rows["status"][cell[0]] == IMPOSSIBLE:
+            with pytest.raises(ConfigError):
+                sweep.trajectory(scene, **values)
+        elif oracles.simulated(self.found)[cell[0]]:
+            followed = self.ask(
+                "follow", lambda: sweep.trajectory(scene, stop_when_settled=True, every=every, **values)
+            )
+            if followed is not None and config.integrator.stop_when_settled:
+                oracles.alike(oracles.rows(followed), oracles.rows(self.found, cell))
+
+    @rule(given=draws.draws(range(20), 6, 1), number=NUMBER)
+    def overridden(self, given: Draws, number: int) -> None:
+        """What a file, the command line and Python each say a part of is run as if it stood in one file."""
+        kept = {"cases", *(self.config.table[name].path for name in self.config.distributions)}  # which are in an order
+        paths = sorted({[*self.scene.flat][k % len(self.scene.flat)] for k, _ in given} - kept)
+        file, folder = self._written(json.dumps(self.scene.with_({}, *paths))), self._new()
+        settings = [f"--set={path}={json.dumps(self.scene.flat[path])}" for path in paths]
+        if number % 2:
+            with nothing_drawn():
+                invoke("run", str(file), *settings, f"--output={folder}", "--quiet")
+            found = sweep.open(next(folder.glob("*.nc")))
+        else:
+            found = self._run(load_config(file, {path: self.scene.flat[path] for path in paths}))
+        self._compare(found)
+
+    @precondition(lambda self: self.client is not None)
+    @rule()
+    def on_a_cluster(self) -> None:
+        """The workers of a cluster come to the same numbers."""
+        same_numbers(self._run(self.config, client=self.client), self.found)
 
     # ---- over the files of an earlier run
 
-    @rule(target=datasets, scene=SCENE, number=NUMBER)
-    def grow(self, scene: Scene, number: int) -> Any:
+    @precondition(lambda self: not self.config.refine)
+    @rule(number=NUMBER, ways=st.sets(st.sampled_from(["t_end", "axis", "samples", "measure", "name"]), min_size=1))
+    def grow(self, number: int, ways: set[str]) -> None:
         """A run over the dataset of a smaller one, or of a shorter one, is that of all cells at once."""
-        config, folder = scene.config, self._new()
-        if not self._affordable(config) or config.refine:
-            return multiple()
-        few: Flat = {"integrator.t_end": config.integrator.t_end / 2, "integrator.patience": config.integrator.patience}
-        more: Flat = few | {"integrator.t_end": config.integrator.t_end}
-        if config.axes and number % 3:
-            random, (name, known) = Random(number), list(config.axes.items())[number % len(config.axes)]
+        config, folder, random = self.config, self._new(), Random(number)
+        more: Flat = {
+            "name": "x",
+            "integrator.t_end": config.integrator.t_end,
+            "integrator.patience": config.integrator.patience,
+        }
+        few = {**more}
+        if "t_end" in ways:
+            few["integrator.t_end"] /= random.choice((1.3, 2, 10))
+        if "samples" in ways and config.samples:
+            few["samples"] = more["samples"] = 4
+            few["samples"] = random.choice((1, 2, 3))
+        if "measure" in ways:
+            few["measure"] = [each for each in (config.document()["measure"]) if each in ("reversals", "margin")][:1]
+            few |= {} if self._allowed(self.scene.with_(few)) else {"measure": config.document()["measure"]}
+        if "axis" in ways and config.axes:
+            name, known = list(config.axes.items())[number % len(config.axes)]
             numbers = [*random.sample(known, len(known)), float(np.mean(known)) * 1.001 or 1e-6]
-            sets = numbers[random.randrange(len(numbers)) :], random.sample(numbers, len(numbers))
-            few, more = ({config.table[name].path: each} for each in sets)
-        with nothing_drawn(number % 5 > 0):
-            self._run(scene.with_(few), folder)
-            found = self._run(scene.with_(more), folder)
-        same_numbers(found, sweep.run(scene.with_(more)))
-        return Found(found, Scene(scene.flat | more, load_config(scene.with_(more))), ran=True)
+            path = config.table[name].path
+            few[path], more[path] = numbers[random.randrange(len(numbers)) :], random.sample(numbers, len(numbers))
+        if self._allowed(self.scene.with_(few)) and self._allowed(self.scene.with_(more)):
+            self._run(self.scene.with_(few), folder)
+            found = self._run(self.scene.with_(more), folder)
+            same_numbers(found, self._run(self.scene.with_(more)))
+            self.others.append(found)
 
-    @rule(scene=SCENE, which=st.sampled_from(["failed", "limit"]), change=draws.draws(REPEATED, 1))
-    def rerun(self, scene: Scene, which: str, change: Draws) -> None:
+    @rule(which=st.sampled_from(["failed", "limit"]), change=draws.draws(REPEATED, 1))
+    def rerun(self, which: str, change: Draws) -> None:
         """Cells that are run again are those of a run with the new settings; the others stay."""
-        if not self._affordable(scene.config) or not scene.config.simulated:
+        if self.config.refine:
             return
-        folder, document = self._new(), scene.with_({path: draws.setting(path, n) for path, n in change})
+        folder, document = self._new(), self.scene.with_({path: draws.setting(path, n) for path, n in change})
+        if not self._allowed(document):
+            return
+        old = oracles.rows(self._run(self.config, folder))
         with nothing_drawn():
-            old = oracles.rows(self._run(scene.config, folder))
-            again = self.ask("rerun", lambda: sweep.run(document | {"name": scene.config.name}, folder, rerun=which))
+            again = self.ask("rerun", lambda: sweep.run(document | {"name": self.config.name}, folder, rerun=which))
         if again is not None:
-            new, fresh = oracles.rows(again), oracles.rows(sweep.run(document))
+            new, fresh = oracles.rows(again), oracles.rows(self._run(document))
             repeated = np.isin(old["status"], FAILURES if which == "failed" else TIME_LIMIT)
             for cells, rows in ((repeated, fresh), (~repeated, old)):
                 oracles.same({k: v[cells] for k, v in new.items()}, {k: v[cells] for k, v in rows.items()}, NUMBERS)
 
-    @rule(scene=SCENE, chunks=st.integers(0, 3))
-    def interrupted(self, scene: Scene, chunks: int) -> None:
-        """A run that was interrupted goes on to the same numbers."""
-        if self._affordable(scene.config):
-            folder = self._new()
-            with patch("sweep.engine.executor._rescale", lambda *_: 200), suppress(KeyboardInterrupt), nothing_drawn():
-                sweep.run(scene.config, folder, reporter=Stop(chunks))
-            with nothing_drawn():
-                same_numbers(self._run(scene.config, folder), sweep.run(scene.config))
+    @rule(verb=st.sampled_from(["run", "run", *STUDIES]), chunks=st.integers(0, 3), given=st.data())
+    def interrupted(self, verb: str, chunks: int, given: Any) -> None:
+        """What was interrupted goes on to the same numbers, which are in the file that is written."""
+        taken = words.arguments(verb, given.draw(draws.draws(words.TAKEN[verb], 2))) if verb != "run" else {}
+        taken = {"bracket": 0.2} | taken if verb in ("boundaries", "critical") else taken
+        taken.pop("fresh", None)
+        call, folder = getattr(sweep, verb), self._new()
+        whole = self.ask(verb, lambda: call(self.config, **taken))
+        if whole is None:
+            return
+        with patch("sweep.engine.executor._rescale", lambda *_: 200), nothing_drawn():
+            for sitting in range(2 + chunks):
+                with suppress(KeyboardInterrupt):
+                    call(self.config, folder, reporter=Stop(chunks + sitting), **taken)
+            same_numbers(call(self.config, folder, **taken), whole)
+        self.others.append(whole)
+        if verb == "boundaries" and whole.sizes["point"]:
+            self._recounted(whole.isel(point=slice(None, None, -(-whole.sizes["point"] // 20))))
+        elif verb == "critical" and whole.dims:
+            dim = str(next(iter(whole.dims)))
+            if dim in self.config.axes:
+                at = {dim: self.config.axes[dim][-1]}
+                one, other = whole.sel(at), sweep.critical(self.config, **taken, **at)
+                for name in (name for name in one.data_vars if name.endswith("reason")):
+                    np.testing.assert_array_equal(one[name].values, other[name].values.reshape(one[name].shape), name)
+
+    def _recounted(self, points: xr.Dataset) -> None:
+        """Both ends of brackets of boundaries count as the search says, where a run is certain of it."""
+        for end in ("fewer", "more"):
+            columns = {name: points[name].values.copy() for name in self.config.axes}
+            for i, along in enumerate(points["bracket"].values):
+                columns[along][i] = points[f"end_{end}"].values[i]
+            cases = {name: column.tolist() for name, column in columns.items()}
+            keys = (self.config.table[name].path for name in columns)
+            again = oracles.rows(self._run(self.scene.with_({"cases": cases}, *keys, "refine", "picture")))
+            known = again["decided"] == 1 if "decided" in again else np.zeros(len(again["status"]), bool)
+            np.testing.assert_array_equal(again["reversals"][known], points[f"reversals_{end}"].values[known])
 
     @precondition(lambda self: self.far)
-    @rule(scene=SCENE, after=st.floats(0.3, 3.0))
-    def killed(self, scene: Scene, after: float) -> None:
-        """So does one whose process was killed."""
-        if self._affordable(scene.config):
-            file, folder = self._written(draws.in_yaml(scene.flat)), self._new()
-            words = [sys.executable, "-m", "sweep", "run", str(file), "--output", str(folder), "--quiet"]
-            process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            time.sleep(after)
-            process.kill()
-            process.wait()
-            same_numbers(self._run(load_config(file), folder), sweep.run(load_config(file)))
-
-    @precondition(lambda self: self.client is not None)
-    @rule(found=datasets)
-    def on_a_cluster(self, found: Found) -> None:
-        """The workers of a cluster come to the same numbers."""
-        if found.compared:
-            same_numbers(self._run(found.scene.config, client=self.client), found.dataset)
+    @rule(after=st.floats(0.3, 3.0))
+    def killed(self, after: float) -> None:
+        """So does what was killed."""
+        file, folder = self._written(draws.in_yaml(self.scene.flat)), self._new()
+        words = [sys.executable, "-m", "sweep", "run", str(file), "--output", str(folder), "--quiet"]
+        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(after)
+        process.kill()
+        process.wait()
+        same_numbers(self._run(load_config(file), folder), self._run(load_config(file)))
 
     # ---- what is done with datasets
 
-    @rule(target=datasets, found=datasets, way=st.sampled_from(sorted(words.CUTS)), number=NUMBER)
-    def cut(self, found: Found, way: str, number: int) -> Any:
-        """What xarray makes of a dataset can be described and drawn, or is refused."""
-        if not found.dataset.dims or not found.dataset.data_vars:
-            return multiple()
-        random = Random(number)
-        cut = words.CUTS[way](found.dataset, random.choice(sorted(map(str, found.dataset.dims))), random)
+    @rule(which=NUMBER, ways=st.lists(st.sampled_from(sorted(words.CUTS)), min_size=1, max_size=2), number=NUMBER)
+    def cut(self, which: int, ways: list[str], number: int) -> None:
+        """What xarray makes of a dataset can be described, saved and drawn, or is refused."""
+        cut, random = self.others[which % len(self.others)], Random(number)
+        for way in ways:
+            if cut.dims and cut.data_vars and all(cut.sizes.values()):
+                with warnings.catch_warnings(action="ignore"):  # xarray's own
+                    cut = words.CUTS[way](cut, random.choice(sorted(map(str, cut.dims))), random)
         if kind(cut):
-            self.ask("describe", lambda: (describe(cut), contents(cut)))
+            self.ask("describe", lambda: (describe(require_whole(cut)), contents(cut)))
             figure = self.ask("plot", lambda: sweep.plot(cut))
             figure and figure.draw_without_rendering()
-            self._reopened(Found(cut))
-        return Found(cut)
+            self._reopened(cut)
+            self.others.append(cut)
 
-    def _saved(self, found: Found, file: Path) -> bool:
+    def _saved(self, dataset: xr.Dataset, file: Path) -> bool:
         """Whether xarray can save a dataset: one that is stacked it cannot."""
         with suppress(ValueError, NotImplementedError):
-            found.dataset.to_netcdf(file)
+            dataset.to_netcdf(file)
         return file.exists()
 
-    @rule(target=datasets, found=datasets)
-    def save(self, found: Found) -> Any:
+    def _reopened(self, dataset: xr.Dataset) -> xr.Dataset | None:
         """A dataset that is saved is the same when it is opened."""
-        again = self._reopened(found)
-        return multiple() if again is None else Found(again, found.scene, found.ran)
-
-    def _reopened(self, found: Found) -> xr.Dataset | None:
         file = self._new(".nc")
-        again = self.ask("open", lambda: sweep.open(file), str(file)) if self._saved(found, file) else None
+        again = self.ask("open", lambda: sweep.open(file), str(file)) if self._saved(dataset, file) else None
         if again is not None:
-            xr.testing.assert_identical(again.drop_attrs(deep=False), found.dataset.drop_attrs(deep=False))
+            xr.testing.assert_identical(again.drop_attrs(deep=False), dataset.drop_attrs(deep=False))
         return again
 
-    @rule(found=datasets, arguments=draws.draws(words.TAKEN["plot"], 3), form=st.sampled_from(["", *PICTURES]))
-    def plot(self, found: Found, arguments: Draws, form: str) -> None:
-        """A picture, in any format, or as a notebook shows it."""
-        given = words.arguments("plot", arguments) | ({"output": self.folder / f"x.{form}"} if form else {})
-        figure = self.ask("plot", lambda: found.dataset.sweep.plot(**given))
-        if isinstance(figure, Figure) and not form:
+    @rule(which=NUMBER, arguments=PICTURE, at=NUMBER, form=st.sampled_from(["", *PICTURES]))
+    def plot(self, which: int, arguments: Draws, at: int, form: str) -> None:
+        """A picture shows what the dataset has there, in any format, and however the dataset is ordered."""
+        self._drawn(self.others[which % len(self.others)], arguments, at, form)
+
+    def _drawn(self, dataset: xr.Dataset, arguments: Draws, at: int, form: str = "") -> None:
+        given, cut = words.arguments("plot", arguments), dataset
+        dims = [dim for dim in dataset.dims if dim in dataset.coords and dim != "count" and dataset.sizes[dim]]
+        numbers = [dim for dim in dims if dataset[dim].dtype.kind in "if"]
+        known = [*dataset.data_vars, *words.DERIVED]
+        given |= {"variable": str(known[at % len(known)])} if "variable" in given and at % 4 else {}
+        given |= {name: str(dims[at % len(dims) - i]) for i, name in enumerate("xy") if name in given and dims}
+        if "sel" in given and numbers and at % 8:
+            dim = numbers[at % len(numbers)]
+            given["sel"] = {str(dim): float(dataset[dim][at % dataset.sizes[dim]])}
+            cut = dataset.isel({dim: at % dataset.sizes[dim]})
+        how = given | ({"output": self._new(f".{form}")} if form else {})
+        figure = self.ask("plot", lambda: dataset.sweep.plot(**how))
+        if isinstance(figure, Figure):
             figure.draw_without_rendering()
+            if kind(dataset) == RUN and ("sel" not in given or cut is not dataset):
+                oracles.shown(cut, figure)
+            if dims and {*dataset.indexes} - {"count"} == {*dims}:
+                turned = dataset.isel({dims[at % len(dims)]: slice(None, None, -1)}).sweep.plot(**given)
+                assert oracles.content(turned) == oracles.content(figure), "another picture backwards"
 
     @precondition(lambda self: self.browser)
-    @rule(found=datasets, addressed=draws.draws(["show", "x", "y", "low", "high", "n0"]))
-    def explore(self, found: Found, addressed: Draws) -> None:
+    @rule(which=NUMBER, addressed=draws.draws(["show", "x", "y", "low", "high", "n0"], 5))
+    def explore(self, which: int, addressed: Draws) -> None:
         """The document of the explorer, at any address."""
         from bokeh.document import Document
 
@@ -391,24 +466,26 @@ class Machine(RuleBasedStateMachine):
         from sweep.explorer.slices import Source
         from sweep.explorer.view import View
 
-        texts = [*map(str, found.dataset.data_vars), *map(str, found.dataset.dims), "1", "1e7", "x"]
+        dataset = self.others[which % len(self.others)]
+        texts = [*map(str, dataset.data_vars), *map(str, dataset.dims), "1", "1e7", "x"]
         query = {key: [texts[n % len(texts)]] for key, n in addressed}
         document = Document()
-        source = self.ask("open", lambda: Source(found.dataset))
+        source = self.ask("open", lambda: Source(dataset))
         if source:
             View(document, source, usable(source), None, query)
             document.validate()
 
-    @rule(target=datasets, scene=SCENE, name=st.sampled_from(words.CALLED), given=st.data())
-    def call(self, scene: Scene, name: str, given: Any) -> Any:
+    @rule(name=st.sampled_from(words.CALLED), given=st.data())
+    def call(self, name: str, given: Any) -> None:
         """A function that takes a configuration, with any of its arguments."""
         taken = words.arguments(name, given.draw(draws.draws(words.TAKEN[name], 3)))
-        if not self._affordable(scene.config) or (name in words.SLOW and not self.far):
-            return multiple()
+        if name in words.SLOW and not self.far:
+            return
         taken |= {"film": self._film(), "free": ["mu"]} if name == "fit" else {}
         taken |= {"output": self._new(".gif")} if name == "animate" else {}
-        found = self.ask(name, lambda: getattr(sweep, name)(scene.config, **taken), str(self.folder / "film.csv"))
-        return Found(found) if isinstance(found, xr.Dataset) else multiple()
+        found = self.ask(name, lambda: getattr(sweep, name)(self.config, **taken), str(self.folder / "film.csv"))
+        if isinstance(found, xr.Dataset):
+            self.others.append(found)
 
     def _film(self) -> Path:
         file = self.folder / "film.csv"
@@ -419,32 +496,32 @@ class Machine(RuleBasedStateMachine):
 
     # ---- the command line
 
-    @rule(scene=SCENE, found=datasets, verb=st.sampled_from(sorted(words.VERBS)), given=st.data())
-    def command(self, scene: Scene, found: Found, verb: str, given: Any) -> None:
+    @rule(which=NUMBER, verb=st.sampled_from(sorted(words.VERBS)), given=st.data())
+    def command(self, which: int, verb: str, given: Any) -> None:
         """A command with any of its options."""
         asked = words.VERBS[verb].params
         known, drawn = {each.name for each in asked}, given.draw(draws.draws(words.options(verb), 3))
         line = [word for name, n in drawn for word in words.option(verb, name, n)]
-        if "config" in known and not self._carried_out(scene, line):
+        if "config" in known and not self._carried_out(line):
             line.append("--dry-run")
         if (verb in words.SLOW and not self.far) or ("--dry-run" in line and "dry_run" not in known):
             return
         file = self._new(".nc")
-        if "file" in known and not self._saved(found, file):
+        if "file" in known and not self._saved(self.others[which % len(self.others)], file):
             return
-        config = self._written(draws.in_yaml(scene.flat))
+        config = self._written(draws.in_yaml(self.scene.flat))
         files = {"config": config, "film": self._film(), "source": config, "file": file, "name": "quick"}
         first = [str(files[each.name]) for each in asked if isinstance(each, click.Argument)]
         if "output" in known:
             line += ["--output", str(self._new({"animate": ".gif", "plot": ".png"}.get(verb, "")))]
         self.ask(f"sweep {verb}", lambda: invoke(verb, *first, *line))
 
-    def _carried_out(self, scene: Scene, line: list[str]) -> bool:
+    def _carried_out(self, line: list[str]) -> bool:
         """Whether a command with these settings takes little time."""
         pairs = [line[i + 1].partition("=") for i, word in enumerate(line) if word == "--set"]
         try:
             given = {path: parse_value(text, path) for path, _, text in pairs}
-            return self._affordable(load_config(draws.nested(scene.flat), given))
+            return draws.affordable(load_config(self.scene.with_({}), given), self.pool)
         except Refused:
             return True
 

@@ -21,6 +21,7 @@ from sweep.plots import picture, scales
 from sweep.plots.figure import opaque
 from sweep.results.dataset import REASONS, VARIABLES, described
 from sweep.results.probabilities import PROBABILITIES, probabilities
+from sweep.results.store import StoreError
 
 FORMULAS: dict[str, Any] = {"name": "formulas", "friction": {"mu": 60}}
 
@@ -67,9 +68,9 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
-        (lambda d: d.isel(mu=slice(0)), "has no cells: the axis mu is empty"),
-        (lambda d: d.isel(b=0, n0=0).isel(mu=slice(0)), "has no cells: the axis mu is empty"),
-        (lambda d: d.stack(both=("mu", "b")), "the values of the axis both are not finite numbers; unstack it"),
+        (lambda d: d.isel(mu=slice(0)), "the axis mu has no values; select at least one"),
+        (lambda d: d.isel(b=0, n0=0).isel(mu=slice(0)), "the axis mu has no values; select at least one"),
+        (lambda d: d.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),
         (lambda d: d.assign_coords(mu=[f"{v:g}" for v in d.mu.values]), "the values of the axis mu are not finite"),
         (lambda d: d[["n_c1_plus"]], "none of the variables is drawn unless it is named; choose n_c1_plus"),
         (lambda d: d[["n_c1_plus"]].drop_vars("n_c1_plus").assign_attrs(sweep_kind="run"), "has no variable to draw"),
@@ -82,23 +83,50 @@ def test_what_cannot_be_drawn_is_refused(damage: Callable[[xr.Dataset], xr.Datas
 
 def test_an_axis_without_numbers_has_no_nearest_value() -> None:
     stacked = made().stack(both=("mu", "b"))
-    with pytest.raises(ConfigError, match="axis both are not finite numbers"):
+    with pytest.raises(ConfigError, match="the axis both is stacked; unstack it"):
         picture.plot(stacked, sel={"both": 1.0})
 
 
 @pytest.mark.parametrize(
     ("found", "said"),
     [
-        (xr.Dataset(attrs={"sweep_kind": "boundaries"}), "no level, curve, closed, outcome, x, y; draw boundaries as"),
-        (xr.Dataset({"critical_reason": ("mu", [])}, {"mu": []}), "critical_reason has no cells: the axis mu is empty"),
-        (xr.Dataset(attrs={"sweep_kind": "critical"}), "no critical_reason; draw critical spins as the command"),
-        (xr.Dataset({"seen": 1.0, "fitted": 1.0}), "the axes of seen are lost; draw a fit as the command fit"),
-        (xr.Dataset({"spin": (("trajectory", "time"), np.zeros((0, 3)))}), "the axis trajectory is empty"),
+        (xr.Dataset(attrs={"sweep_kind": "boundaries"}), r"lacks the variable level and \d+ other things; it was cut"),
+        (xr.Dataset({"critical_reason": ("mu", [])}, {"mu": []}), "the axis mu has no values; select at least one"),
+        (xr.Dataset(attrs={"sweep_kind": "critical"}), "lacks the variable critical_reason and 8 other things"),
+        (xr.Dataset({"seen": 1.0, "fitted": 1.0}), r"lacks the variable value and \d+ other things"),
+        (xr.Dataset({"spin": (("trajectory", "time"), np.zeros((0, 3)))}), "the axis trajectory has no values"),
     ],
 )
 def test_datasets_of_other_kinds_that_are_not_whole_are_refused(found: xr.Dataset, said: str) -> None:
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(StoreError, match=f"^the dataset: {said}"):
         picture.plot(found)
+
+
+def test_boundaries_without_a_whole_number_are_not_drawn() -> None:
+    curves = sweep.boundaries({"friction": {"mu": [60, 80]}}, n0=[0.02, 0.06], t_end=1000, bracket=0.1)
+    with pytest.raises(StoreError, match=r"^the dataset: has no whole numbers in level"):
+        picture.plot(curves.where(False))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"figsize": (1,)}, r"^figsize: must be a width and a height in inches, such as \(6, 4\), not \(1,\)"),
+        ({"figsize": (0, 2)}, "^figsize: must be a width"),
+        ({"limits": ("a", "b")}, "^limits: must be a lower and a higher finite number"),
+        ({"limits": (0, np.inf)}, "^limits: must be a lower and a higher finite number"),
+        ({"sel": ["n0"]}, "^sel: must be values by axis"),
+        ({"width": 3}, "^width: 3; give a length between 50 and 1000 mm"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        picture.plot(made(), **given)
+
+
+def test_a_page_smaller_than_what_stands_around_the_panels_is_too_small() -> None:
+    with pytest.raises(ConfigError, match=r"^figsize: 1 × 1 inches is too small for this figure; give"):
+        picture.plot(made(), "reversals", figsize=(1, 1))
 
 
 def test_samples_without_a_status_or_counts() -> None:

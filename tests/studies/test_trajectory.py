@@ -156,7 +156,7 @@ def test_the_explorer_shows_no_body_of_unknown_shape(write: Write) -> None:
 
 def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
     config = sweep.load_config(write(STANDARD), {"t_end": 8000.0})
-    both = sweep.trajectory(config, n0=[0.001, 0.05], every=5.0, stop_when_settled=True)
+    both = sweep.trajectory(config, mu=60, n0=[0.001, 0.05], every=5.0, stop_when_settled=True)
     assert both.t_stop[0] < both.t_stop[1] - 5
     for i in range(2):
         np.testing.assert_array_equal(np.isfinite(both.spin[i]), both.time <= both.t_stop[i] * (1 + 1e-12))
