@@ -20,6 +20,8 @@ from sweep.kernels.status import SETTLED, TOPPLED
 from sweep.plots import picture, scales
 from sweep.plots.figure import opaque
 from sweep.results.dataset import REASONS, VARIABLES, described
+from sweep.results.kind import CRITICAL
+from sweep.results.margins import POINTS
 from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.results.store import StoreError
 
@@ -41,10 +43,11 @@ def sampled(n0: tuple[float, ...] = (0.02, 0.05), status: int = SETTLED) -> xr.D
 
 
 def critical(spins: dict[str, list[float]], reason: list[int], dim: str = "case", **coords: Any) -> xr.Dataset:
-    """A dataset of critical spins, with these values of them along one axis."""
-    flags = described(VARIABLES["critical_reason"])
-    found = {name: (dim, np.array(values), described(VARIABLES[name])) for name, values in spins.items()}
-    return xr.Dataset({**found, "critical_reason": (dim, np.array(reason, "int8"), flags)}, coords)
+    """A dataset of critical spins, with these values of them along one axis, and the others unknown."""
+    unknown = dict.fromkeys(CRITICAL.needs, [np.nan] * len(reason))
+    reasons = {name: np.array(reason, "int8") for name in unknown if name.endswith("reason")}
+    found: dict[str, Any] = {**unknown, **reasons, **spins}
+    return xr.Dataset({n: (dim, np.array(v), described(VARIABLES[n])) for n, v in found.items()}, coords)
 
 
 def words(figure: Figure) -> list[str]:
@@ -166,8 +169,8 @@ def test_critical_spins_of_rows_of_a_table_that_share_a_body() -> None:
     coords: Any = {name: found[name] for name in ("a", "b", "c", "delta", "mu")}
     rows = critical(spins, [0, 0], **coords).assign_attrs(config=found.attrs["config"])
     (axes,) = picture.plot(rows).axes
-    drawn = {line.get_gid(): line.get_ydata() for line in axes.lines if line.get_gid()}
-    assert {name: np.asarray(values).tolist() for name, values in drawn.items()} == spins
+    drawn = {line.get_gid(): np.asarray(line.get_ydata(), float) for line in axes.lines if line.get_gid()}
+    assert {name: values.tolist() for name, values in drawn.items() if np.isfinite(values).any()} == spins
 
 
 def test_critical_spins_that_do_not_exist() -> None:
@@ -190,11 +193,11 @@ def test_the_critical_spins_of_one_body_are_seen() -> None:
 def test_a_search_without_points_does_not_say_that_counts_are_the_same() -> None:
     axis = {"actual_range": [1.0, 2.0], "spacing": "linear"}
     empty = xr.Dataset(
-        {name: ("point", np.zeros(0, int)) for name in ("level", "curve", "closed", "outcome")},
+        {name: ("point", np.zeros(0, int)) for name in POINTS},
         {name: ("point", np.zeros(0), axis) for name in ("n0", "mu")},
-        {"x": "n0", "y": "mu"},
+        {"x": "n0", "y": "mu", "trajectories": 0},
     )
-    (axes,) = picture.plot(empty.assign(end_more=("point", np.zeros(0)))).axes
+    (axes,) = picture.plot(empty).axes
     assert axes.get_title() == "no boundary was found between the cells"
 
 
