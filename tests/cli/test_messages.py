@@ -33,7 +33,7 @@ MEANT = {
     "trajectory c.yaml --at mu=3 --at mu=-3": "--at mu[1]: must be a finite number >= 0",
     "run c.yaml --set mu=20..60:0": "--set mu.num: must be a whole number >= 1 and <= 1000000, not 0",
     "trajectory c.yaml --at mu=": "--at mu=: must be NAME=VALUE, such as mu=60 or a=12cm",
-    "trajectory c.yaml --at a=12cm": "--at a: is in c here; give the number without cm, or set units: SI",
+    "trajectory c.yaml --at mu=40 --at a=12cm": "--at a: is in c here; give the number without cm, or set units: SI",
     "boundaries c.yaml --set n0=[0.02,0.05] --x q": "--x: q is not an axis of more than one value; the axes are mu, n0",
     "plot d.nc --var reversls": "--var: there is no variable reversls (did you mean reversals?)",
     "plot d.nc --sel n9=1": "--sel: there is no axis n9; the axes are mu",

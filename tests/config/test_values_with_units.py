@@ -60,7 +60,10 @@ def test_the_command_line_takes_them_too(write: Write, tmp_path: Path) -> None:
     assert invoke(*line, "--at", "c=2 cm", "--at", "c=25mm").exit_code == 0
     (file,) = tmp_path.glob("*_trajectory.nc")
     assert sweep.open(file)["c"].values == pytest.approx([0.02, 0.025])
-    refused(invoke("trajectory", write(SMALL), "--at", "b=3cm"), "--at b: is in c here; give the number without cm")
+    refused(
+        invoke("trajectory", write(SMALL), "--dry-run", "--at", "b=3cm"),
+        "--at b: is in c here; give the number without cm",
+    )
 
 
 def small(old: str, new: str) -> str:

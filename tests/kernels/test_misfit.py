@@ -76,7 +76,8 @@ def test_a_run_that_fails_has_none(config: Path) -> None:
 
 
 def test_a_run_says_which_rows_of_the_film_are_left_out(write: Write, config: Path) -> None:
-    film(write, np.linspace(0, 150, 301)).open("a", encoding="utf-8").write("151,,0.01\n")
+    file = film(write, np.linspace(0, 150, 301))
+    file.write_text(f"{file.read_text(encoding='utf-8')}151,,0.01\n", encoding="utf-8")
     heard = Heard()
     sweep.run(config, reporter=heard)
     assert heard.notes == ["1 row of the film is left out: 1 row without a number"]

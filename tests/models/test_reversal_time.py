@@ -12,7 +12,7 @@ from support.physics import KANE_LEVINSON
 import sweep
 from sweep.models import find
 from sweep.models.general import rigid_body
-from sweep.models.general.reversal_time import REASONS, energies, first_reversal, growth
+from sweep.models.general.reversal_time import NOT_KNOWN, REASONS, energies, first_reversal, growth
 from sweep.models.theory import linear
 
 ANGLES = {"roll": 0.01, "pitch": -0.02, "omega1": 0.3, "omega2": -0.1, "omega3": -1.0}
@@ -141,3 +141,10 @@ def test_the_simulated_time_tends_to_the_predicted_one() -> None:
         off = np.array([ratio(side * n0) - 1 for n0 in (0.04, 0.02, 0.01)])
         assert off[-1] < 0.003
         np.testing.assert_allclose(np.log2(off[:-1] / off[1:]), 2, atol=0.3)
+
+
+def test_a_body_that_cannot_stand_has_no_time_and_gives_no_warning() -> None:
+    cases = {"c": [1.1, 1.3], "b": [1.2, 1.2]}
+    found = sweep.predict({"friction": {"mu": 20}, "start": {"n0": 0.02}, "cases": cases, "measure": FIRST})
+    assert np.isnan(found.t_first_reversal_predicted[1])
+    assert found.reversal_time_reason[1] == NOT_KNOWN

@@ -240,7 +240,7 @@ def test_axes_in_any_order_of_values() -> None:
         ({"x": "q"}, "x: reversals has no axis q; its axes are mu, b, n0"),
         ({"x": "b", "y": "b"}, "y: b is the other axis already"),
         ({"cmap": "q"}, "cmap: there is no colour map q; choose"),
-        ({"limits": (2, 1)}, r"limits: 2..1; give"),
+        ({"limits": (2, 1)}, r"limits: must be a lower and a higher finite number"),
         ({"limits": (0, 2), "variable": "ratio", "ax": Figure().subplots()}, r"limits: 0..2; give numbers above zero"),
         ({"variable": "q"}, "variable: there is no variable q; choose reversals"),
         ({"output": "x.jpg"}, "output: x.jpg: unknown format; write a png, pdf, svg or eps"),

@@ -264,7 +264,7 @@ def test_a_map_without_boundaries_has_an_empty_picture(tmp_path: Path) -> None:
 def test_what_cannot_be_searched_is_refused(write: Write) -> None:
     one = write("friction: {mu: [60, 70]}\n", "one.yaml")
     refused(invoke("boundaries", one), "boundaries need two axes")
-    refused(invoke("boundaries", one, "--x", "c"), "x: c is no axis of more than one value", "mu")
+    refused(invoke("boundaries", one, "--x", "c"), "--x: c is not an axis of more than one value", "mu")
 
 
 def traced(edge: Callable[[Array], Array], points: int, deviation: float) -> tuple[Curve, int]:
