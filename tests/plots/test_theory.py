@@ -17,6 +17,7 @@ from sweep.models.ladder import analytic
 from sweep.models.theory import stability
 from sweep.plots import description, picture
 from sweep.plots.theory import Line, crossings, lines
+from sweep.results.kind import CRITICAL
 
 BODY = {"a": 10.0, "c": 1.0, "delta": 0.03}
 
@@ -78,7 +79,8 @@ def test_the_code_of_a_users_model_does_not_run_for_a_picture() -> None:
 
 def test_curves_of_critical_spins_are_smooth_from_the_first_value_to_the_last() -> None:
     dataset = predictions([30.0, 80.0, 130.0, 180.0]).sel(b=4.5).drop_vars(["n0", "reversals_predicted"])
-    dataset["critical_reason"] = dataset["n_c1_plus"].astype("int8")
+    for name in set(CRITICAL.needs) - set(dataset):
+        dataset[name] = dataset["n_c1_plus"].astype("int8" if name.endswith("reason") else float)
     dataset["n_c2_plus_simulated"] = dataset["n_c2_plus"]
     (axes,) = picture.plot(dataset).axes
     for name in ("n_c1_plus_linear", "n_c2_plus"):

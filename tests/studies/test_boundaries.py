@@ -137,7 +137,7 @@ def searched(
 
     search = Boundaries(measuring(sweep.load_config(SCENE, axes)), Formula(), ("b", "mu"), width, 0.01)
     sure: set[tuple[float, float]] = set()
-    while search.grow(lambda _: 1000):
+    while search.grow():
         if search.estimates:
             sure |= set(zip(search.rounds[-1]["mu"].tolist(), search.rounds[-1]["b"].tolist(), strict=True))
     return search, sure

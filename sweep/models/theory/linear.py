@@ -31,7 +31,7 @@ def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, wh
     deriving the equations a second time.
     """
     columns, states, some = [], states.astype(complex)[:, None], list(which)
-    together = max(1, _TOGETHER // states.shape[2])
+    together = max(1, _TOGETHER // max(1, states.shape[2]))
     for first in range(0, len(some), together):
         shifts = some[first : first + together]
         shifted = np.repeat(states, len(shifts), axis=1)
