@@ -127,8 +127,8 @@ def test_trajectories_of_samples_are_those_of_the_run(write: Write) -> None:
     assert seen["sample"].values.tolist() == [0, 1, 2, 3, 4] * 2
     for name in ("reversals", "t_last_reversal"):
         np.testing.assert_array_equal(seen[name], found[name].values.ravel())
-    assert sweep.trajectory(scene, samples=3, n0=0.05, t_end=10).n0.values.tolist() == [0.05] * 3
-    named = {"samples": 3, "t_end": 10, **dict.fromkeys(sweep.load_config(scene).distributions, 0.02)}
+    assert sweep.trajectory(scene, samples=3, b=2, n0=0.05, t_end=10).n0.values.tolist() == [0.05] * 3
+    named = {"samples": 3, "t_end": 10, "b": 2, **dict.fromkeys(sweep.load_config(scene).distributions, 0.02)}
     assert "sample" not in sweep.trajectory(scene, **named).coords
     with pytest.raises(sweep.ConfigError, match="samples: needs a parameter that is a distribution"):
         sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, samples=3)
