@@ -3,6 +3,7 @@
     python scripts/film_verdicts.py good FILMS SEED       films of what the configuration describes
     python scripts/film_verdicts.py spoilt FILMS SEED     films of something else, in turn of each kind of `SPOILT`
     python scripts/film_verdicts.py teacher FILMS SEED    good films with three gross outliers each
+    python scripts/film_verdicts.py phone                 prints `data/phone_synthetic.csv`
 
 The films are made by `tests/support/newton.py`, another derivation and SciPy's integrator: solid bodies of 5 to 20 cm,
 three laws of friction, 4 to 8 s at 30 to 240 images a second, noise of 1 to 5 % of the start spin, spins or what a
@@ -44,8 +45,8 @@ LAWS: dict[str, dict[str, Any]] = {
 FREE = ("mu", "sigma", "n0", "x0", "y0")
 
 SPOILT = ("law", "body", "spin unit", "time unit", "outliers", "bias", "delay", "drag")
-"""What is wrong: the law fitted is not that of the film; the inertia is; degrees are taken for radians; hundredths of a
-second for tenths; a tenth of the rows is off; the gyroscope has a bias; the film begins late; the drag is held at
+"""What is wrong: the law fitted is not that of the film; the inertia is not that of the body; degrees are taken for
+radians; hundredths of a second for tenths; a tenth of the rows is off; the gyroscope has a bias; the film begins late; the drag is held at
 zero."""
 
 
@@ -100,7 +101,7 @@ def cases(films: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Case]:
 def _case(kind: str, random: np.random.Generator) -> Case | None:
     """A film of a random body, or None if that lifts off."""
     solid, law = body(random), str(random.choice(list(LAWS)))
-    if kind == "law":  # dry friction that slips fast, taken for a viscous one
+    if kind == "law":  # dry friction, taken for a viscous one or for none
         law = "coulomb-sqrt"
     friction = LAWS[law] | {"mu": LAWS[law]["mu"] * random.uniform(0.5, 2)}
     lasts = np.exp(random.uniform(np.log(3), np.log(20))) if kind == "drag" else np.exp(random.uniform(np.log(5), 4))
@@ -127,7 +128,9 @@ def _case(kind: str, random: np.random.Generator) -> Case | None:
     free = FREE
     match kind:
         case "law":
-            told["friction"] = dict(LAWS["viscous"])
+            told["friction"], free = (
+                (dict(LAWS["viscous"]), FREE) if random.random() < 0.5 else ({"law": "none"}, FREE[1:])
+            )
         case "body":
             told["body"] |= {"Ixy": solid["Ixy"] * random.choice([0.4, 0.6, 1.6]), "Ixx": 1.3 * solid["Ixx"]}
         case "spin unit":
@@ -149,7 +152,10 @@ def _case(kind: str, random: np.random.Generator) -> Case | None:
 def judged(case: Case) -> dict[str, Any]:
     """What a fit says of a film, with what is true."""
     began = time.process_time()
-    found = sweep.fit(case.told, case.film, case.free, progress=False)
+    try:
+        found = sweep.fit(case.told, case.film, case.free, progress=False)
+    except sweep.ConfigError as refusal:
+        return {"kind": case.kind, "law": case.law, "fits": 0, "why": str(refusal)}
     seconds = time.process_time() - began
     kept = ~found["outlier"].values
     squares = [float(np.sum((curve - case.film.value)[kept] ** 2)) for curve in (found["fitted"].values, case.exact)]
@@ -168,17 +174,49 @@ def judged(case: Case) -> dict[str, Any]:
 
 def summary(lines: list[dict[str, Any]]) -> str:
     """The shares over all films."""
-    inside = np.concatenate([each["inside"] for each in lines])
     words = [f"{np.mean([each['fits'] for each in lines]):.1%} of {len(lines)} are called good"]
+    words += _of_fits([each for each in lines if "best" in each])
+    for kind in dict.fromkeys(each["kind"] for each in lines):
+        some = [each["fits"] for each in lines if each["kind"] == kind]
+        words.append(f"{kind}: {len(some) - sum(some)} of {len(some)} called bad")
+    return "\n".join(words)
+
+
+def _of_fits(lines: list[dict[str, Any]]) -> list[str]:
+    """How good the fits are that were not refused."""
+    inside, words = np.concatenate([each["inside"] for each in lines]), list[str]()
     words.append(f"best minimum in {np.mean([each['best'] for each in lines]):.1%}")
     for level in (68, 95):
         held = np.concatenate([each["held"][level] for each in lines])[inside]
         words.append(f"{np.mean(held):.1%} of {inside.sum()} truths in the intervals of {level} %")
     words.append(f"{np.median([each['seconds'] for each in lines]):.1f} s of the processor a fit (median)")
-    for kind in dict.fromkeys(each["kind"] for each in lines):
-        some = [each["fits"] for each in lines if each["kind"] == kind]
-        words.append(f"{kind}: {len(some) - sum(some)} of {len(some)} called bad")
-    return "\n".join(words)
+    return words
+
+
+PHONE = "--mass 420g --length 24cm --width 7.5cm --height 3.4cm --angle 3.0+-0.8deg"
+"""The rattleback of the page on fits, a phone on it."""
+
+
+def phone() -> None:
+    """Print what phyphox would show of it, with noise and two blows, and a product of inertia that was misjudged."""
+    from sweep.cli.configurations import MEASURED
+    from sweep.config.document import parse_value
+    from sweep.config.measured import measured, of_solid
+
+    given = dict(zip(*[iter(PHONE.replace("--", "").split())] * 2, strict=True))
+    text = of_solid({name: measured(name, value, MEASURED[name][0]) for name, value in given.items()}, whole=False)
+    told = parse_value(text, "phone")
+    told["body"]["Ixy"] = 1.15 * told["body"]["Ixy"]["normal"][0]
+    told["friction"] |= {"mu": 0.22, "sigma": told["body"]["Izz"] / 25}
+    told["start"] = {"n0": 5.4, "x0": 1.4e-3, "y0": -4e-4}
+    times, random = np.arange(0, 8, 0.01), np.random.default_rng(44)
+    y = motion(sweep.load_config(told), "coulomb-sqrt", times)
+    assert y is not None
+    turning = np.array([y[3], y[2], -y[4]]) + random.normal(0, 0.03, (3, len(times)))
+    turning[2, [231, 566]] += [4.0, -2.5]
+    print('"Time (s)","Gyroscope x (rad/s)","Gyroscope y (rad/s)","Gyroscope z (rad/s)","Absolute (rad/s)"')
+    for row in zip(times, *turning, np.linalg.norm(turning, axis=0), strict=True):
+        print(",".join(f"{value:.4f}" for value in row))
 
 
 def main(which: str, films: int, seed: int, first: int = 0) -> None:
@@ -191,4 +229,4 @@ def main(which: str, films: int, seed: int, first: int = 0) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], *map(int, sys.argv[2:]))
+    phone() if sys.argv[1] == "phone" else main(sys.argv[1], *map(int, sys.argv[2:]))

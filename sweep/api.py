@@ -303,7 +303,8 @@ def animate(
 
     Parameters
     ----------
-    source : a configuration, as for `run`, or a dataset of `trajectory` or the path of its file, which ends in .nc
+    source : a configuration, as for `run`, or a dataset of `trajectory` or `fit`, or the path of its file, which ends
+        in .nc.  Of a fit, the film is shown beside the body that fits it
     output : file to write; its suffix names the format: gif, mp4 (which needs ffmpeg) or html (a page without network)
     begin, end : the stretch of time shown; by default until a third beyond the last of the bodies' first reversals
     speed : time shown in a second of the clip; by default such that the clip takes ten
@@ -330,7 +331,12 @@ def animate(
     if output is not None:
         animation.check(Path(output))
     if animation.is_dataset(source):
-        return animation.animate(source, output, begin=begin, end=end, speed=speed, **values)
+        from sweep.progress import shown as told_by
+        from sweep.studies.filmed import shown
+
+        with told_by(progress, reporter) as told:
+            of_file = shown(source, told)
+        return animation.animate(of_file, output, begin=begin, end=end, speed=speed, **values)
     followed = trajectory(cast("ConfigLike", source), progress=progress, reporter=reporter, **values)
     return animation.animate(followed, output, begin=begin, end=end, speed=speed)
 

@@ -133,7 +133,8 @@ def animate(
 ) -> None:  # fmt: skip
     """Show how single bodies turn, and their contact points' paths on the table.
 
-    The bodies are those of CONFIG, or of FILE, which `sweep trajectory` wrote (NAME_trajectory.nc).  They are shown
+    The bodies are those of CONFIG, or of FILE, which `sweep trajectory` wrote (NAME_trajectory.nc), or the film and the
+    body that fits it of a FILE that `sweep fit` wrote (NAME_fit.nc).  They are shown
     side by side on a common clock, above their spin curves.  A page (html) opens without network; an mp4 needs ffmpeg.
     """
     from sweep.plots import animation
@@ -147,7 +148,14 @@ def animate(
     target = output or usual
     animation.check(target)
     require_writable(target)
-    result = _followed(config, cells_of(cells, config.table), quiet) if config else source
+    if config:
+        result = _followed(config, cells_of(cells, config.table), quiet)
+    else:
+        from sweep.progress import Terminal
+        from sweep.studies.filmed import shown
+
+        with Terminal(quiet) as terminal:
+            result = shown(source, terminal)
     target.parent.mkdir(parents=True, exist_ok=True)
     animation.animate(result, target, begin=begin, end=end, speed=speed)
     if not quiet:

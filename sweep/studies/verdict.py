@@ -7,7 +7,7 @@ without what varies slowly, is as large as they are, and neither their autocorre
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import log10, sqrt
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from sweep.faults import counted, either
 from sweep.grid import BODY, Array
 from sweep.studies.intervals import variance
 from sweep.studies.misfit import UNKNOWNS, Minimum, Problem
+from sweep.units import ANGLE, SPIN, TIME, named, pretty
 
 # The chance that one of the tests calls a right curve wrong, and the lags of the autocorrelation.
 _CHANCE, _LAGS = 1e-3, 20
@@ -32,6 +33,10 @@ _TAILS = 6.0
 # A parameter is pressed against the end of its range if within this share of it the misfit would fall by so many
 # variances.
 _BEYOND, _PRESSED = 0.02, 2.0
+
+
+# How many of its errors a parameter may be from what was measured of it.
+_FAR = 3.5
 
 
 class Verdict(NamedTuple):
@@ -62,11 +67,18 @@ def judged(problem: Problem, best: Minimum) -> Verdict:
     reasons = [] if not np.isfinite(size) else _structure(away, size, noise)
     if problem.film.error is not None and chi2.sf(best.misfit, problem.rows - len(problem.free)) < _CHANCE:
         reasons.append(f"the curve misses the film by {size:.3g} times its errors")
-    if (off := int((~kept).sum())) > _SHARE * len(kept):
-        reasons.append(f"{off} of {len(kept)} rows are outliers")
+    if (left_out := int((~kept).sum())) > _SHARE * len(kept):
+        reasons.append(f"{left_out} of {len(kept)} rows are outliers")
     if ends := pressed(problem, best):
-        reasons.append(f"{either(ends).replace(' or ', ' and ')} would go beyond the range that was searched")
+        reasons.append(f"{_all(ends)} would go beyond the range that was searched")
+    far = np.abs(best.away[len(kept) :] / problem.scale)
+    if off := [name for i, name in enumerate(np.array([*problem.free])[problem.measured]) if far[i] > _FAR]:
+        reasons.append(f"{_all(off)} would be more than {_FAR:g} errors from what was measured")
     return Verdict(reasons, size, noise)
+
+
+def _all(names: Iterable[str]) -> str:
+    return either(names).replace(" or ", " and ")
 
 
 def own_noise(values: Array) -> float:
@@ -88,7 +100,7 @@ def _structure(away: Array, size: float, noise: float) -> list[str]:
     words = []
     if min(correlated, in_runs) < _CHANCE:
         by = f"{size / noise:.2g} times its noise" if size > 1.3 * noise > 0 else "more than noise"
-        words.append(f"the curve misses the film by {by}, and rows in a row to the same side")
+        words.append(f"the curve misses the film by {by}, and stays on one side of it for many rows")
     if kurtosis(away) > _TAILS * sqrt(24 / n):
         words.append("some rows are farther off the curve than noise brings them")
     return words
@@ -139,12 +151,12 @@ def sentences(
     `limits` are the ends of the intervals of 95 %, shape (2, free); `edge` says which are none.
     """
     config, names = problem.config, list(problem.free)
-    unit = {"heading": "rad"}.get(problem.film.what, "rad/s" if config.units == "SI" else "sqrt(g/c)")
+    unit = pretty(named(ANGLE if problem.film.what == "heading" else SPIN, config.units))
     return "\n".join([
         _how(problem, verdict, unit),
         _known(config, names, values, limits, edge) if verdict.fits else _CAUSES,
         _unknown([name for name, each in zip(names, edge, strict=True) if each], words) if verdict.fits
-        else "Its values describe a curve that is not the film's: their intervals are not to be believed.",
+        else "The values and intervals below describe a curve that is not the film's.",
     ])  # fmt: skip
 
 
@@ -157,7 +169,7 @@ _CAUSES = (
 def _how(problem: Problem, verdict: Verdict, unit: str) -> str:
     left = f", {counted(int((~problem.kept).sum()), 'outlier')} left out" if not problem.kept.all() else ""
     if not verdict.fits:
-        return f"The curve does not fit the film: {'; '.join(verdict.reasons)}{left}."
+        return f"The fit is not to be believed: {'; '.join(verdict.reasons)}{left}."
     if problem.film.error is not None:
         return f"The curve fits the film: it misses it by {verdict.size:.2g} times its errors{left}."
     return (
@@ -170,7 +182,8 @@ def _known(config: Config, names: Sequence[str], values: Array, limits: Array, e
     told = []
     for name, value, (low, high), at in zip(names, values, limits.T, edge, strict=True):
         if not at:
-            told.append(f"{name} is {_digits(value, high - low)}{_unit(config, name)} "
+            words = config.described(name)["long_name"] if name in config.table else name
+            told.append(f"{words} is {_digits(value, high - low)}{_unit(config, name)} "
                         f"({_digits(low, high - low)} to {_digits(high, high - low)})")  # fmt: skip
     return f"At 95 % confidence, {', '.join(told)}." if told else "It determines none of the free parameters."
 
@@ -182,10 +195,10 @@ def _digits(value: float, width: float) -> str:
 
 
 def _unit(config: Config, name: str) -> str:
-    found = (
-        config.described(name).get("units", "") if name in config.table else {"film_delay": "s"}.get(name, "radian s-1")
-    )
-    return f" {found.replace('radian s-1', 'rad/s').replace('radian', 'rad')}" if found and found != "1" else ""
+    """The unit of a parameter, as figures print it, behind a space."""
+    of_film = {"film_delay": named(TIME, config.units), "film_bias": named(SPIN, config.units)}
+    found = config.described(name).get("units", "") if name in config.table else of_film[name]
+    return f" {pretty(found)}" if found not in ("", "1") else ""
 
 
 def _unknown(names: Sequence[str], words: Sequence[str]) -> str:
@@ -196,7 +209,7 @@ def _unknown(names: Sequence[str], words: Sequence[str]) -> str:
             return f"But {tied[0]}; measure one of them otherwise."
         return "A film of another start would test the law of friction."
     which = dict.fromkeys(next((film for some, film in _FILMS.items() if name in some), _SLIPPING) for name in names)
-    return f"It does not determine {either(names).replace(' or ', ' and ')}; for that, {'; and '.join(which)}."
+    return f"It does not determine {_all(names)}; for that, {'; and '.join(which)}."
 
 
 _SLIPPING = "film the body as it slips and reverses: with a faster spin, or more tilt at the start"

@@ -20,6 +20,7 @@ from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import stack, take
 from sweep.results.store import StoreError
+from sweep.studies.filmed import shown
 from sweep.studies.misfit import Problem
 from sweep.studies.ranges import Range
 
@@ -188,6 +189,90 @@ def test_the_command_writes_what_runs_the_fitted_body(
         assert invoke(verb, tmp_path / "out" / "scene_fit.nc").exit_code == 0
     with pytest.raises(StoreError, match="has a fit; open a dataset of run"):
         Source(written)
+
+
+def test_a_right_curve_is_called_right(found: xr.Dataset) -> None:
+    assert found.attrs["fits"] == 1
+    assert found.attrs["noise"] == pytest.approx(NOISE, rel=0.15)
+    how, known, unknown = found.attrs["verdict"].splitlines()
+    assert how == "The curve fits the film: it misses it by 0.00092 √(g/c) (root mean square), which is noise."
+    assert re.fullmatch(r"At 95 % confidence, friction μ is 5\d\.\d .* start spin n₀ is 0\.052.*\)\.", known)
+    assert unknown == "A film of another start would test the law of friction."
+    assert found.edge.values.tolist() == [0, 0]
+    assert not found.outlier.any()
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ({"delta": 0.04}, "times its noise, and stays on one side of it for many rows"),
+        ({"mu": [30.0, 48.0]}, "mu would go beyond the range that was searched"),
+        ({"b": {"normal": [3.2, 0.02]}}, "b would be more than 3.5 errors from what was measured"),
+    ],
+    ids=str,
+)
+def test_a_wrong_curve_is_called_wrong(
+    write: Write, seen: tuple[np.ndarray, ...], given: dict[str, Any], reason: str
+) -> None:
+    times, spins, _ = seen
+    found = sweep.fit(write(SCENE), Film(times, spins), ["mu", "n0"], **given)
+    assert found.attrs["fits"] == 0
+    assert reason in found.attrs["fits_because"]
+    assert found.attrs["verdict"].startswith("The fit is not to be believed: ")
+    if given.keys() == {"mu"}:
+        assert found.edge.values.tolist() == [2, 0]
+
+
+def test_outliers_are_left_out_and_widen_no_interval(
+    write: Write, seen: tuple[np.ndarray, ...], found: xr.Dataset
+) -> None:
+    times, spins = seen[0], seen[1].copy()
+    spins[[40, 170, 250]] += [10.0, -0.05, 0.008]
+    again = sweep.fit(write(SCENE), Film(times, spins), ["mu", "n0"])
+    assert np.flatnonzero(again.outlier).tolist() == [40, 170, 250]
+    assert "3 outliers left out" in again.attrs["verdict"]
+    assert again.attrs["fits"] == 1
+    np.testing.assert_allclose(again.upper_95 - again.lower_95, found.upper_95 - found.lower_95, rtol=0.1)
+
+
+def test_ranges_are_found_from_the_film(write: Write, seen: tuple[np.ndarray, ...], found: xr.Dataset) -> None:
+    """From guesses that are far off."""
+    times, spins, _ = seen
+    guesses = write("friction: {mu: 5}\nstart: {n0: -3, x0: 0.01, y0: 0.01}\n", "guesses.yaml")
+    again = sweep.fit(guesses, Film(times, spins), ["mu", "n0"])
+    np.testing.assert_allclose(again.value, found.value, rtol=1e-4)
+    low, high = again.range_from.values[1], again.range_to.values[1]
+    assert 0 < low < TRUTH["n0"] < high < 0.1
+
+
+def test_what_was_measured_of_the_body_is_a_prior(write: Write, seen: tuple[np.ndarray, ...]) -> None:
+    """Of a body that spins upright a film says nothing, so that what was measured stays as it was."""
+    times = seen[0][:100]
+    film = Film(times, noisy(np.full(len(times), 0.05)))
+    found = sweep.fit(write(SCENE), film, ["n0"], mu=55, x0=0.0, y0=0.0, b={"normal": [3.0, 0.1]})
+    assert found.parameter.values.tolist() == ["n0", "b"]
+    one = found.sel(parameter="b")
+    assert one.value.item() == pytest.approx(3.0, abs=0.01)
+    assert [one.lower_68.item(), one.upper_68.item()] == pytest.approx([2.9, 3.1], abs=0.01)
+    assert [one.lower_95.item(), one.upper_95.item()] == pytest.approx([2.804, 3.196], abs=0.015)
+
+
+def test_a_drag_is_sought_where_the_configuration_names_none(write: Write) -> None:
+    config = write(DRY)
+    found = sweep.fit(config, film_of(config, "coulomb-sqrt"), ["sigma", "n0"])
+    one = found.sel(parameter="sigma")
+    assert one.lower_95.item() == 0.0 < one.upper_95.item() < 1e-4
+    assert one.edge.item() == 0
+
+
+def test_film_and_fit_are_shown_side_by_side(found: xr.Dataset) -> None:
+    both = shown(found.isel(time=slice(60)))
+    assert both.trajectory.values.tolist() == ["film", "fit"]
+    film, fit = (both.sel(trajectory=name) for name in ("film", "fit"))
+    np.testing.assert_allclose(film.spin, fit.spin, atol=0.006)
+    np.testing.assert_allclose(film.heading, fit.heading, atol=0.1)
+    assert not film.roll_angle.any()
+    assert fit.roll_angle.any()
 
 
 @pytest.mark.parametrize("laws", [(), ("viscous", "coulomb")])
