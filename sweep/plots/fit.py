@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,8 @@ def draw(dataset: xr.Dataset) -> Picture:
         above.plot(time, fitted, color=f"C{i}", linewidth=1, label=name, gid=f"fitted {name}")
         left = np.where(out, np.nan, seen - fitted)
         below.plot(time, left, ".", color=colour, markersize=2, gid=f"residuals {name}")
-    if noise := float(dataset.attrs.get("noise", 0)):
-        below.axhspan(-2 * noise, 2 * noise, color="0.9", zorder=0, gid="noise")
+    if isinstance(noise := dataset.attrs.get("noise"), Real):
+        below.axhspan(-2 * float(noise), 2 * float(noise), color="0.9", zorder=0, gid="noise")
     low, high = np.nanpercentile(seen[~out], [0, 100])
     above.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low)) if out.any() and high > low else None
     zero_line(above)

@@ -74,22 +74,23 @@ def _side(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int) -> tuple
     spread, unit = covariance(problem, best), variance(problem, best)
     size = np.sqrt(max(spread[i, i], 1e-30))
     along, reach, ends = spread[:, i] / size**2, float(size), list[float]()
-    lower = None
+    valley, lower = [best.place], None
     for allowed in LEVELS.values():
         near, far = (reach, np.inf) if ends else (0.0, np.inf)
         reach *= float(np.sqrt(allowed / LEVELS[68]))
         for _ in range(8):
             end = float(np.clip(best.place[i] + sign * reach, 0, 1))
-            start = np.clip(best.place + along * (end - best.place[i]), 0, 1)
-            start[i] = end
+            starts = _starts(valley, best.place + along * (end - best.place[i]), i, end)
+            start = min(starts, key=lambda each: float(np.sum(ask(each[None]) ** 2)))
             found = minimise(ask, start, i, _ENOUGH / problem.rows)
             above = (found.misfit - best.misfit) / unit
+            if above < 10 * allowed:
+                valley.append(found.place)
             if above < -0.01 * allowed:
                 lower = found
             if lower or abs(above / allowed - 1) < 0.05 or (end in (0, 1) and above < allowed):
                 break
             reach = abs(end - best.place[i])
-            along = (found.place - best.place) / (end - best.place[i])  # a valley is curved
             near, far = (reach, far) if above < allowed else (near, reach)
             # A profile is nearly a parabola; where it is not, halve.
             guess = reach * float(np.sqrt(allowed / max(above, 0.05 * allowed)))
@@ -98,6 +99,22 @@ def _side(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int) -> tuple
         if lower:
             return ends + ends[-1:] * (len(LEVELS) - len(ends)), lower
     return ends, None
+
+
+def _starts(valley: list[Array], straight: Array, i: int, end: float) -> list[Array]:
+    """Places from which to go down to the bottom of a valley, which may be curved, where parameter `i` is at `end`.
+
+    They are on the straight line of the linear theory, on that through the two places of the `valley` that are nearest
+    to the end, and at the nearest of them.
+    """
+    near = sorted(valley, key=lambda each: abs(each[i] - end))[:2]
+    starts = [straight, near[0].copy()]
+    if len(near) > 1 and near[0][i] != near[1][i]:
+        starts.append(near[0] + (near[0] - near[1]) * (end - near[0][i]) / (near[0][i] - near[1][i]))
+    starts = [np.clip(each, 0, 1) for each in starts]
+    for each in starts:
+        each[i] = end
+    return starts
 
 
 def covariance(problem: Problem, best: Minimum) -> Array:

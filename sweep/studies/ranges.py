@@ -30,7 +30,7 @@ class Range:
     high: float
     bend: float
     least: float = -inf
-    """A bound of physics, which may be the lower end: such an end is no end of the search."""
+    """The bounds beyond which it is not widened."""
     most: float = inf
     given: bool = False
     """Whether the user has given the ends, so that they are not widened."""
@@ -60,13 +60,16 @@ class Range:
         return replace(self, high=min(end, self.most)) if up else replace(self, low=max(end, self.least))
 
     def ends(self, place: float, near: float = 0.0) -> int:
-        """-1 or 1 if a place is at the lower or upper end of the search, 0 if not; an end of physics is none."""
-        if place <= near and self.low > self.least:
+        """-1 or 1 if a place is at the lower or upper end of the search, 0 if not; zero, as of a drag, is no end."""
+        if place <= near and (self.low or self.least):
             return -1
-        return int(place >= 1 - near and self.high < self.most)
+        return int(place >= 1 - near)
 
 
 _MUCH = 1e9
+
+_ROWS = 1500
+"""Rows of a film from whose last third the drag is estimated."""
 
 # What a hand does to a body: its start point, as shares of a and b, and its tilt.
 _NEAREST, _FARTHEST, _LEVEL, _TILTED = 5e-4, 0.2, 5e-4, 0.15
@@ -116,13 +119,13 @@ def measured(parameter: Parameter, known: Distribution) -> Range:
 
 
 def _around(config: Config, parameter: Parameter, value: float, least: float, most: float) -> Range:
-    """From a fifth to five times of a positive value; from zero to twice one that may be negative."""
+    """From a fifth to five times of a positive value; up to twice one that may be negative, with either sign."""
     if value == 0:
         message = "give the ends of its range as two values, such as [-1, 1]: it is free, and zero tells no size"
         raise ConfigError([config.fault(parameter.place, message)])
     if least >= 0:
         return Range.even(value / 5, min(value * 5, most), least=least, most=most)
-    return Range.even(0.0, 2 * value, least, most)
+    return Range.even(-2 * value, 2 * value, least, most)
 
 
 def _spins(film: Film, sign: int) -> Range:
@@ -140,7 +143,8 @@ def _spins(film: Film, sign: int) -> Range:
 
 def _drag(config: Config, film: Film) -> float:
     """The largest drag that the film's end allows: five times what it loses there, if all of it were drag."""
-    last = slice(len(film.time) * 2 // 3, None)
+    # No more rows than that: slopes are those of all pairs.
+    last = slice(len(film.time) * 2 // 3, None, max(1, len(film.time) // _ROWS))
     spin = np.gradient(film.value, film.time) if film.what == "heading" else film.value
     size = np.abs(spin[last])
     rate = max(-theilslopes(size, film.time[last])[0], 0.0) / max(np.median(size), 1e-12)

@@ -1,6 +1,7 @@
 """Fits to films that another derivation has made, their intervals, and laws of friction compared by them."""
 
 import re
+import runpy
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args
@@ -8,7 +9,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 import xarray as xr
-from support import Write, adaptive, columns, newton
+from support import ROOT, Write, adaptive, columns, newton
 from support.cli import invoke
 
 import sweep
@@ -196,7 +197,7 @@ def test_a_right_curve_is_called_right(found: xr.Dataset) -> None:
     assert found.attrs["noise"] == pytest.approx(NOISE, rel=0.15)
     how, known, unknown = found.attrs["verdict"].splitlines()
     assert how == "The curve fits the film: it misses it by 0.00092 √(g/c) (root mean square), which is noise."
-    assert re.fullmatch(r"At 95 % confidence, friction μ is 5\d\.\d .* start spin n₀ is 0\.052.*\)\.", known)
+    assert re.fullmatch(r"At 95 % confidence, friction μ is 5\d\.\d .* start spin n₀ is 0\.0519 .*\)\.", known)
     assert unknown == "A film of another start would test the law of friction."
     assert found.edge.values.tolist() == [0, 0]
     assert not found.outlier.any()
@@ -374,3 +375,28 @@ def test_the_command_compares_laws_and_writes_table_picture_and_the_best_body(wr
     assert (best.law, best.integrator.t_end) == ("viscous", 2)
     for verb in ("info", "plot"):
         assert invoke(verb, out / "stone_laws.nc").exit_code == 0
+
+
+@pytest.mark.campaign
+def test_films_of_another_code_are_judged_rightly() -> None:
+    """A few of the films that the page on fits counts."""
+    script = runpy.run_path(str(ROOT / "scripts" / "film_verdicts.py"))
+    good = [script["judged"](case) for case in script["cases"](12, 1, ("good",))]
+    assert sum(each["fits"] for each in good) >= 11
+    assert sum(each["best"] for each in good) >= 11
+    spoilt = [script["judged"](case) for case in script["cases"](8, 2, script["SPOILT"])]
+    assert not any(each["fits"] for each in spoilt if each.get("off", 1) > script["_OFF"])
+
+
+def test_the_film_of_a_phone_gives_its_friction(tmp_path: Path) -> None:
+    """As the page on ruler and phone has it, word for word"""
+    script = runpy.run_path(str(ROOT / "scripts" / "film_verdicts.py"))
+    (tmp_path / "phone.yaml").write_text(invoke("body", *script["PHONE"].split()).stdout, encoding="utf-8")
+    assert script["PHONE"] in (ROOT / "docs" / "how-to" / "fit-phone.md").read_text(encoding="utf-8")
+    film = ROOT / "data" / "phone_synthetic.csv"
+    found = sweep.fit(tmp_path / "phone.yaml", film, ["mu", "sigma", "n0", "x0", "y0"])
+    assert found.attrs["fits"] == 1
+    assert "2 outliers left out" in found.attrs["verdict"]
+    one = found.sel(parameter="mu")
+    assert one.lower_95.item() < 0.22 < one.upper_95.item()
+    assert one.upper_95.item() - one.lower_95.item() < 0.01
