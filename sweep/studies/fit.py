@@ -135,13 +135,28 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
 
 def _found(problem: Problem, note: Callable[[str], None]) -> tuple[Problem, list[Minimum]]:
     """The minima over the whole film, the lowest first, and the problem with the ranges and outliers that they show."""
-    found: list[Minimum] = []
+    found: list[tuple[Problem, list[Minimum]]] = []
     for seed, (points, kept) in enumerate(SEARCHES):
-        minima = _search(problem, points, kept, seed, note)
-        problem, found = _settled(problem, _different([*found, *minima]), note)
-        if verdict.judged(problem, found[0]).fits:
+        settled, minima = _settled(problem, _search(problem, points, kept, seed, note), note)
+        found.append((settled, minima))
+        # A wider range may have led into a corner far from the minimum that is sought.
+        if settled.free == problem.free and verdict.judged(settled, minima[0]).fits:
             break
-    return problem, found
+    problem, minima = min(found, key=lambda each: each[1][0].misfit)
+    return problem, _different([_turned(problem, each) for each in minima])
+
+
+def _turned(problem: Problem, minimum: Minimum) -> Minimum:
+    """The minimum with the sign of the start that the configuration has, where half a turn changes it."""
+    names = ranges.mirrored(problem.config, problem.free)
+    if not names:
+        return minimum
+    at = [list(problem.free).index(name) for name in names]
+    if (minimum.place[at[0]] - 0.5) * (problem.config.parameters[names[0]].numbers[0] or 1.0) >= 0:
+        return minimum
+    place, jacobian = minimum.place.copy(), minimum.jacobian.copy()
+    place[at], jacobian[:, at] = 1 - place[at], -jacobian[:, at]
+    return minimum._replace(place=place, jacobian=jacobian)
 
 
 def _search(problem: Problem, points: int, kept: int, seed: int, note: Callable[[str], None]) -> list[Minimum]:

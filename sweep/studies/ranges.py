@@ -57,6 +57,8 @@ class Range:
         end = self.bend * np.sinh((high if up else low) + (1 if up else -1) * min((high - low) / 2, log(4)))
         if self.given or self.prior:
             return self
+        if self.low == -self.high:
+            return replace(self, low=max(-abs(end), self.least), high=min(abs(end), self.most))
         return replace(self, high=min(end, self.most)) if up else replace(self, low=max(end, self.least))
 
     def ends(self, place: float, near: float = 0.0) -> int:
@@ -71,12 +73,12 @@ _MUCH = 1e9
 _ROWS = 1500
 """Rows of a film from whose last third the drag is estimated."""
 
-# What a hand does to a body: its start point, as shares of a and b, and its tilt.
-_NEAREST, _FARTHEST, _LEVEL, _TILTED = 5e-4, 0.2, 5e-4, 0.15
+# What a hand does to a body: how far it takes its contact point, as a share of a and b, or tilts it.
+_FARTHEST, _TILTED = 0.2, 0.15
 
-_OF_A, _OF_B = {"x0": "a", "pitch": ""}, {"y0": "b", "roll": ""}
-_ON_BODY = 0.9
-"""Share of a semi-axis within which a start point is sought."""
+_STARTS = {"x0": "a", "y0": "b", "pitch": "", "roll": ""}
+_ON_BODY = 0.65
+"""Share of both semi-axes within which a start point is sought: the corners are on the body."""
 
 # Shares of a range of parameters that may vanish, or have either sign, within which it is linear.
 _FROM_ZERO, _EITHER_SIGN = 1 / 300, 1 / 100
@@ -101,7 +103,7 @@ def of_parameter(config: Config, film: Film, name: str) -> Range:
         return _around(config, parameter, value, least, most)
     if name in ("n0", "omega3"):
         return _spins(film, 1 if name == "n0" else -1)
-    if name in _OF_A or name in _OF_B:
+    if name in _STARTS:
         return _starts(config, name, value)
     if name == "sigma":
         return Range(0.0, high := _drag(config, film), high * _FROM_ZERO, least=0.0)
@@ -155,20 +157,24 @@ def _drag(config: Config, film: Film) -> float:
 
 
 def _starts(config: Config, name: str, value: float) -> Range:
-    """The start point or tilt; that along the body keeps its sign, as both signs together start a mirror image.
+    """The start point or tilt, of either sign, which is nearly logarithmic."""
+    size = _STARTS[name]
+    length = min(config.parameters[size].numbers) if size else 1.0
+    most = _ON_BODY * length if size and config.surface == "ellipsoid" else inf
+    far = min(max(_FARTHEST * length if size else _TILTED, 2 * abs(value)), most)
+    return Range(-far, far, far * _EITHER_SIGN, least=-most, most=most)
+
+
+def mirrored(config: Config, free: Mapping[str, Range]) -> list[str]:
+    """The names of the start point or tilt where both signs together start the same motion, half a turn later.
 
     Half a turn takes a body to itself unless it has an `Ixz` or `Iyz`.
     """
-    size = (_OF_A | _OF_B)[name]
-    length = min(config.parameters[size].numbers) if size else 1.0
-    near, far = (_NEAREST * length, _FARTHEST * length) if size else (_LEVEL, _TILTED)
-    most = _ON_BODY * length if size and config.surface == "ellipsoid" else inf
-    far = min(max(far, 2 * abs(value)), most)
-    turned = any(config.parameters[each].numbers != (0.0,) for each in ("Ixz", "Iyz") if each in config.parameters)
-    if name in _OF_A and not turned:
-        side = 1 if value >= 0 else -1
-        return Range.even(side * near, side * far, -most, most)
-    return Range(-far, far, far * _EITHER_SIGN, least=-most, most=most)
+    pairs = (pair for pair in (["x0", "y0"], ["pitch", "roll"]) if {*pair} <= free.keys())
+    names = next((pair for pair in pairs if all(free[name].low == -free[name].high for name in pair)), [])
+    others = ("Ixz", "Iyz", "omega1", "omega2", "slip1", "slip2")
+    odd = any(name in free or config.parameters[name].numbers != (0.0,) for name in others if name in config.parameters)
+    return [] if odd else names
 
 
 def wide(config: Config, law: Law) -> Mapping[str, tuple[float, float]]:
