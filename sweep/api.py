@@ -303,7 +303,8 @@ def animate(
 
     Parameters
     ----------
-    source : a configuration, as for `run`, or a dataset of `trajectory` or the path of its file, which ends in .nc
+    source : a configuration, as for `run`, or a dataset of `trajectory` or `fit`, or the path of its file, which ends
+        in .nc.  Of a fit, the film is shown beside the body that fits it
     output : file to write; its suffix names the format: gif, mp4 (which needs ffmpeg) or html (a page without network)
     begin, end : the stretch of time shown; by default until a third beyond the last of the bodies' first reversals
     speed : time shown in a second of the clip; by default such that the clip takes ten
@@ -330,7 +331,12 @@ def animate(
     if output is not None:
         animation.check(Path(output))
     if animation.is_dataset(source):
-        return animation.animate(source, output, begin=begin, end=end, speed=speed, **values)
+        from sweep.progress import shown as told_by
+        from sweep.studies.filmed import shown
+
+        with told_by(progress, reporter) as told:
+            of_file = shown(source, told)
+        return animation.animate(of_file, output, begin=begin, end=end, speed=speed, **values)
     followed = trajectory(cast("ConfigLike", source), progress=progress, reporter=reporter, **values)
     return animation.animate(followed, output, begin=begin, end=end, speed=speed)
 
@@ -341,6 +347,8 @@ def fit(
     free: Sequence[str],
     *,
     laws: Sequence[str] = (),
+    time_column: str = "",
+    spin_column: str = "",
     progress: bool | None = None,
     reporter: Reporter | None = None,
     **overrides: Any,
@@ -352,11 +360,14 @@ def fit(
     Parameters
     ----------
     config, progress, reporter, overrides : as for `run`.  A free parameter that has several values is sought between
-        the least and the largest; one that has a single value, from a fifth to five times it, or within half of it
-        where it may be negative.  All others have one value
+        the least and the largest.  The range of one that has a single value is found from the film and the body, and
+        widened where the best value lies at its end.  A parameter that is a distribution is free as well: that is what
+        was measured of it
     film : a table of numbers with a header: a time, and a spin ("spin (rad/s)"), what a phone on the body tells
         ("Gyroscope z (rad/s)") or a heading ("angle (deg)"); with a column "error", intervals follow from that, and
         else from the residuals.  Or a `sweep.config.film.Film`
+    time_column, spin_column : names of the columns of the film, with a unit if it gives none, such as "omega (deg/s)";
+        by default those with known names
     free : names of the parameters to find.  Of the film itself, film_delay and film_bias can be found too
     laws : laws of friction to compare, such as ``["viscous", "coulomb-tanh"]``.  Each takes from `config` what that
         says of its parameters, and finds those that `config` does not say as well; it does without what it has not
@@ -364,8 +375,10 @@ def fit(
     Returns
     -------
     Dataset over (parameter): the `value` that fits best, and the ends of its intervals of 68 and 95 %.  Over (time):
-        the film and the fit.  Over (rank): all minima that were found.  The attribute `undetermined` says what the film
-        does not tell, and `config` runs the fitted body.  With `laws`, dataset over (law, parameter) and (law, time);
+        the film, the fit, and which rows are outliers, left out of it.  Over (rank): all minima that were found.  The
+        attribute `fits` is 1 if what is left between film and curve is noise, and 0 if not; `fits_because` gives the
+        reason, `verdict` three sentences, `undetermined` what the film does not determine, and `config` runs the fitted
+        body.  With `laws`, dataset over (law, parameter) and (law, time);
         over (law): `chi_square`, `number_free`, `akaike` and the `weight` of each.
 
     Raises
@@ -376,7 +389,7 @@ def fit(
     from sweep.studies.laws import fitted
 
     with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return fitted(checked, film, free, laws, told)
+        return fitted(checked, film, free, laws, told, (time_column, spin_column))
 
 
 def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:

@@ -1,7 +1,8 @@
 """Commands, their output and pictures: ```{console} runs its lines that begin with `$ ` while the pages are built.
 
-The commands of a page run one after the other, in a folder of its own that holds the repository's `configs`.  Progress
-bars are left out.  ```{picture} shows an image file that an earlier command of the page has written.
+The commands of a page run one after the other, in a folder of its own that holds the repository's `configs` and films.
+Progress bars are left out.  What a command prints goes to a file if it ends with `> FILE`.  ```{picture} shows an image
+file that an earlier command of the page has written.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from docutils.parsers.rst.directives.images import Image
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-_CONFIGS = Path(__file__).parents[2] / "configs"
+_CONFIGS, _DATA = (Path(__file__).parents[2] / name for name in ("configs", "data"))
 
 
 class Picture(Image):
@@ -46,6 +47,7 @@ class Console(SphinxDirective):
         words = shlex.split(command, comments=True)
         if words[:3] != ["python", "-m", "sweep"]:
             raise self.error(f"{command}: only commands of sweep are run; write ```console without braces")
+        words, target = (words[:-2], words[-1]) if words[-2] == ">" else (words, "")
         done = subprocess.run(
             [sys.executable, *words[1:]],
             cwd=self._folder(),
@@ -53,9 +55,11 @@ class Console(SphinxDirective):
             stderr=subprocess.STDOUT,
             text=True,
         )
+        if target:
+            (self._folder() / target).write_text(done.stdout, encoding="utf-8")
         if done.returncode:
             raise self.error(f"{command}:\n{done.stdout}")
-        return [line for line in done.stdout.splitlines() if "━" not in line]
+        return [] if target else [line for line in done.stdout.splitlines() if "━" not in line]
 
     def _folder(self) -> Path:
         """The page's own folder, which the next build begins anew."""
@@ -63,6 +67,7 @@ class Console(SphinxDirective):
         if self.env.current_document.get("console") is None:
             shutil.rmtree(folder, ignore_errors=True)
             shutil.copytree(_CONFIGS, folder / "configs")
+            shutil.copytree(_DATA, folder / "data", ignore=shutil.ignore_patterns("benchmark", "reference*"))
             self.env.current_document["console"] = folder
         return folder
 

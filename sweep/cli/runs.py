@@ -133,7 +133,8 @@ def animate(
 ) -> None:  # fmt: skip
     """Show how single bodies turn, and their contact points' paths on the table.
 
-    The bodies are those of CONFIG, or of FILE, which `sweep trajectory` wrote (NAME_trajectory.nc).  They are shown
+    The bodies are those of CONFIG, or of FILE, which `sweep trajectory` wrote (NAME_trajectory.nc), or the film and the
+    body that fits it of a FILE that `sweep fit` wrote (NAME_fit.nc).  They are shown
     side by side on a common clock, above their spin curves.  A page (html) opens without network; an mp4 needs ffmpeg.
     """
     from sweep.plots import animation
@@ -147,7 +148,14 @@ def animate(
     target = output or usual
     animation.check(target)
     require_writable(target)
-    result = _followed(config, cells_of(cells, config.table), quiet) if config else source
+    if config:
+        result = _followed(config, cells_of(cells, config.table), quiet)
+    else:
+        from sweep.progress import Terminal
+        from sweep.studies.filmed import shown
+
+        with Terminal(quiet) as terminal:
+            result = shown(source, terminal)
     target.parent.mkdir(parents=True, exist_ok=True)
     animation.animate(result, target, begin=begin, end=end, speed=speed)
     if not quiet:
@@ -212,14 +220,21 @@ def indices(config: Config, **how: Any) -> None:
 @click.argument("film", type=PATH)
 @click.option("--free", required=True, metavar="NAME,NAME", help="The parameters to find, e.g. mu,sigma,n0,x0,y0.")
 @click.option("--laws", metavar="NAME,NAME", help="Laws of friction to fit and compare, e.g. viscous,coulomb.")
+@click.option("--time-column", default="", metavar="NAME", help="Column of the time, e.g. 'clock (ms)'.")
+@click.option("--spin-column", default="", metavar="NAME",
+              help="Column of the spin, gyroscope or heading, with its unit if the film has none.")  # fmt: skip
 @OUTPUT
 @QUIET
-def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | None, quiet: bool) -> None:
+def fit(
+    config: Config, film: Path, free: str, laws: str | None, time_column: str, spin_column: str, output: Path | None,
+    quiet: bool,
+) -> None:  # fmt: skip
     """Find the parameters of the body in CONFIG that reproduce FILM.
 
     FILM is a table with a header: a time, and a spin, a gyroscope's reading or a heading, such as "Time (s), Gyroscope
-    z (rad/s)".  A free parameter with several values in CONFIG is sought between the least and the largest; of the film
-    itself, film_delay and film_bias can be free.  Writes NAME_fit.nc and .png, and
+    z (rad/s)".  A free parameter with several values in CONFIG is sought between the least and the largest; the range
+    of one with a single value is found from the film.  Of the film itself, film_delay and film_bias can be free.
+    Three sentences say whether the fit is to be believed.  Writes NAME_fit.nc and .png, and
     NAME_fit.yaml, which runs the fitted body; with --laws, NAME_laws.nc, .png and .yaml, that of the best law.
     """
     from sweep.progress import Terminal
@@ -229,7 +244,7 @@ def fit(config: Config, film: Path, free: str, laws: str | None, output: Path | 
     names, others = ([name.strip() for name in each.split(",")] if each else [] for each in (free, laws))
     files = _files(config, "laws" if laws else "fit", output)
     with Terminal(quiet) as terminal, of_option("--free", config.table):
-        result = fitted(config, film, names, others, terminal)
+        result = fitted(config, film, names, others, terminal, (time_column, spin_column))
     _save(result, files)
     files.configuration.write_text(result.attrs["config"], encoding="utf-8")
     if not quiet:

@@ -170,11 +170,17 @@ def unlike(config: Config, film: Film) -> str:
     gap = float(np.median(np.diff(film.time)))
     if film.clock == "" and config.units == SI and gap >= _SLOW:
         return f"has rows {gap:g} s apart if its times are in s; {given}"
+    spin = float(np.percentile(np.abs(film.value), 90)) if film.what != "heading" else 0.0
+    if config.units == SI and config.of_rattlebacks and spin > _FAST:
+        return f"turns at {spin:.3g} rad/s; if its spins are in degrees, name the unit, such as 'spin (deg/s)'"
     return ""
 
 
 _SLOW = 1.0
 """Seconds between rows, beyond which the unit of time has to be named: a film shows no rattle then."""
+
+_FAST = 100.0
+"""Radians per second, 16 turns, beyond which no body stays on a table."""
 
 
 def _unusable_step(config: Config) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,22 +15,29 @@ import numpy as np
 from sweep.config import tables
 from sweep.config.document import text_of
 from sweep.config.tables import GAPS, SEPARATORS, Table
-from sweep.faults import ConfigError, brief, counted, either, fault_of
+from sweep.faults import ConfigError, brief, counted, either, fault_of, suggestion
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
-from sweep.units import ANGLE, SPIN, TIME, Unit
+from sweep.units import ANGLE, SPIN, TIME, Unit, factor
 
 MOST_ROWS = 20_000
 """Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
 
-# What trackers and phones (phyphox) call their columns, without the unit in parentheses.
+# What trackers and phones call their columns, without the unit in parentheses: Sensor Logger `seconds_elapsed` and `z`
+# (its `time` counts nanoseconds since 1970), Physics Toolbox `wz`, Tracker `ω` and `θ`.  The first one counts.
 _NAMES: dict[str, tuple[str, ...]] = {
-    "time": ("time", "t"),
-    "spin": ("spin", "n", "angular velocity"),
-    "gyroscope": ("gyroscope z", "gyro z", "omega z", "wz"),
-    "heading": ("heading", "angle", "theta"),
+    "time": ("seconds elapsed", "time", "t"),
+    "spin": ("spin", "n", "angular velocity", "omega", "ω"),
+    "gyroscope": ("gyroscope z", "gyro z", "omega z", "wz", "ωz", "ω z"),
+    "heading": ("heading", "angle", "theta", "θ"),
     "error": ("error", "sigma", "uncertainty"),
 }
+
+_NAMED = re.compile(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", re.DOTALL)
+"""A name, perhaps with a unit in parentheses behind it."""
+
+# phyphox translates its columns, such as "Gyroskop Z" and "Żyroskop - składowa z"; units and the letter stay.
+_UPRIGHT = re.compile(r"(.*\W)?z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +80,13 @@ class Film:
         return isinstance(other, Film) and self.sha256 == other.sha256
 
 
-def read(path: str | Path) -> Film:
+def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film:
     """Read a film from a table with a header, columns apart by commas, semicolons or tabs.
+
+    Parameters
+    ----------
+    time_column, spin_column : the names of the columns of the time and of what is seen, with the unit in parentheses
+        if the table does not give it, or a wrong one, such as "omega (deg/s)"; by default those of known names
 
     Raises
     ------
@@ -83,7 +95,10 @@ def read(path: str | Path) -> Film:
         few rows, or text instead of numbers.
     """
     table = tables.read(str(path), text_of(Path(path)))
-    found = _columns(table.names)
+    found, asked = _columns(table), _asked(table, time_column, spin_column)
+    if spin_column:
+        found = {name: place for name, place in found.items() if name not in get_args(Seen)}
+    found |= asked
     what = next((each for each in get_args(Seen) if each in found), None)
     if "time" not in found or not what:
         names = either(f"'{name}'" for name in ("spin (rad/s)", "gyroscope z (rad/s)", "heading (deg)"))
@@ -120,15 +135,53 @@ def read(path: str | Path) -> Film:
     )  # fmt: skip
 
 
-def _columns(names: Sequence[str]) -> dict[str, int]:
-    """The place of each known column."""
-    found: dict[str, int] = {}
-    for place, written in enumerate(names):
-        plain = re.sub(r"[_\s]+", " ", written).lower()
-        for what, known in _NAMES.items():
-            if plain in known:
-                found.setdefault(what, place)
+def _columns(table: Table) -> dict[str, int]:
+    """The place of each known column: by its name, or else by its unit."""
+    plain = [_plain(name) for name in table.names]
+    found = {
+        what: min((plain.index(name) for name in known if name in plain), key=lambda place: known.index(plain[place]))
+        for what, known in _NAMES.items() if {*known} & {*plain}
+    }  # fmt: skip
+    clocks = [place for place, unit in enumerate(table.units) if factor(unit, TIME)]
+    upright = [place for place, name in enumerate(plain) if _UPRIGHT.fullmatch(name) and _turns(table, place)]
+    if "time" not in found and clocks:
+        found["time"] = clocks[0]
+    if not {*get_args(Seen)} & found.keys() and len(upright) == 1:
+        found["gyroscope"] = upright[0]
     return found
+
+
+def _turns(table: Table, place: int) -> bool:
+    """Whether a column is of angular velocities: by its unit, or in Sensor Logger's table of the gyroscope."""
+    of_logger = "gyro" in Path(table.file).name.lower() and "seconds_elapsed" in table.names
+    return bool(factor(table.units[place], SPIN)) or (of_logger and not table.units[place])
+
+
+def _asked(table: Table, time_column: str, spin_column: str) -> dict[str, int]:
+    """The places of the columns that are asked for by name; their units are set where the names say them."""
+    found = {}
+    for option, text in (("--time-column", time_column), ("--spin-column", spin_column)):
+        if not text:
+            continue
+        named = _NAMED.fullmatch(text.strip())
+        name, unit = (named[1], named[2]) if named else (text, "")
+        if name not in table.names:
+            words = f"there is no column {brief(text)}{suggestion(name, table.names)}; "
+            raise fault_of(f"{words}it has {brief(', '.join(table.names))}", option, file=table.file, line=table.top)
+        place = table.names.index(name)
+        table.units[place] = unit or table.units[place]
+        found["time" if option == "--time-column" else _kind(_plain(name), table.units[place])] = place
+    return found
+
+
+def _kind(name: str, unit: str) -> str:
+    """What a column shows, by its name, or else by its unit."""
+    usual = "heading" if factor(unit, ANGLE) else "gyroscope" if _UPRIGHT.fullmatch(name) else "spin"
+    return next((what for what in get_args(Seen) if name in _NAMES[what]), usual)
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[_\s]+", " ", name).casefold()
 
 
 def _column(table: Table, place: int, unit: Unit, gaps: dict[int, str]) -> Array:

@@ -35,14 +35,19 @@ _SHAPE = """\
 # of a, b and c is fitted to the lowest tenth of its height, within {misfit:.2g} m.
 """
 _BODY = """\
-# Behind ± are errors, to first order, if those of the measurements are independent.
+# Behind ± are errors, to first order, if those of the measurements are independent; a normal distribution has its mean
+# and error in brackets.
 units: {units}
 body:
 {entries}
-# Change these to yours: they are guesses of dry friction on wood, and of a spin either way.
-friction: {{law: coulomb, mu: 0.3, regularisation: sqrt, speed: 5.0e-3}}
-start: {{n0: [-5, 5], x0: {x0:.2g}, y0: {y0:.2g}}}
+# These are guesses: of dry friction on wood, of a drag that stops the spin within a minute, and of a start in the sense
+# that turns back.  `run` shows what they lead to, and `fit` finds them from a film.
+friction: {{law: coulomb, mu: 0.3, regularisation: sqrt, speed: 5.0e-3, sigma: {sigma:.2g}}}
+start: {{n0: {n0:g}, x0: {x0:.2g}, y0: {y0:.2g}}}
 """
+
+_SPIN, _LASTS = 5.0, 20.0
+"""The start spin, and the time in which drag alone takes two thirds of it, in seconds."""
 
 
 @dataclass(frozen=True)
@@ -129,11 +134,23 @@ def _body(formula: Callable[[solids.Numbers], solids.Numbers], given: Given) -> 
     values, errors = ({name: getattr(each, part) for name, each in given.items()} for part in ("value", "error"))
     found, spread = formula(values), solids.propagated(formula, values, errors)
     units = {name: named(PARAMETERS[name].units, SI) for name in found}
-    entries = (
-        f"  {name}: {value + 0.0:.6g}  #{f' ± {spread[name]:.2g}' if spread[name] else ''} {units[name]}"
-        for name, value in found.items()
-    )
-    return _BODY.format(units=SI, entries="\n".join(entries), x0=found["a"] / 50, y0=found["b"] / 50)
+    # It is the angle that makes it uncertain, which is hard to measure.
+    unsure = "Ixy" if errors.get("angle") else ""
+    entries = (_entry(name, value, spread[name], units[name], name == unsure) for name, value in found.items())
+    guesses = {"sigma": found["Izz"] / _LASTS, "n0": -_SPIN if found.get("Ixy", 0) > 0 else _SPIN}
+    return _BODY.format(
+        units=SI, entries="\n".join(entries), x0=found["a"] / 50, y0=found["b"] / 50, **guesses
+    )  # fmt: skip
+
+
+def _entry(name: str, value: float, error: float, unit: str, unsure: bool) -> str:
+    """A line of the body: a distribution if it is `unsure`, else a number.
+
+    The errors of all but one are tied to each other, and stay comments.
+    """
+    if unsure:
+        return f"  {name}: {{normal: [{value + 0.0:.6g}, {error:.2g}]}}  # {unit}"
+    return f"  {name}: {value + 0.0:.6g}  #{f' ± {error:.2g}' if error else ''} {unit}"
 
 
 def _said(given: Given) -> str:

@@ -195,7 +195,9 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 
 def label(dataset: xr.Dataset, i: int) -> str:
-    """The parameters that set this trajectory apart from the others, and its number of reversals."""
+    """Its name, or the parameters that set this trajectory apart from the others, and its number of reversals."""
+    if "trajectory" in dataset.coords and dataset["trajectory"].dtype.kind in "UO":
+        return str(dataset["trajectory"].values[i])
     names = _varying(dataset) or [name for name in ("n0", "omega3") if name in dataset]
     named = ", ".join(labels.measured(dataset, name, float(np.ravel(dataset[name].values)[i])) for name in names)
     return f"{named}: {labels.reversals(int(dataset['reversals'][i]))}" if "reversals" in dataset else named

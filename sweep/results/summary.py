@@ -59,7 +59,8 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _fit(dataset: xr.Dataset) -> Iterator[str]:
-    """The values and their intervals, what the film does not determine, and how well the curve fits."""
+    """The verdict, the values and their intervals, what the film does not determine, and how well the curve fits."""
+    yield from verdict(dataset)
     if "law" in dataset.dims:
         yield from _laws(dataset)
         return
@@ -67,7 +68,7 @@ def _fit(dataset: xr.Dataset) -> Iterator[str]:
     for name in dataset["parameter"].values:
         one = dataset.sel(parameter=name)
         ends = (f"{one[f'lower_{n}'].item():11.5g} … {one[f'upper_{n}'].item():<11.5g}" for n in (68, 95))
-        yield f"{name:12} {one['value'].item():12.6g}   {'   '.join(ends)}"
+        yield f"{name:12} {one['value'].item():12.6g}   {bound(one) or '   '.join(ends)}".rstrip()
     yield from filter(None, dataset.attrs["undetermined"].split("; "))
     if others := int((dataset["misfit"][1:] < 1.05 * dataset["misfit"][0]).sum()):
         yield f"{counted(others, 'other minimum fits', 'other minima fit')} within 5 % as well: see minimum"
@@ -75,6 +76,17 @@ def _fit(dataset: xr.Dataset) -> Iterator[str]:
         f"residuals {dataset.attrs['root_mean_square']:.4g}, root mean square; Akaike's criterion "
         f"{dataset.attrs['akaike']:.6g}; {counted(dataset.attrs['trajectories'], 'trajectory', 'trajectories')}"
     )
+
+
+def verdict(dataset: xr.Dataset) -> list[str]:
+    """The sentences on a fit, a line each; none for a fit of an earlier version."""
+    return str(dataset.attrs.get("verdict", "")).splitlines()
+
+
+def bound(one: xr.Dataset) -> str:
+    """What a fit says of a parameter whose interval of 95 % reaches an end of the search; "" of any other."""
+    ends = f"below {one['upper_95'].item():.5g}", f"above {one['lower_95'].item():.5g}"
+    return ("", *(f"{end} at 95 %; no interval" for end in ends), "not determined by the film")[int(one.get("edge", 0))]
 
 
 def _indices(dataset: xr.Dataset) -> Iterator[str]:

@@ -1,10 +1,8 @@
 """Finds the body, friction and start that reproduce a film.
 
 The misfit has many minima: a trajectory that reverses once more is another one.  So the search starts from points all
-over the ranges (Sobol), and first asks for the beginning of the film, then for half as much again, and so on.
-
-An interval holds the values of a parameter at which the other parameters can keep the misfit, in units of the variance,
-within 1 or 3.84 of its least (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).
+over the ranges (Sobol), and first asks for the beginning of the film, then for half as much again, and so on.  Where
+the curve that is found does not fit, the search begins again from more points.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from sweep.config import Config, ConfigError, Values
 from sweep.config.cross_checks import misplaced, unlike
 from sweep.config.film import Film
 from sweep.ended import ended
-from sweep.faults import brief, fault_of, suggestion
+from sweep.faults import brief, counted, fault_of, suggestion
 from sweep.grid import BODY, Array
 from sweep.interrupt import deferred
 from sweep.kernels.measures.misfit import Misfit
@@ -31,8 +29,10 @@ from sweep.models.user.blame import blamed
 from sweep.results import dataset
 from sweep.results.kind import FIT
 from sweep.results.provenance import provenance
-from sweep.studies.misfit import UNKNOWNS, Ask, Minimum, Problem, minimise
-from sweep.studies.search import require_certain
+from sweep.studies import ranges, verdict
+from sweep.studies.intervals import LEVELS, blind, covariance, intervals, variance
+from sweep.studies.misfit import ENOUGH, UNKNOWNS, Minimum, Problem, minimise
+from sweep.studies.search import require_simulated
 from sweep.studies.together import together
 from sweep.units import ANGLE, SPIN, TIME
 from sweep.variables import Variable
@@ -44,11 +44,8 @@ _SEEN = {
     "heading": Variable("float64", ANGLE, "heading"),
 }
 
-LEVELS = {68: 1.0, 95: 3.84}
-"""Percent of an interval, and how far its ends raise the misfit: quantiles of chi square for one parameter."""
-
-POPULATION, KEPT = 256, 8
-"""Points all over the ranges, and the best of them from which the search goes on."""
+SEARCHES = ((256, 6), (1024, 8))
+"""Points all over the ranges, and the best of them from which a search goes on; more if the first finds no fit."""
 
 # Minima whose parameters differ by less than this share of their ranges are one.
 _SAME = 0.01
@@ -57,16 +54,17 @@ _SAME = 0.01
 # that were fitted from one reversal to the next were missed; doubling missed two, and 1.3 was no better than 1.5.
 _LONGER, _HORIZONS = 1.5, 7
 
-# A direction is not determined if its 95 % interval is longer than this share of the ranges.
-_BLIND = 0.5
+# How exact the minima are over a part of the film.
+_ROUGHLY = 1e-5
 
-# How often intervals are sought anew because a lower minimum has turned up.
-_RESTARTS = 3
+# How often outliers are looked for and ranges are widened: where the misfit would fall by half a variance within
+# another tenth of the range.
+_ROUNDS, _WIDENED = 4, (0.1, 0.5)
+
+_OPTIONAL = ("sigma",)
+"""Parameters that every law has, and that are zero where a configuration does not name them."""
 
 _RUGGED = "the misfit is rugged: minima lie close together, and the intervals are of one of them alone"
-
-# Correlation of two parameters beyond which neither is known without the other.
-_TIED = 0.98
 
 
 @deferred()
@@ -74,25 +72,42 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
     """The fit of the law of friction that `config` names."""
     if not np.isfinite([film.time, film.value, film.errors]).all():
         raise fault_of("the film holds a value that is no number; leave out such instants")
-    theirs = _of_film(film)
+    theirs, known = ranges.of_film(film), config.distributions
     config = _one_body(config, free, theirs)
     if reason := unlike(config, film):
         raise fault_of(f"the film {reason}")
     began = time.perf_counter()
     if film.omitted:
         note(film.omitted)
-    ranges = {name: theirs.get(name) or _range(config, name) for name in free}
-    if len(ranges) >= len(film.time):
-        raise fault_of(f"{len(ranges)} parameters are free, and the film has {len(film.time)} rows; free fewer")
-    ends = {name: Values(each, True, list(each)) for name, each in ranges.items() if name in (*BODY, "x0", "y0")}
+    if known:
+        note(f"free within what was measured: {', '.join(known)}")
+    sought = {
+        name: theirs.get(name) or (ranges.measured(config.table[name], known[name]) if name in known
+                                   else ranges.of_parameter(config, film, name))
+        for name in dict.fromkeys([*free, *known])
+    }  # fmt: skip
+    if len(sought) >= len(film.time):
+        raise fault_of(f"{len(sought)} parameters are free, and the film has {len(film.time)} rows; free fewer")
+    ends = {n: Values((r.low, r.high), True, [r.low, r.high]) for n, r in sought.items() if n in (*BODY, "x0", "y0")}
     if off := misplaced(replace(config, parameters=config.parameters | ends)):
         raise ConfigError([config.fault(("start", "x0"), f"what is free reaches too far: {off}")])
     with blamed(config.origin):
-        problem = Problem(config, film, ranges)
-        minima = _search(problem, note)
-        best, limits, rugged = _intervals(problem, minima[0], note)
-    words = _blind(problem, best) + ([_RUGGED] if rugged else [])
+        problem, minima = _found(Problem(config, film, sought, _countable(film)), note)
+        best, limits, rugged = intervals(problem, minima[0], note)
+    words = blind(problem, best) + ([_RUGGED] if rugged else [])
     return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began)
+
+
+def with_optional(config: Config, free: Sequence[str]) -> Config:
+    """`config` with zero for what is free of the couples that any law may have besides, such as `sigma`."""
+    named = {*config.parameters, *config.cases}
+    zero = {name: Values.one(0.0) for name in free if name in _OPTIONAL and name not in named}
+    return replace(config, parameters=config.parameters | zero) if zero and config.of_rattlebacks else config
+
+
+def _countable(film: Film) -> Array:
+    """Which instants count before anything is known."""
+    return np.ones(len(film.time), bool) if film.what == "heading" else verdict.gross(film.value)
 
 
 def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> Config:
@@ -100,7 +115,8 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
 
     `of_film` are the names of what may be free of the film.
     """
-    require_certain(config)
+    require_simulated(config)
+    config = config.at_medians
     known = (*config.tier.parameters, *of_film)
     if not free:
         raise fault_of(f"name the free parameters, out of {', '.join(known)}")
@@ -117,148 +133,92 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
     return config
 
 
-def _of_film(film: Film) -> dict[str, tuple[float, float]]:
-    """The ranges in which `UNKNOWNS` are sought, by name."""
-    delay, most = float(film.time[-1]) / 10, float(np.abs(film.value).max()) / 10
-    # No film shows where a heading counts from, so that it has no bias.
-    return {"film_delay": (0.0, delay)} | ({} if film.what == "heading" else {"film_bias": (-most, most)})
+def _found(problem: Problem, note: Callable[[str], None]) -> tuple[Problem, list[Minimum]]:
+    """The minima over the whole film, the lowest first, and the problem with the ranges and outliers that they show."""
+    found: list[tuple[Problem, list[Minimum]]] = []
+    for seed, (points, kept) in enumerate(SEARCHES):
+        settled, minima = _settled(problem, _search(problem, points, kept, seed, note), note)
+        found.append((settled, minima))
+        # A wider range may have led into a corner far from the minimum that is sought.
+        if settled.free == problem.free and verdict.judged(settled, minima[0]).fits:
+            break
+    problem, minima = min(found, key=lambda each: each[1][0].misfit)
+    return problem, _different([_turned(problem, each) for each in minima])
 
 
-def _range(config: Config, name: str) -> tuple[float, float]:
-    """The range in which a parameter is sought: its axis, or from a fifth to five times a positive value."""
-    values, parameter = config.parameters[name], config.table[name]
-    if values.is_axis and len(values.numbers) > 1:
-        return min(values.numbers), max(values.numbers)
-    value = values.numbers[0]
-    if value == 0:
-        message = "give the ends of its range as two values, such as [-1, 1]: it is free, and zero tells no size"
-        raise ConfigError([config.fault(parameter.place, message)])
-    if max(parameter.above, parameter.at_least) >= 0:
-        return value / 5, min(value * 5, parameter.below)
-    return value - abs(value) / 2, value + abs(value) / 2
+def _turned(problem: Problem, minimum: Minimum) -> Minimum:
+    """The minimum with the sign of the start that the configuration has, where half a turn changes it."""
+    names = ranges.mirrored(problem.config, problem.free)
+    if not names:
+        return minimum
+    at = [list(problem.free).index(name) for name in names]
+    if (minimum.place[at[0]] - 0.5) * (problem.config.parameters[names[0]].numbers[0] or 1.0) >= 0:
+        return minimum
+    place, jacobian = minimum.place.copy(), minimum.jacobian.copy()
+    place[at], jacobian[:, at] = 1 - place[at], -jacobian[:, at]
+    return minimum._replace(place=place, jacobian=jacobian)
 
 
-def _search(problem: Problem, note: Callable[[str], None]) -> list[Minimum]:
-    """The minima over the whole film, the lowest first."""
-    sobol = qmc.Sobol(len(problem.free), rng=0).random(POPULATION)
+def _search(problem: Problem, points: int, kept: int, seed: int, note: Callable[[str], None]) -> list[Minimum]:
+    """Minima over the whole film, the lowest first."""
+    sobol = qmc.Sobol(len(problem.free), rng=seed).random(points)
     rows = len(problem.film.time)
     horizons = [ceil(rows / _LONGER**k) for k in range(_HORIZONS - 1, -1, -1)]
     cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
-    places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:KEPT]]]
+    places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:kept]]]
     for number, instants in enumerate(horizons, start=1):
-        answers = partial(problem.answers, instants=instants)
-        found = together([partial(minimise, place=place) for place in places], answers)
-        minima = _different(sorted(found, key=lambda each: each.misfit))
+        minima = _minimised(problem, places, instants, ENOUGH if instants == rows else _ROUGHLY)
         note(f"film up to {problem.film.time[instants - 1]:.4g}, {number} of {len(horizons)}: minima: {len(minima)}")
         places = [each.place for each in minima]
     return minima
 
 
+def _minimised(
+    problem: Problem, places: Sequence[Array], instants: int | None = None, enough: float = ENOUGH
+) -> list[Minimum]:
+    """The minima near these places, the lowest first, over the film or its first instants."""
+    answers = partial(problem.answers, instants=instants)
+    return _different(together([partial(minimise, place=place, enough=enough) for place in places], answers))
+
+
+def _settled(
+    problem: Problem, minima: list[Minimum], note: Callable[[str], None]
+) -> tuple[Problem, list[Minimum]]:  # fmt: skip
+    """The minima once outliers are left out, and ranges widened at whose ends the best one lies."""
+    for _ in range(_ROUNDS):
+        best = minima[0]
+        kept = verdict.outliers(problem, best)
+        sides = verdict.pressed(problem, best, *_WIDENED)
+        free = {name: r.widened(up=sides[name] > 0) if name in sides else r for name, r in problem.free.items()}
+        scale = np.sqrt(variance(problem, best))
+        if free == problem.free and (kept == problem.kept).all() and (scale == problem.scale or not problem.measured):
+            break
+        if (off := int((~kept).sum())) and (kept != problem.kept).any():
+            note(f"{counted(off, 'outlier')} left out")
+        if wider := [name for name in free if free[name] != problem.free[name]]:
+            note(f"wider ranges: {', '.join(wider)}")
+        new = replace(problem, free=free, kept=kept, scale=scale, _steps={})
+        minima = _minimised(new, [new.place(problem.values(each.place)) for each in minima])
+        problem = new
+    return problem, minima
+
+
 def _different(minima: list[Minimum]) -> list[Minimum]:
+    """The minima that differ, the lowest first."""
     found: list[Minimum] = []
-    for each in minima:
+    for each in sorted(minima, key=lambda each: each.misfit):
         if all(np.max(np.abs(each.place - other.place)) > _SAME for other in found):
             found.append(each)
     return found
 
 
-def _variance(problem: Problem, best: Minimum) -> float:
-    """The variance of the residuals: 1 if the film tells its errors."""
-    if problem.film.error is not None:
-        return 1.0
-    return best.misfit / (len(problem.film.time) - len(problem.free))
-
-
-def _intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> tuple[Minimum, Array, bool]:
-    """The best minimum, and the ends of the intervals of `LEVELS` as places, shape (levels, 2, free).
-
-    An end at 0 or 1 is that of the range.  Where a profile meets a lower minimum, all begins anew from that.  If
-    that happens more than once, the misfit is rugged, which is told as well.
-    """
-    for restart in range(_RESTARTS + 1):
-        limits, lower = _profiles(problem, best, note, stops=restart < _RESTARTS)
-        if lower is None:
-            break
-        (best,) = together([partial(minimise, place=lower.place)], problem.answers)
-        note(f"a lower minimum: {best.misfit:.6g}")
-    return best, limits, restart > 1
-
-
-def _profiles(
-    problem: Problem, best: Minimum, note: Callable[[str], None], *, stops: bool
-) -> tuple[Array, Minimum | None]:
-    """The ends of all intervals, shape (levels, 2, free), or, if that `stops` it, a minimum that is lower."""
-    ends = [
-        partial(_end, problem=problem, best=best, i=i, sign=sign, allowed=allowed)
-        for allowed in LEVELS.values() for sign in (-1, 1) for i in range(len(problem.free))
-    ]  # fmt: skip
-    found = together(ends, problem.answers, lambda end: stops and end[1] is not None)
-    note(f"intervals: {problem.trajectories} trajectories so far")
-    lower = min((each for _, each in found if each), key=lambda each: each.misfit, default=None)
-    if lower and stops:
-        return np.empty(0), lower
-    low, high = np.reshape([end for end, _ in found], (len(LEVELS), 2, len(problem.free))).swapaxes(0, 1)
-    # In a rugged misfit a narrow search may have come farther; what fits so well belongs to the wide interval too.
-    return np.stack([np.minimum.accumulate(low), np.maximum.accumulate(high)], axis=1), None
-
-
-def _end(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int, allowed: float) -> tuple[float, Minimum | None]:
-    """Where one parameter leaves its interval, and a lower minimum if one is met on the way."""
-    variance, covariance = _variance(problem, best), _covariance(problem, best)
-    size = np.sqrt(max(covariance[i, i], 1e-30))
-    along, reach = covariance[:, i] / size**2, float(np.sqrt(allowed) * size)
-    near, far = 0.0, np.inf
-    for _ in range(8):
-        end = float(np.clip(best.place[i] + sign * reach, 0, 1))
-        start = np.clip(best.place + along * (end - best.place[i]), 0, 1)
-        start[i] = end
-        found = minimise(ask, start, i)
-        above = (found.misfit - best.misfit) / variance
-        if above < -0.01 * allowed:
-            return end, found
-        if abs(above / allowed - 1) < 0.05 or (end in (0, 1) and above < allowed):
-            return end, None
-        reach = abs(end - best.place[i])
-        near, far = (reach, far) if above < allowed else (near, reach)
-        # A profile is nearly a parabola; where it is not, halve.
-        guess = reach * float(np.sqrt(allowed / max(above, 0.05 * allowed)))
-        reach = guess if near < guess < far else (near + far) / 2
-    return float(np.clip(best.place[i] + sign * reach, 0, 1)), None
-
-
-def _covariance(problem: Problem, best: Minimum) -> Array:
-    """Of the places, by the Jacobian; a direction that the film does not see is as wide as its range."""
-    sizes, directions = np.linalg.eigh(best.jacobian.T @ best.jacobian / _variance(problem, best))
-    return np.asarray((directions / np.maximum(sizes, 1.0)) @ directions.T)
-
-
-def _blind(problem: Problem, best: Minimum) -> list[str]:
-    """What the film does not determine, in words."""
-    covariance, names = _covariance(problem, best), list(problem.free)
-    sizes, directions = np.linalg.eigh(covariance)
-    words = []
-    for size, direction in zip(sizes[::-1], directions.T[::-1], strict=True):
-        if 4 * np.sqrt(size) > _BLIND:
-            some = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
-            together = " and ".join(some) + (" together" if len(some) > 1 else "")
-            words.append(f"the film hardly determines {together}: the interval of 95 % is half of the range or more")
-    deviation = np.sqrt(np.diag(covariance))
-    tied = covariance / np.outer(deviation, deviation)
-    words += [
-        f"{names[i]} and {names[j]} are known only together: their correlation is {tied[i, j]:.3f}"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(tied[i, j]) > _TIED
-    ]
-    return words
-
-
 def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: list[str], seconds: float) -> xr.Dataset:
     """What was found, with the film and the curve that fits it."""
     best, film, names = minima[0], problem.film, list(problem.free)
-    covariance, variance = _covariance(problem, best), _variance(problem, best)
-    deviation, rows = np.sqrt(np.diag(covariance)), len(film.time)
-    fitted = film.value + problem.residuals(best.place[None])[0] * problem.film.errors
+    spread, unit = covariance(problem, best), variance(problem, best)
+    deviation, rows = np.sqrt(np.diag(spread)), problem.rows
+    fitted = film.value + verdict.of_film(problem, best) * film.errors
+    judged, edge = verdict.judged(problem, best), _ends(problem, limits)
     told, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
         f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})
@@ -269,24 +229,44 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
         {
             "value": ("parameter", problem.values(best.place), {"long_name": "value that fits best"}),
             **ends,
-            "range_from": ("parameter", problem.low, {"long_name": "least value that was tried"}),
-            "range_to": ("parameter", problem.high, {"long_name": "largest value that was tried"}),
-            "correlation": (("parameter", "other"), covariance / np.outer(deviation, deviation)),
+            "edge": ("parameter", edge, {"long_name": "ends of the interval of 95 % that are ends of the search",
+                                         "flag_values": np.arange(4, dtype=np.int8),
+                                         "flag_meanings": "none lower upper both"}),
+            "range_from": ("parameter", [each.low for each in problem.free.values()],
+                           {"long_name": "least value that was tried"}),
+            "range_to": ("parameter", [each.high for each in problem.free.values()],
+                         {"long_name": "largest value that was tried"}),
+            "correlation": (("parameter", "other"), spread / np.outer(deviation, deviation)),
             "minimum": (("rank", "parameter"), problem.values(np.array([each.place for each in minima]))),
-            "misfit": ("rank", [each.misfit / variance for each in minima], {"long_name": "chi square of a minimum"}),
+            "misfit": ("rank", [each.misfit / unit for each in minima], {"long_name": "chi square of a minimum"}),
             "seen": ("time", film.value, told),
             "fitted": ("time", fitted, told),
+            "outlier": ("time", ~problem.kept, {"long_name": "row that is left out"}),
         },
         {"parameter": names, "other": names, "time": ("time", film.time, clock)},
     )  # fmt: skip
+    noise = judged.noise * float(np.median(film.errors))
     criterion = rows * np.log(best.misfit / rows) if film.error is None else best.misfit
     values = dict(zip(names, problem.values(best.place).tolist(), strict=True))
     return found.assign_attrs(
         title=f"{problem.config.name}: fitted to a film ({problem.config.model} model)",
         **provenance(_with(problem.config, values), seconds, problem.trajectories, of=FIT),
-        root_mean_square=float(np.sqrt(np.mean((fitted - film.value) ** 2))), akaike=float(criterion + 2 * len(names)),
+        root_mean_square=float(np.sqrt(np.mean((fitted - film.value)[problem.kept] ** 2))),
+        akaike=float(criterion + 2 * len(names)), noise=noise, outliers=int((~problem.kept).sum()),
+        fits=int(judged.fits), fits_because=judged.because,
+        verdict=verdict.sentences(problem, judged, problem.values(best.place),
+                                  np.array([problem.values(end) for end in limits[-1]]), edge, words),
         undetermined="; ".join(words), trajectories=problem.trajectories,
     )  # fmt: skip
+
+
+def _ends(problem: Problem, limits: Array) -> Array:
+    """Which ends of the intervals of 95 % are those of the search: 1 the lower, 2 the upper, 3 both; shape (free,)."""
+    low, high = limits[-1]
+    return np.array([
+        (each.ends(one) < 0) + 2 * (each.ends(other) > 0)
+        for each, one, other in zip(problem.free.values(), low, high, strict=True)
+    ], np.int8)  # fmt: skip
 
 
 def _with(config: Config, values: Mapping[str, float]) -> Config:

@@ -7,7 +7,7 @@ over the least (Burnham and Anderson 2002, sections 2.6 and 2.9).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import sqrt
+from math import prod, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,8 @@ from sweep.config.film import Film, read
 from sweep.engine.reporter import Reporter
 from sweep.faults import brief, fault_of, suggestion
 from sweep.models.general.laws import LAWS, Law
-from sweep.studies.fit import fit
-from sweep.units import SI
+from sweep.studies.fit import fit, with_optional
+from sweep.studies.ranges import wide
 
 # Differences of the criterion up to which two laws cannot be told apart, and from which on one is ruled out.  A
 # parameter that is of no use makes a difference of two.
@@ -34,12 +34,18 @@ _SHARED = ("seen", "other", "minimum", "misfit", "correlation")
 
 
 def fitted(
-    config: Config, film: str | Path | Film, free: Sequence[str], laws: Sequence[str], reporter: Reporter
+    config: Config,
+    film: str | Path | Film,
+    free: Sequence[str],
+    laws: Sequence[str],
+    reporter: Reporter,
+    columns: tuple[str, str] = ("", ""),
 ) -> xr.Dataset:
-    """As `sweep.api.fit`."""
+    """As `sweep.api.fit`; `columns` are those of the time and of what is seen."""
     if laws and (config.origin or config.model != "slip"):
         raise fault_of("laws of friction are compared in the slip model; set model: slip")
-    film, note = film if isinstance(film, Film) else read(film), reporter.note
+    film, note = film if isinstance(film, Film) else read(film, *columns), reporter.note
+    config = with_optional(config, free)
     if not laws:
         return fit(config, film, free, note)
     found: dict[str, xr.Dataset] = {}
@@ -75,21 +81,8 @@ def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
     said = [name for name in law.parameters if name in given and (name in law.pure) == (name in before.pure)]
     friction |= {name: given[name] for name in said}
     own = [name for name in law.parameters if name not in said and config.table[name].default is None]
-    friction |= {name: _usual(config, law)[name] for name in own}
+    friction |= {name: sqrt(prod(wide(config, law)[name])) for name in own}
     return load_config({**kept, "friction": friction, "integrator": {"t_end": config.integrator.t_end}}), own
-
-
-def _usual(config: Config, law: Law) -> Mapping[str, list[float]]:
-    """The ranges in which parameters of friction are sought that the configuration does not say."""
-    length = config.parameters["c"].numbers[0] if config.units == SI else 1.0
-    velocity = sqrt(length * config.parameters["gravity"].numbers[0]) if config.units == SI else 1.0
-    return {
-        "mu": [0.02, 1.0] if "mu" in law.pure else [1 / velocity, 1e3 / velocity],
-        "mu_static": [0.02, 1.0],
-        "speed": [3e-3 * velocity, 0.3 * velocity],
-        "speed_stick": [1e-3 * velocity, 0.1 * velocity],
-        "radius_contact": [1e-3 * length, 0.3 * length],
-    }
 
 
 def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
@@ -113,16 +106,19 @@ def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
         akaike=("law", akaike, {"long_name": "Akaike's criterion"}),
         weight=("law", share / share.sum(), {"long_name": "Akaike's weight"}),
     )
-    words = _told_apart(names, akaike - akaike.min())
+    words = apart_words = _told_apart(names, akaike - akaike.min())
     excess = chi[best] / (rows - number[best])
     if film.error is not None and excess > 1 + _MISSED * sqrt(2 / (rows - number[best])):
-        words.append(f"even {names[best]} misses the film by more than its errors: {excess:.3g} chi square an instant")
-    words += [
-        f"{name}: {each}" for name, one in found.items() for each in one.attrs["undetermined"].split("; ") if each
-    ]
+        words = [
+            *words,
+            f"even {names[best]} misses the film by more than its errors: {excess:.3g} chi square an instant",
+        ]
+    blind = ((name, each) for name, one in found.items() for each in one.attrs["undetermined"].split("; ") if each)
+    words = [*words, *(f"{name}: {each}" for name, each in blind)]
     attributes: dict[str, Any] = dict(fits[best].attrs)
     attributes["title"] = attributes["title"].replace(": fitted", ": laws of friction fitted")
     attributes |= {"undetermined": "; ".join(words), "trajectories": sum(one.attrs["trajectories"] for one in fits)}
+    attributes["verdict"] = f"{names[best]}: {attributes['verdict']}" + "".join(f"\n{each}." for each in apart_words)
     return result.assign_attrs(attributes)
 
 

@@ -20,6 +20,7 @@ from sweep.grid import Array
 from sweep.interrupt import point
 from sweep.kernels.methods import PLAIN, automatic_step
 from sweep.kernels.samples import sampled
+from sweep.studies.ranges import Range
 
 UNKNOWNS = ("film_delay", "film_bias")
 """What a fit may find of a film besides the parameters of the body, by the names that the option --free takes."""
@@ -34,8 +35,10 @@ _STEADY = 0.02
 # A body that lifts off, or a run that diverges, misses every value by this many times the largest one.
 _LOST = 10.0
 
-# A minimum is found when a step changes misfit or place by less than a share, or there is no slope; and the most steps.
-_ENOUGH, _FLAT, _MOST_STEPS = 1e-9, 1e-14, 50
+ENOUGH = 1e-9
+"""The share by which misfit and place of a minimum are exact."""
+
+_FLAT, _MOST_STEPS = 1e-14, 50
 
 
 class Minimum(NamedTuple):
@@ -45,11 +48,13 @@ class Minimum(NamedTuple):
     """The free parameters, as shares of their ranges, shape (free,)."""
     misfit: float
     jacobian: Array
-    """Of the residuals with respect to the place, shape (instants, free)."""
+    """Of the residuals with respect to the place, shape (instants and measured, free)."""
+    away: Array
+    """The residuals, shape (instants and measured,)."""
 
 
 Ask = Callable[[Array], Array]
-"""Tells the residuals, shape (cells, instants), at places, shape (cells, free).
+"""Gives the residuals, shape (cells, instants and measured), at places, shape (cells, free).
 
 These are so close together that their trajectories take the same steps."""
 
@@ -60,23 +65,34 @@ class Problem:
 
     config: Config
     film: Film
-    free: Mapping[str, tuple[float, float]]
-    """The free parameters, those of `UNKNOWNS` too, and the ends of the ranges in which they are sought."""
+    free: Mapping[str, Range]
+    """The free parameters, those of `UNKNOWNS` too, and where they are sought."""
+    kept: Array
+    """Which instants count, shape (instants,): not the outliers."""
+    scale: float = 1.0
+    """The standard deviation of a residual, by which what was measured of a parameter is weighed."""
     trajectories: int = 0
     """How many were computed."""
     _steps: dict[tuple[float, ...], float] = field(default_factory=dict)
     """Steps by rounded places."""
 
-    def __post_init__(self) -> None:
-        self.low, self.high = (np.array(ends) for ends in zip(*self.free.values(), strict=True))
-        self.ratio = self.low > 0
-        """Where a range of positive numbers is divided evenly in its logarithm."""
+    @property
+    def rows(self) -> int:
+        """How many residuals count."""
+        return int(self.kept.sum()) + len(self.measured)
+
+    @property
+    def measured(self) -> list[int]:
+        """The indices of parameters that were measured otherwise."""
+        return [i for i, each in enumerate(self.free.values()) if each.prior]
 
     def values(self, places: Array) -> Array:
         """The free parameters at places, of the same shape (..., free)."""
-        low, high = (np.where(self.ratio, np.log(np.where(self.ratio, end, 1)), end) for end in (self.low, self.high))
-        found = low + (high - low) * places
-        return np.where(self.ratio, np.exp(np.where(self.ratio, found, 0)), found)
+        return np.stack([each.values(places[..., i]) for i, each in enumerate(self.free.values())], axis=-1)
+
+    def place(self, values: Array) -> Array:
+        """The place of values, both of shape (free,)."""
+        return np.array([each.place(value) for each, value in zip(self.free.values(), values, strict=True)])
 
     def columns(self, places: Array) -> dict[str, Array]:
         """All parameters of the bodies at places of shape (cells, free)."""
@@ -97,7 +113,7 @@ class Problem:
         curves, possible = np.full((len(places), len(times)), np.nan), np.flatnonzero(~model.impossible(columns))
         columns, found = ({name: v[possible] for name, v in each.items()} for each in (columns, found))
         steps = automatic_step(PLAIN, model, columns)[0] if steps is None else steps[possible]
-        longest = self.free.get("film_delay", (0.0, 0.0))[1]
+        longest = self.free["film_delay"].high if "film_delay" in self.free else 0.0
         shown = sampled(model, columns, steps, times, self.film.what, found.get("film_delay"), longest)
         shown[np.isnan(shown).any(axis=1)] = np.nan
         curves[possible] = shown + found.get("film_bias", np.zeros(len(possible)))[:, None]
@@ -105,32 +121,48 @@ class Problem:
         return curves
 
     def residuals(self, places: Array, instants: int | None = None, steps: Array | None = None) -> Array:
-        """(computed - seen) / error at all or the first `instants` of the film, shape (cells, instants)."""
-        seen, error = self.film.value[:instants], self.film.errors[:instants]
+        """(computed - seen) / error at all or the first `instants` of the film, shape (cells, instants).
+
+        It is zero for outliers.
+        """
+        seen, error, kept = self.film.value[:instants], self.film.errors[:instants], self.kept[:instants]
         away = self.curves(places, self.film.time[:instants], steps) - seen
-        if self.film.what == "heading":  # no film tells where a heading counts from
-            away -= np.average(away, axis=1, weights=error**-2.0)[:, None]
-        return np.where(np.isnan(away), _LOST * np.abs(seen).max(), away) / error
+        if self.film.what == "heading":  # no film shows where a heading counts from
+            away -= np.average(away, axis=1, weights=kept * error**-2.0)[:, None]
+        return np.where(np.isnan(away), _LOST * np.abs(seen[kept]).max(), away) / error * kept
+
+    def _off_measured(self, places: Array) -> Array:
+        """How far parameters that were measured are from what was measured, in errors, shape (cells, measured)."""
+        known = [(self.values(places)[:, i], [*self.free.values()][i].prior) for i in self.measured]
+        found = [(value - prior[0]) / prior[1] for value, prior in known if prior]
+        return self.scale * np.reshape(found, (len(found), len(places))).T
 
     def answers(self, places: Sequence[Array], instants: int | None = None) -> Iterator[Array]:
-        """The residuals that searches `Ask` for."""
-        steps = [np.full(len(each), self._step(each)) for each in places]
-        found = self.residuals(np.concatenate(places), instants, np.concatenate(steps))
+        """The residuals that searches `Ask` for: of the film and, behind these, of what was measured otherwise."""
+        cells = np.concatenate(places)
+        steps = [np.full(len(each), step) for each, step in zip(places, self._steps_of(places), strict=True)]
+        found = self.residuals(cells, instants, np.concatenate(steps))
+        found = np.concatenate([found, self._off_measured(cells)], axis=1)
         return iter(np.split(found, np.cumsum([len(each) for each in places[:-1]])))
 
-    def _step(self, places: Array) -> float:
-        """The least automatic step of bodies close together, or of the first that were as close: it takes 5 ms."""
-        key = tuple(np.round(places[0] / _STEADY).tolist())
-        if np.isinf(self._steps.get(key, np.inf)):
-            model, columns = self.config.equations, self.columns(places)
-            possible = ~model.impossible(columns)
-            columns = {name: values[possible] for name, values in columns.items()}
-            self._steps[key] = float(automatic_step(PLAIN, model, columns)[0].min(initial=np.inf))
-        return self._steps[key]
+    def _steps_of(self, places: Sequence[Array]) -> list[float]:
+        """For each of `places` the automatic step of the first there, or of the first ever that was as close to it."""
+        keys = [tuple(np.round(each[0] / _STEADY).tolist()) for each in places]
+        new = {key: each[0] for key, each in zip(keys, places, strict=True) if np.isinf(self._steps.get(key, np.inf))}
+        if new:  # together, as that takes no longer than one alone
+            model, columns = self.config.equations, self.columns(np.stack([*new.values()]))
+            possible = np.flatnonzero(~model.impossible(columns))
+            columns, steps = {name: values[possible] for name, values in columns.items()}, np.full(len(new), np.inf)
+            steps[possible] = automatic_step(PLAIN, model, columns)[0] if len(possible) else steps[possible]
+            self._steps |= zip(new, steps.tolist(), strict=True)
+        return [self._steps[key] for key in keys]
 
 
-def minimise(ask: Ask, place: Array, fixed: int | None = None) -> Minimum:
-    """The minimum near a place, over all parameters but the `fixed` one."""
+def minimise(ask: Ask, place: Array, fixed: int | None = None, enough: float = ENOUGH) -> Minimum:
+    """The minimum near a place, over all parameters but the `fixed` one.
+
+    It is found when a step changes misfit or place by less than the share `enough`, or there is no slope.
+    """
     moved = np.array([i for i in range(len(place)) if i != fixed], int)
     known: dict[bytes, tuple[Array, Array]] = {}
 
@@ -147,12 +179,13 @@ def minimise(ask: Ask, place: Array, fixed: int | None = None) -> Minimum:
 
     if not len(moved):
         away, jacobian = look(place[moved])
-        return Minimum(place, float(np.sum(away**2)), jacobian)
+        return Minimum(place, float(np.sum(away**2)), jacobian, away)
     inside = np.clip(place[moved], 1e-9, 1 - 1e-9)
     found = least_squares(
         lambda some: look(some)[0], inside, lambda some: look(some)[1][:, moved], bounds=(0, 1), x_scale="jac",
-        max_nfev=_MOST_STEPS, ftol=_ENOUGH, xtol=_ENOUGH, gtol=_FLAT,
+        max_nfev=_MOST_STEPS, ftol=enough, xtol=enough, gtol=_FLAT,
     )  # fmt: skip
     end = place.copy()
     end[moved] = found.x
-    return Minimum(end, float(2 * found.cost), look(found.x)[1])
+    away, jacobian = look(found.x)
+    return Minimum(end, float(2 * found.cost), jacobian, away)

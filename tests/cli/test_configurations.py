@@ -39,14 +39,26 @@ def test_what_is_printed_loads_with_the_numbers_measured(tmp_path: Path) -> None
 def test_errors_stand_beside_what_they_make_uncertain() -> None:
     text = printed(*TOY)
     lines = dict(re.findall(r"^  (\w+): \S+  # (.*)$", text, re.MULTILINE))
-    assert (lines["a"], lines["b"], lines["mass"], lines["Ixy"]) == ("± 0.0005 m", "m", "kg", "± 1.8e-07 kg m2")
-    assert "±" not in printed(*(re.sub(r" ?(±|\+-) ?[\d.]+", "", word) for word in TOY)).partition("body:\n")[2]
+    assert (lines["a"], lines["b"], lines["mass"]) == ("± 0.0005 m", "m", "kg")
+    assert re.search(r"^  Ixy: {normal: \[-7.06284e-07, 1.8e-07\]}  # kg m2$", text, re.MULTILINE)
+    exact = printed(*(re.sub(r" ?(±|\+-) ?[\d.]+", "", word) for word in TOY)).partition("body:\n")[2]
+    assert "±" not in exact
+    assert "normal" not in exact
 
 
 def test_a_measured_body_runs_and_turns_back_from_one_spin_alone(tmp_path: Path) -> None:
     (tmp_path / "toy.yaml").write_text(printed(*TOY), encoding="utf-8")
-    found = sweep.run(tmp_path / "toy.yaml", t_end=10.0)
+    found = sweep.run(tmp_path / "toy.yaml", t_end=10.0, n0=[-5.0, 5.0], Ixy=-7.1e-7)
     assert (found["reversals"] > 0).values.tolist() == [False, True]
+    written = sweep.load_config(tmp_path / "toy.yaml").parameters
+    assert written["n0"].numbers == (5.0,)
+    assert written["sigma"].numbers[0] > 0
+    assert written["Ixy"].distribution is not None
+
+
+def test_a_length_may_have_a_decimal_comma() -> None:
+    words = [word.replace(".", ",") for word in TOY]
+    assert printed(*words).splitlines()[5:] == printed(*TOY).splitlines()[5:]
 
 
 def half_ellipsoid(directions: int = 80, rings: int = 40, missing: int = 0, scale: float = 1.0) -> str:

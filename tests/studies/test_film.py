@@ -39,6 +39,49 @@ def test_spins_come_in_their_units(write: Write, header: str, mark: str, unit: f
     assert found.what == ("spin" if "spin" in header else "gyroscope")
 
 
+TIME, UP = TIMES + 3, SPINS - 2
+
+
+@pytest.mark.parametrize(
+    ("name", "header", "columns"),
+    [
+        ("phyphox.csv", '"Time (s)","Gyroscope x (rad/s)","Gyroscope z (rad/s)"', [TIME, SPINS, UP]),
+        ("phyphox.csv", '"Zeit (s)","Gyroskop X (rad/s)","Gyroskop Z (rad/s)","Betrag (rad/s)"', [TIME, SPINS, UP, UP]),
+        ("phyphox.csv", '"Czas (s)","Żyroskop - składowa z (rad/s)"', [TIME, UP]),
+        ("phyphox.csv", '"時間 (s)","ジャイロスコープ z (rad/s)"', [TIME, UP]),
+        ("Gyroscope.csv", "time,seconds_elapsed,z,y,x", [1e18 + TIME * 1e9, TIME, UP, SPINS, SPINS]),
+        ("toolbox.csv", "time,wx,wy,wz", [TIME, SPINS, SPINS, UP]),
+        ("tracker.csv", "t,x,y,ω (rad/s)", [TIME, SPINS, SPINS, UP]),
+    ],
+)  # fmt: skip
+def test_columns_of_phones_and_trackers_are_known(
+    write: Write, name: str, header: str, columns: list[np.ndarray]
+) -> None:
+    found = film.read(write(table(header, *columns), name))
+    np.testing.assert_allclose([found.time, found.value], [TIMES, UP], rtol=1e-12, atol=1e-12)
+    assert found.what == ("spin" if "ω" in header else "gyroscope")
+
+
+def test_columns_may_be_asked_for_by_name(write: Write) -> None:
+    path = write(table("clock,time (s),spin (rad/s),turn,z", TIMES * 1e3, TIMES, UP, np.degrees(SPINS), UP), "film.csv")
+    found = film.read(path, "clock (ms)", "turn (deg/s)")
+    np.testing.assert_allclose([found.time, found.value], [TIMES, SPINS], rtol=1e-12, atol=1e-12)
+    assert [film.read(path, "", each).what for each in ("turn", "z", "turn (deg)")] == ["spin", "gyroscope", "heading"]
+    with pytest.raises(ConfigError, match=r"--spin-column: there is no column tunr .* .did you mean turn"):
+        film.read(path, "", "tunr (deg/s)")
+
+
+def test_the_accelerations_of_a_logger_are_no_spins(write: Write) -> None:
+    with pytest.raises(ConfigError, match="'gyroscope z"):
+        film.read(write(table("time,seconds_elapsed,z,y,x", TIMES, TIMES, UP, UP, UP), "Accelerometer.csv"))
+
+
+def test_degrees_taken_for_radians_are_refused(write: Write) -> None:
+    path = write(table("t (s),n", TIMES, 400 + SPINS), "film.csv")
+    with pytest.raises(ConfigError, match="the film turns at 401 rad/s; if its spins are in degrees, name the unit"):
+        sweep.fit(write(STONE), path, ["mu"])
+
+
 @pytest.mark.parametrize(("time", "spin"), [("ms", "deg/s"), ("[ms]", "(°/s)"), ("ms", "")])
 def test_a_row_of_units_below_the_header_is_honoured(write: Write, time: str, spin: str) -> None:
     header = f"time,spin{'' if spin else ' (deg/s)'},note\n{time},{spin},"

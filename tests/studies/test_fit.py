@@ -1,5 +1,7 @@
 """Fits to films that another derivation has made, their intervals, and laws of friction compared by them."""
 
+import re
+import runpy
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args
@@ -7,7 +9,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 import xarray as xr
-from support import Write, adaptive, columns, newton
+from support import ROOT, Write, adaptive, columns, newton
 from support.cli import invoke
 
 import sweep
@@ -19,7 +21,9 @@ from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import stack, take
 from sweep.results.store import StoreError
+from sweep.studies.filmed import shown
 from sweep.studies.misfit import Problem
+from sweep.studies.ranges import Range
 
 SCENE = "name: scene\nfriction: {mu: [30, 100]}\nstart: {n0: [0.03, 0.07], x0: 0.01, y0: 0.01}\n"
 STONE = """\
@@ -46,6 +50,12 @@ def seen() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     *states, _ = adaptive.motion(body, times, rtol=1e-10, atol=1e-13)
     spin = slip.rhs(tuple(states), take(slip.Constants.of(body), 0))[1][0]
     return times, noisy(spin), noisy(heading(body, "viscous", np.array(states)[:, 0], times), 0.02)
+
+
+def posed(config: sweep.Config, film: Film, **ranges: tuple[float, float]) -> Problem:
+    """A film all of whose instants count, and the ranges of what is free."""
+    free = {name: Range.even(*each) for name, each in ranges.items()}
+    return Problem(config, film, free, np.ones(len(film.time), bool))
 
 
 def heading(body: Mapping[str, np.ndarray], law: str, start: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -97,7 +107,7 @@ def test_an_interval_ends_where_the_misfit_has_risen_by_a_quantile(write: Write,
     times, spins, _ = seen
     film = Film(times, spins, np.full(len(times), NOISE))
     found = sweep.fit(write(SCENE), film, ["mu"], n0=TRUTH["n0"])
-    problem = Problem(sweep.load_config(write(SCENE), {"n0": TRUTH["n0"]}), film, {"mu": (40.0, 70.0)})
+    problem = posed(sweep.load_config(write(SCENE), {"n0": TRUTH["n0"]}), film, mu=(40.0, 70.0))
 
     def misfit(mu: float) -> float:
         return float(np.sum(problem.residuals(np.log([[mu / 40]]) / np.log(70 / 40), len(times)) ** 2))
@@ -135,7 +145,7 @@ def test_a_film_of_the_true_body_is_reproduced(write: Write, what: Seen) -> None
         value = heading(cell, law, start, late)[1:]
     else:
         value = (newton.spin(y) if what == "spin" else -y[4])[1:] + true["film_bias"]
-    problem = Problem(config, Film(times, value, what=what), {name: (each, each) for name, each in true.items()})
+    problem = posed(config, Film(times, value, what=what), **{name: (each, 2 * each) for name, each in true.items()})
     away = problem.residuals(np.zeros((1, len(true))), len(times))
     np.testing.assert_allclose(away, 0, atol=1e-6)
     assert np.ptp(value) > 0.1
@@ -182,6 +192,90 @@ def test_the_command_writes_what_runs_the_fitted_body(
         Source(written)
 
 
+def test_a_right_curve_is_called_right(found: xr.Dataset) -> None:
+    assert found.attrs["fits"] == 1
+    assert found.attrs["noise"] == pytest.approx(NOISE, rel=0.15)
+    how, known, unknown = found.attrs["verdict"].splitlines()
+    assert how == "The curve fits the film: it misses it by 0.00092 √(g/c) (root mean square), which is noise."
+    assert re.fullmatch(r"At 95 % confidence, friction μ is 5\d\.\d .* start spin n₀ is 0\.0519 .*\)\.", known)
+    assert unknown == "A film of another start would test the law of friction."
+    assert found.edge.values.tolist() == [0, 0]
+    assert not found.outlier.any()
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ({"delta": 0.04}, "times its noise, and stays on one side of it for many rows"),
+        ({"mu": [30.0, 48.0]}, "mu would go beyond the range that was searched"),
+        ({"b": {"normal": [3.2, 0.02]}}, "b would be more than 3.5 errors from what was measured"),
+    ],
+    ids=str,
+)
+def test_a_wrong_curve_is_called_wrong(
+    write: Write, seen: tuple[np.ndarray, ...], given: dict[str, Any], reason: str
+) -> None:
+    times, spins, _ = seen
+    found = sweep.fit(write(SCENE), Film(times, spins), ["mu", "n0"], **given)
+    assert found.attrs["fits"] == 0
+    assert reason in found.attrs["fits_because"]
+    assert found.attrs["verdict"].startswith("The fit is not to be believed: ")
+    if given.keys() == {"mu"}:
+        assert found.edge.values.tolist() == [2, 0]
+
+
+def test_outliers_are_left_out_and_widen_no_interval(
+    write: Write, seen: tuple[np.ndarray, ...], found: xr.Dataset
+) -> None:
+    times, spins = seen[0], seen[1].copy()
+    spins[[40, 170, 250]] += [10.0, -0.05, 0.008]
+    again = sweep.fit(write(SCENE), Film(times, spins), ["mu", "n0"])
+    assert np.flatnonzero(again.outlier).tolist() == [40, 170, 250]
+    assert "3 outliers left out" in again.attrs["verdict"]
+    assert again.attrs["fits"] == 1
+    np.testing.assert_allclose(again.upper_95 - again.lower_95, found.upper_95 - found.lower_95, rtol=0.1)
+
+
+def test_ranges_are_found_from_the_film(write: Write, seen: tuple[np.ndarray, ...], found: xr.Dataset) -> None:
+    """From guesses that are far off."""
+    times, spins, _ = seen
+    guesses = write("friction: {mu: 5}\nstart: {n0: -3, x0: 0.01, y0: 0.01}\n", "guesses.yaml")
+    again = sweep.fit(guesses, Film(times, spins), ["mu", "n0"])
+    np.testing.assert_allclose(again.value, found.value, rtol=1e-4)
+    low, high = again.range_from.values[1], again.range_to.values[1]
+    assert 0 < low < TRUTH["n0"] < high < 0.1
+
+
+def test_what_was_measured_of_the_body_is_a_prior(write: Write, seen: tuple[np.ndarray, ...]) -> None:
+    """Of a body that spins upright a film says nothing, so that what was measured stays as it was."""
+    times = seen[0][:100]
+    film = Film(times, noisy(np.full(len(times), 0.05)))
+    found = sweep.fit(write(SCENE), film, ["n0"], mu=55, x0=0.0, y0=0.0, b={"normal": [3.0, 0.1]})
+    assert found.parameter.values.tolist() == ["n0", "b"]
+    one = found.sel(parameter="b")
+    assert one.value.item() == pytest.approx(3.0, abs=0.01)
+    assert [one.lower_68.item(), one.upper_68.item()] == pytest.approx([2.9, 3.1], abs=0.01)
+    assert [one.lower_95.item(), one.upper_95.item()] == pytest.approx([2.804, 3.196], abs=0.015)
+
+
+def test_a_drag_is_sought_where_the_configuration_names_none(write: Write) -> None:
+    config = write(DRY)
+    found = sweep.fit(config, film_of(config, "coulomb-sqrt"), ["sigma", "n0"])
+    one = found.sel(parameter="sigma")
+    assert one.lower_95.item() == 0.0 < one.upper_95.item() < 1e-4
+    assert one.edge.item() == 0
+
+
+def test_film_and_fit_are_shown_side_by_side(found: xr.Dataset) -> None:
+    both = shown(found.isel(time=slice(60)))
+    assert both.trajectory.values.tolist() == ["film", "fit"]
+    film, fit = (both.sel(trajectory=name) for name in ("film", "fit"))
+    np.testing.assert_allclose(film.spin, fit.spin, atol=0.006)
+    np.testing.assert_allclose(film.heading, fit.heading, atol=0.1)
+    assert not film.roll_angle.any()
+    assert fit.roll_angle.any()
+
+
 @pytest.mark.parametrize("laws", [(), ("viscous", "coulomb")])
 def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: tuple[str, ...]) -> None:
     film = Film(np.arange(3.0), np.array([0.05, np.nan, 0.05]))
@@ -195,9 +289,9 @@ def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: 
         (["muu"], {}, "muu is no parameter of the slip model (did you mean mu?); free may be a, b"),
         ([], {}, "name the free parameters"),
         (["n0"], {}, "has several values; free it, or give one"),
-        (["mu", "n0", "x0"], {"x0": 8.0}, "what is free reaches too far: start point off the ellipsoid at x0=12"),
+        (["mu", "n0", "a"], {"x0": 5.0}, "what is free reaches too far: start point off the ellipsoid at x0=5"),
         (["mu", "n0", "x0", "y0", "a", "b", "delta", "film_delay", "film_bias"], {}, "9 parameters are free"),
-        (["mu", "n0", "x0"], {"x0": 0.0}, "give the ends of its range as two values"),
+        (["mu", "n0", "delta"], {"delta": 0.0}, "give the ends of its range as two values"),
         (["mu"], {"model": "analytic", "n0": 0.05}, "is a formula and cannot be simulated"),
         (["mu"], {"laws": ["viscuos"]}, "viscuos is no law of friction (did you mean viscous?); choose from viscous"),
     ],
@@ -275,8 +369,34 @@ def test_the_command_compares_laws_and_writes_table_picture_and_the_best_body(wr
     assert said.exit_code == 0, said.output
     assert "law none: free are n0; it has no mu, speed\n" in said.stderr
     assert "law viscous: free are mu, n0; it has no speed\n" in said.stderr
-    assert said.stdout.splitlines()[1].startswith("viscous ")
+    assert re.findall(r"^(\w+) {3,}", said.stdout, re.MULTILINE) == ["viscous", "none"]
+    assert said.stdout.startswith("viscous: The curve fits the film")
     best = sweep.load_config(out / "stone_laws.yaml")
     assert (best.law, best.integrator.t_end) == ("viscous", 2)
     for verb in ("info", "plot"):
         assert invoke(verb, out / "stone_laws.nc").exit_code == 0
+
+
+@pytest.mark.campaign
+def test_films_of_another_code_are_judged_rightly() -> None:
+    """A few of the films that the page on fits counts."""
+    script = runpy.run_path(str(ROOT / "scripts" / "film_verdicts.py"))
+    good = [script["judged"](case) for case in script["cases"](12, 1, ("good",))]
+    assert sum(each["fits"] for each in good) >= 11
+    assert sum(each["best"] for each in good) >= 11
+    spoilt = [script["judged"](case) for case in script["cases"](8, 2, script["SPOILT"])]
+    assert not any(each["fits"] for each in spoilt if each.get("off", 1) > script["_OFF"])
+
+
+def test_the_film_of_a_phone_gives_its_friction(tmp_path: Path) -> None:
+    """As the page on ruler and phone has it, word for word"""
+    script = runpy.run_path(str(ROOT / "scripts" / "film_verdicts.py"))
+    (tmp_path / "phone.yaml").write_text(invoke("body", *script["PHONE"].split()).stdout, encoding="utf-8")
+    assert script["PHONE"] in (ROOT / "docs" / "how-to" / "fit-phone.md").read_text(encoding="utf-8")
+    film = ROOT / "data" / "phone_synthetic.csv"
+    found = sweep.fit(tmp_path / "phone.yaml", film, ["mu", "sigma", "n0", "x0", "y0"])
+    assert found.attrs["fits"] == 1
+    assert "2 outliers left out" in found.attrs["verdict"]
+    one = found.sel(parameter="mu")
+    assert one.lower_95.item() < 0.22 < one.upper_95.item()
+    assert one.upper_95.item() - one.lower_95.item() < 0.01

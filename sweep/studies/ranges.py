@@ -1,0 +1,190 @@
+"""Finds the ranges in which a fit seeks parameters that have a single value: from the film, the body and the law.
+
+Places in a range are even in asinh(value / bend), which is linear for a large bend and logarithmic for a small one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import inf, log, sqrt
+
+import numpy as np
+from scipy.special import ndtr
+from scipy.stats import theilslopes
+
+from sweep.config import Config, ConfigError
+from sweep.config.distributions import Distribution
+from sweep.config.film import Film
+from sweep.grid import Array
+from sweep.models.general.laws import LAWS, Law
+from sweep.parameters import Parameter
+from sweep.units import SI
+
+
+@dataclass(frozen=True)
+class Range:
+    """Where a parameter is sought."""
+
+    low: float
+    high: float
+    bend: float
+    least: float = -inf
+    """The bounds beyond which it is not widened."""
+    most: float = inf
+    given: bool = False
+    """Whether the user has given the ends, so that they are not widened."""
+    prior: tuple[float, float] | None = None
+    """Mean and standard deviation, if the parameter was measured."""
+
+    @classmethod
+    def even(cls, one: float, other: float, least: float = -inf, most: float = inf) -> Range:
+        """A range between two numbers that is linear, or logarithmic if it does not reach zero."""
+        (low, high), (near, far) = sorted((one, other)), sorted((abs(one), abs(other)))
+        return cls(low, high, near / _MUCH if low * high > 0 else far * _MUCH, least, most)
+
+    def values(self, places: Array) -> Array:
+        low, high = np.arcsinh(np.array([self.low, self.high]) / self.bend)
+        return np.asarray(self.bend * np.sinh(low + (high - low) * places))
+
+    def place(self, value: float) -> float:
+        low, high, at = np.arcsinh(np.array([self.low, self.high, value]) / self.bend)
+        return float(np.clip((at - low) / (high - low), 0, 1))
+
+    def widened(self, *, up: bool) -> Range:
+        """The range with one end farther out, by a factor of four or by half its length, unless that end is fixed."""
+        low, high = np.arcsinh(np.array([self.low, self.high]) / self.bend)
+        end = self.bend * np.sinh((high if up else low) + (1 if up else -1) * min((high - low) / 2, log(4)))
+        if self.given or self.prior:
+            return self
+        if self.low == -self.high:
+            return replace(self, low=max(-abs(end), self.least), high=min(abs(end), self.most))
+        return replace(self, high=min(end, self.most)) if up else replace(self, low=max(end, self.least))
+
+    def ends(self, place: float, near: float = 0.0) -> int:
+        """-1 or 1 if a place is at the lower or upper end of the search, 0 if not; zero, as of a drag, is no end."""
+        if place <= near and (self.low or self.least):
+            return -1
+        return int(place >= 1 - near)
+
+
+_MUCH = 1e9
+
+_ROWS = 1500
+"""Rows of a film from whose last third the drag is estimated."""
+
+# What a hand does to a body: how far it takes its contact point, as a share of a and b, or tilts it.
+_FARTHEST, _TILTED = 0.2, 0.15
+
+_STARTS = {"x0": "a", "y0": "b", "pitch": "", "roll": ""}
+_ON_BODY = 0.65
+"""Share of both semi-axes within which a start point is sought: the corners are on the body."""
+
+# Shares of a range of parameters that may vanish, or have either sign, within which it is linear.
+_FROM_ZERO, _EITHER_SIGN = 1 / 300, 1 / 100
+
+
+def of_film(film: Film) -> dict[str, Range]:
+    """The ranges of what may be free of the film itself, by name."""
+    bias = float(np.abs(film.value).max()) / 10
+    delay = {"film_delay": Range.even(0.0, float(film.time[-1]) / 10, least=0.0)}
+    # No film shows where a heading counts from, so that it has no bias.
+    return delay | ({} if film.what == "heading" else {"film_bias": Range.even(-bias, bias)})
+
+
+def of_parameter(config: Config, film: Film, name: str) -> Range:
+    """The range of a parameter of `config`; `ConfigError` where nothing gives it."""
+    values, parameter = config.parameters[name], config.table[name]
+    least, most = max(parameter.above, parameter.at_least), parameter.below
+    if values.is_axis and len(values.numbers) > 1:
+        return replace(Range.even(min(values.numbers), max(values.numbers)), given=True)
+    value = values.numbers[0]
+    if not config.of_rattlebacks:
+        return _around(config, parameter, value, least, most)
+    if name in ("n0", "omega3"):
+        return _spins(film, 1 if name == "n0" else -1)
+    if name in _STARTS:
+        return _starts(config, name, value)
+    if name == "sigma":
+        return Range(0.0, high := _drag(config, film), high * _FROM_ZERO, least=0.0)
+    if usual := wide(config, config.own_law or LAWS[config.law]).get(name):
+        low, high = usual
+        return Range.even(min(low, value / 5 or low), max(high, value * 5), least=least)
+    return _around(config, parameter, value, least, most)
+
+
+def measured(parameter: Parameter, known: Distribution) -> Range:
+    """The range of a parameter that was measured, and its prior, which is normal."""
+    low, below, centre, above, high = known.at(ndtr(np.array([-4.0, -1.0, 0.0, 1.0, 4.0]))).tolist()
+    ends = max(low, parameter.above, parameter.at_least), min(high, parameter.below)
+    return Range(*ends, _MUCH * max(map(abs, ends)), prior=(centre, (above - below) / 2))
+
+
+def _around(config: Config, parameter: Parameter, value: float, least: float, most: float) -> Range:
+    """From a fifth to five times of a positive value; up to twice one that may be negative, with either sign."""
+    if value == 0:
+        message = "give the ends of its range as two values, such as [-1, 1]: it is free, and zero tells no size"
+        raise ConfigError([config.fault(parameter.place, message)])
+    if least >= 0:
+        return Range.even(value / 5, min(value * 5, most), least=least, most=most)
+    return Range.even(-2 * value, 2 * value, least, most)
+
+
+def _spins(film: Film, sign: int) -> Range:
+    """The start spin: that of the film's first twelfth, and as much around it as it varies there."""
+    first = slice(0, max(8, len(film.time) // 12))
+    time, value = film.time[first], film.value[first]
+    if film.what == "heading":
+        slope, _, low, high = theilslopes(value, time)
+        centre, half = slope, max(high - low, 0.3 * abs(slope))
+    else:
+        centre, half = np.median(value[:5]), max(np.ptp(np.percentile(value, [5, 95])), 0.3 * abs(np.median(value[:5])))
+    half = half or 1.0
+    return Range.even(sign * (centre - half), sign * (centre + half), -1e3, 1e3)
+
+
+def _drag(config: Config, film: Film) -> float:
+    """The largest drag that the film's end allows: five times what it loses there, if all of it were drag."""
+    # No more rows than that: slopes are those of all pairs.
+    last = slice(len(film.time) * 2 // 3, None, max(1, len(film.time) // _ROWS))
+    spin = np.gradient(film.value, film.time) if film.what == "heading" else film.value
+    size = np.abs(spin[last])
+    rate = max(-theilslopes(size, film.time[last])[0], 0.0) / max(np.median(size), 1e-12)
+    columns = {name: values.numbers[0] for name, values in config.parameters.items()}
+    mass = columns.get("mass", 1.0)
+    inertia = columns.get("Izz", mass * (columns["a"] ** 2 + columns["b"] ** 2) / 5)
+    return float(inertia * min(max(5 * rate, 2 / film.time[-1]), 20 / film.time[-1]))
+
+
+def _starts(config: Config, name: str, value: float) -> Range:
+    """The start point or tilt, of either sign, which is nearly logarithmic."""
+    size = _STARTS[name]
+    length = min(config.parameters[size].numbers) if size else 1.0
+    most = _ON_BODY * length if size and config.surface == "ellipsoid" else inf
+    far = min(max(_FARTHEST * length if size else _TILTED, 2 * abs(value)), most)
+    return Range(-far, far, far * _EITHER_SIGN, least=-most, most=most)
+
+
+def mirrored(config: Config, free: Mapping[str, Range]) -> list[str]:
+    """The names of the start point or tilt where both signs together start the same motion, half a turn later.
+
+    Half a turn takes a body to itself unless it has an `Ixz` or `Iyz`.
+    """
+    pairs = (pair for pair in (["x0", "y0"], ["pitch", "roll"]) if {*pair} <= free.keys())
+    names = next((pair for pair in pairs if all(free[name].low == -free[name].high for name in pair)), [])
+    others = ("Ixz", "Iyz", "omega1", "omega2", "slip1", "slip2")
+    odd = any(name in free or config.parameters[name].numbers != (0.0,) for name in others if name in config.parameters)
+    return [] if odd else names
+
+
+def wide(config: Config, law: Law) -> Mapping[str, tuple[float, float]]:
+    """The ranges of the parameters of a law of friction, whatever the configuration says of them."""
+    length = config.parameters["c"].numbers[0] if config.units == SI else 1.0
+    velocity = sqrt(length * config.parameters["gravity"].numbers[0]) if config.units == SI else 1.0
+    return {
+        "mu": (0.02, 1.0) if "mu" in law.pure else (1 / velocity, 300 / velocity),
+        "mu_static": (0.02, 1.0),
+        "speed": (3e-3 * velocity, 0.3 * velocity),
+        "speed_stick": (1e-3 * velocity, 0.1 * velocity),
+        "radius_contact": (1e-3 * length, 0.3 * length),
+    }

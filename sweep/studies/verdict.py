@@ -1,0 +1,230 @@
+"""Judges a fit: whether its curve misses the film by noise alone, what is known, and what the film cannot show.
+
+Residuals of a right curve are independent of each other.  So their own noise, which their third differences show
+without what varies slowly, is as large as they are, and neither their autocorrelation (Ljung and Box 1978, doi
+10.1093/biomet/65.2.297) nor the lengths of their runs of one sign (Wald and Wolfowitz 1940) are unusual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import log10, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2, kurtosis, median_abs_deviation, norm
+
+from sweep.config import Config
+from sweep.faults import counted, either
+from sweep.grid import BODY, Array
+from sweep.studies.intervals import variance
+from sweep.studies.misfit import UNKNOWNS, Minimum, Problem
+from sweep.units import ANGLE, SPIN, TIME, named, pretty
+
+# The chance that one of the tests calls a right curve wrong, and the lags of the autocorrelation.
+_CHANCE, _LAGS = 1e-3, 20
+
+# Outliers are so many times the noise off the curve and off their neighbours; of more than a share, no fit is believed.
+_OFF, _SHARE = 5.0, 0.03
+
+# Tails of residuals: standard errors by which their kurtosis may exceed that of a normal distribution.
+_TAILS = 6.0
+
+# A parameter is pressed against the end of its range if within this share of it the misfit would fall by so many
+# variances.
+_BEYOND, _PRESSED = 0.02, 2.0
+
+
+# How many of its errors a parameter may be from what was measured of it.
+_FAR = 3.5
+
+
+class Verdict(NamedTuple):
+    """What to believe of a fit."""
+
+    reasons: list[str]
+    """Why the curve is not that of the film; empty if it fits."""
+    size: float
+    """Root mean square of the residuals, in units of the film's errors."""
+    noise: float
+    """What of it is noise."""
+
+    @property
+    def fits(self) -> bool:
+        return not self.reasons
+
+    @property
+    def because(self) -> str:
+        """The reason, in words."""
+        return "; ".join(self.reasons) or "what is left between film and curve is noise"
+
+
+def judged(problem: Problem, best: Minimum) -> Verdict:
+    """What the residuals of the best minimum, and its place, say."""
+    kept = problem.kept
+    away = best.away[: len(kept)][kept]
+    size, noise = float(np.sqrt(np.mean(away**2))), own_noise(away)
+    reasons = [] if not np.isfinite(size) else _structure(away, size, noise)
+    if problem.film.error is not None and chi2.sf(best.misfit, problem.rows - len(problem.free)) < _CHANCE:
+        reasons.append(f"the curve misses the film by {size:.3g} times its errors")
+    if (left_out := int((~kept).sum())) > _SHARE * len(kept):
+        reasons.append(f"{left_out} of {len(kept)} rows are outliers")
+    if ends := pressed(problem, best):
+        reasons.append(f"{_all(ends)} would go beyond the range that was searched")
+    far = np.abs(best.away[len(kept) :] / problem.scale)
+    if off := [name for i, name in enumerate(np.array([*problem.free])[problem.measured]) if far[i] > _FAR]:
+        reasons.append(f"{_all(off)} would be more than {_FAR:g} errors from what was measured")
+    return Verdict(reasons, size, noise)
+
+
+def _all(names: Iterable[str]) -> str:
+    return either(names).replace(" or ", " and ")
+
+
+def own_noise(values: Array) -> float:
+    """The standard deviation of what varies from row to row, by third differences."""
+    return float(np.sqrt(np.mean(np.diff(values, 3) ** 2) / 20)) if len(values) > 3 else 0.0
+
+
+def _structure(away: Array, size: float, noise: float) -> list[str]:
+    """What of the residuals is no noise."""
+    if not size:
+        return []
+    n, lags = len(away), min(_LAGS, len(away) // 5)
+    shares = np.array([away[:-lag] @ away[lag:] for lag in range(1, lags + 1)]) / (away @ away)
+    correlated = chi2.sf(n * (n + 2) * np.sum(shares**2 / (n - np.arange(1, lags + 1))), lags)
+    above = away > 0
+    ups, downs, runs = above.sum(), (~above).sum(), 1 + np.count_nonzero(above[1:] != above[:-1])
+    expected = 1 + 2 * ups * downs / n
+    in_runs = norm.cdf((runs - expected) / max(sqrt(max((expected - 1) * (expected - 2), 0) / (n - 1)), 1e-9))
+    words = []
+    if min(correlated, in_runs) < _CHANCE:
+        by = f"{size / noise:.2g} times its noise" if size > 1.3 * noise > 0 else "more than noise"
+        words.append(f"the curve misses the film by {by}, and stays on one side of it for many rows")
+    if kurtosis(away) > _TAILS * sqrt(24 / n):
+        words.append("some rows are farther off the curve than noise brings them")
+    return words
+
+
+def outliers(problem: Problem, best: Minimum) -> Array:
+    """Which instants count, shape (instants,): not those that are off the curve and, as much, off their neighbours."""
+    away = of_film(problem, best)
+    scale = min(
+        median_abs_deviation(away, scale="normal"), median_abs_deviation(np.diff(away, 3), scale="normal") / 20**0.5
+    )
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(away, 3, mode="reflect"), 7)
+    alone = away - np.median(around, axis=1)
+    return np.asarray(~((np.abs(away) > _OFF * scale) & (np.abs(alone) > _OFF * scale)))
+
+
+def of_film(problem: Problem, best: Minimum) -> Array:
+    """The residuals of all instants, those of outliers too."""
+    curve = problem.curves(best.place[None], problem.film.time)[0]
+    away = (curve - problem.film.value) / problem.film.errors
+    if problem.film.what == "heading":
+        away -= np.average(away[problem.kept])
+    return np.asarray(away)
+
+
+def gross(values: Array) -> Array:
+    """Which instants count before anything is fitted, shape (instants,): those not far beyond nearly all others."""
+    low, middle, high = np.percentile(values, [2, 50, 98])
+    return np.asarray((np.abs(values - middle) <= 3 * max(high - middle, middle - low)) | (high == low))
+
+
+def pressed(problem: Problem, best: Minimum, share: float = _BEYOND, fall: float = _PRESSED) -> dict[str, int]:
+    """The parameters at an end of their range, -1 or 1, beyond which the misfit would fall.
+
+    To first order, by `fall` in units of the variance within a `share` of the range.  It does not fall where the film
+    says nothing of a parameter.
+    """
+    slopes = 2 * best.jacobian.T @ best.away / variance(problem, best)
+    ends = {n: r.ends(place, 1e-3) for (n, r), place in zip(problem.free.items(), best.place, strict=True)}
+    return {n: end for (n, end), slope in zip(ends.items(), slopes, strict=True) if -end * slope * share > fall}
+
+
+def sentences(
+    problem: Problem, verdict: Verdict, values: Array, limits: Array, edge: Array, words: Sequence[str]
+) -> str:
+    """Three sentences: how the curve fits, what is known how well, and what the film cannot show and which one would.
+
+    `limits` are the ends of the intervals of 95 %, shape (2, free); `edge` says which are none.
+    """
+    config, names = problem.config, list(problem.free)
+    unit = pretty(named(ANGLE if problem.film.what == "heading" else SPIN, config.units))
+    return "\n".join([
+        _how(problem, verdict, unit),
+        _known(config, names, values, limits, edge) if verdict.fits else _CAUSES,
+        _unknown([name for name, each in zip(names, edge, strict=True) if each], words) if verdict.fits
+        else "The values and intervals below describe a curve that is not the film's.",
+    ])  # fmt: skip
+
+
+_CAUSES = (
+    "Check the units of the film and the measures of the body, free film_delay and film_bias, and compare laws of "
+    "friction by --laws."
+)
+
+
+def _how(problem: Problem, verdict: Verdict, unit: str) -> str:
+    left = f", {counted(int((~problem.kept).sum()), 'outlier')} left out" if not problem.kept.all() else ""
+    if not verdict.fits:
+        return f"The fit is not to be believed: {'; '.join(verdict.reasons)}{left}."
+    if problem.film.error is not None:
+        return f"The curve fits the film: it misses it by {verdict.size:.2g} times its errors{left}."
+    return (
+        f"The curve fits the film: it misses it by {verdict.size:.2g} {unit} (root mean square), which is noise{left}."
+    )
+
+
+def _known(config: Config, names: Sequence[str], values: Array, limits: Array, edge: Array) -> str:
+    """What is known, each with its interval of 95 %."""
+    told = []
+    for name, value, (low, high), at in zip(names, values, limits.T, edge, strict=True):
+        if not at:
+            words = config.described(name)["long_name"] if name in config.table else name
+            told.append(f"{words} is {_digits(value, high - low)}{_unit(config, name)} "
+                        f"({_digits(low, high - low)} to {_digits(high, high - low)})")  # fmt: skip
+    return f"At 95 % confidence, {', '.join(told)}." if told else "It determines none of the free parameters."
+
+
+def _digits(value: float, width: float) -> str:
+    """A number with two digits of the width of its interval."""
+    digits = 2 + max(0, round(log10(abs(value) / width))) if value and width > 0 else 3
+    return f"{value:.{min(digits, 8)}g}"
+
+
+def _unit(config: Config, name: str) -> str:
+    """The unit of a parameter, as figures print it, behind a space."""
+    of_film = {"film_delay": named(TIME, config.units), "film_bias": named(SPIN, config.units)}
+    found = config.described(name).get("units", "") if name in config.table else of_film[name]
+    return f" {pretty(found)}" if found not in ("", "1") else ""
+
+
+def _unknown(names: Sequence[str], words: Sequence[str]) -> str:
+    """What the film does not determine, and which film would."""
+    if not names:
+        tied = [each.partition(":")[0] for each in words if "only together" in each]
+        if tied:
+            return f"But {tied[0]}; measure one of them otherwise."
+        return "A film of another start would test the law of friction."
+    which = dict.fromkeys(next((film for some, film in _FILMS.items() if name in some), _SLIPPING) for name in names)
+    return f"It does not determine {_all(names)}; for that, {'; and '.join(which)}."
+
+
+_SLIPPING = "film the body as it slips and reverses: with a faster spin, or more tilt at the start"
+_FILMS: Mapping[tuple[str, ...], str] = {
+    ("sigma", "mu_viscous", "mu_rolling", "mu_spinning"): "go on filming until the body rests",
+    (
+        "n0",
+        "x0",
+        "y0",
+        "roll",
+        "pitch",
+        "omega1",
+        "omega2",
+        "omega3",
+    ): "begin the film as the hand lets go, at more rows a second",
+    UNKNOWNS: "film a second of rest as well",
+    BODY: "weigh and measure the body",
+}
