@@ -132,7 +132,8 @@ def test_workers_that_come_go_hang_and_lag_cost_only_their_tiles(
         heard = Heard(when_the_first_is_back)
         found = sweep.run(config, tmp_path, reporter=heard, client=client)
         assert heard.seen
-        assert SMALL_TILES <= completed(local) <= SMALL_TILES + lost
+        tasks = SMALL_TILES // 2
+        assert tasks <= completed(local) <= tasks + lost
     same_numbers(found, expected)
 
 
