@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from math import inf, log, sqrt
 
 import numpy as np
+from scipy import stats
 from scipy.special import ndtr
-from scipy.stats import theilslopes
 
 from sweep.config import Config, ConfigError
 from sweep.config.distributions import Distribution
@@ -135,7 +135,7 @@ def _spins(film: Film, sign: int) -> Range:
     first = slice(0, max(8, len(film.time) // 12))
     time, value = film.time[first], film.value[first]
     if film.what == "heading":
-        slope, _, low, high = theilslopes(value, time)
+        slope, _, low, high = stats.theilslopes(value, time)
         centre, half = slope, max(high - low, 0.3 * abs(slope))
     else:
         centre, half = np.median(value[:5]), max(np.ptp(np.percentile(value, [5, 95])), 0.3 * abs(np.median(value[:5])))
@@ -149,7 +149,7 @@ def _drag(config: Config, film: Film) -> float:
     last = slice(len(film.time) * 2 // 3, None, max(1, len(film.time) // _ROWS))
     spin = np.gradient(film.value, film.time) if film.what == "heading" else film.value
     size = np.abs(spin[last])
-    rate = max(-theilslopes(size, film.time[last])[0], 0.0) / max(np.median(size), 1e-12)
+    rate = max(-stats.theilslopes(size, film.time[last])[0], 0.0) / max(np.median(size), 1e-12)
     columns = {name: values.numbers[0] for name, values in config.parameters.items()}
     mass = columns.get("mass", 1.0)
     inertia = columns.get("Izz", mass * (columns["a"] ** 2 + columns["b"] ** 2) / 5)

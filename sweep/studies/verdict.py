@@ -12,7 +12,7 @@ from math import log10, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2, kurtosis, median_abs_deviation, norm
+from scipy import stats
 
 from sweep.config import Config
 from sweep.faults import counted, either
@@ -65,7 +65,7 @@ def judged(problem: Problem, best: Minimum) -> Verdict:
     away = best.away[: len(kept)][kept]
     size, noise = float(np.sqrt(np.mean(away**2))), own_noise(away)
     reasons = [] if not np.isfinite(size) else _structure(away, size, noise)
-    if problem.film.error is not None and chi2.sf(best.misfit, problem.rows - len(problem.free)) < _CHANCE:
+    if problem.film.error is not None and stats.chi2.sf(best.misfit, problem.rows - len(problem.free)) < _CHANCE:
         reasons.append(f"the curve misses the film by {size:.3g} times its errors")
     if (left_out := int((~kept).sum())) > _SHARE * len(kept):
         reasons.append(f"{left_out} of {len(kept)} rows are outliers")
@@ -92,16 +92,16 @@ def _structure(away: Array, size: float, noise: float) -> list[str]:
         return []
     n, lags = len(away), min(_LAGS, len(away) // 5)
     shares = np.array([away[:-lag] @ away[lag:] for lag in range(1, lags + 1)]) / (away @ away)
-    correlated = chi2.sf(n * (n + 2) * np.sum(shares**2 / (n - np.arange(1, lags + 1))), lags)
+    correlated = stats.chi2.sf(n * (n + 2) * np.sum(shares**2 / (n - np.arange(1, lags + 1))), lags)
     above = away > 0
     ups, downs, runs = above.sum(), (~above).sum(), 1 + np.count_nonzero(above[1:] != above[:-1])
     expected = 1 + 2 * ups * downs / n
-    in_runs = norm.cdf((runs - expected) / max(sqrt(max((expected - 1) * (expected - 2), 0) / (n - 1)), 1e-9))
+    in_runs = stats.norm.cdf((runs - expected) / max(sqrt(max((expected - 1) * (expected - 2), 0) / (n - 1)), 1e-9))
     words = []
     if min(correlated, in_runs) < _CHANCE:
         by = f"{size / noise:.2g} times its noise" if size > 1.3 * noise > 0 else "more than noise"
         words.append(f"the curve misses the film by {by}, and stays on one side of it for many rows")
-    if kurtosis(away) > _TAILS * sqrt(24 / n):
+    if stats.kurtosis(away) > _TAILS * sqrt(24 / n):
         words.append("some rows are farther off the curve than noise brings them")
     return words
 
@@ -110,7 +110,8 @@ def outliers(problem: Problem, best: Minimum) -> Array:
     """Which instants count, shape (instants,): not those that are off the curve and, as much, off their neighbours."""
     away = of_film(problem, best)
     scale = min(
-        median_abs_deviation(away, scale="normal"), median_abs_deviation(np.diff(away, 3), scale="normal") / 20**0.5
+        stats.median_abs_deviation(away, scale="normal"),
+        stats.median_abs_deviation(np.diff(away, 3), scale="normal") / 20**0.5,
     )
     around = np.lib.stride_tricks.sliding_window_view(np.pad(away, 3, mode="reflect"), 7)
     alone = away - np.median(around, axis=1)
