@@ -81,7 +81,7 @@ class Cells:
     @property
     def inertia(self) -> Array:
         """The third part of `Model.energy` at the states of these cells, shape (cells,); NaN where one has failed."""
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(self.kernel.model.energy(*self.kernel.unpack(self.images))[2])
 
     def take(self, rows: Array, images: Array | None = None) -> Cells:

@@ -221,7 +221,7 @@ class Kernel:
     def spins(self, images: Array) -> Array:
         """Spins with which the images have ended, shape (cells,)."""
         table = self.table(images)
-        with np.errstate(invalid="ignore"):  # the states of a run that failed
+        with np.errstate(invalid="ignore", over="ignore"):  # the states of a run that failed
             spin, _, _ = self.model.energy(*self.unpack(images))
         return np.where(table["failed_at"] > 0, table["failed_spin"], spin)
 

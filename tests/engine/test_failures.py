@@ -11,6 +11,7 @@ from support.kernels import threads
 from support.runs import Heard, interrupt, lengthen, run_cells, same_numbers
 
 import sweep
+from sweep.config import load_config
 from sweep.engine import failures
 from sweep.engine.executor import execute
 from sweep.engine.life import begin, live
@@ -227,3 +228,13 @@ def test_a_failure_does_not_depend_on_the_time_limit(method: str) -> None:
     assert float(long.t_stop.sel(n0=5)) == pytest.approx(1.423326, abs=1e-6)
     for name in ("status", "t_stop", "spin_final", "step"):
         np.testing.assert_array_equal(long[name], short[name])
+
+
+def test_states_that_overflow_are_read_without_a_warning() -> None:
+    """As a fixed step far beyond the limit of stability leaves them."""
+    (part,) = plan(
+        load_config({"name": "unstable", "model": "effective", "friction": {"mu": 60.0}, "measure": ["reversals"]})
+    ).parts
+    images = part.images.copy()
+    images[:, : len(part.kernel.model.states)] = 1e305
+    assert part.kernel.spins(images).shape == part.take(np.arange(len(images)), images).inertia.shape == (1,)
