@@ -50,9 +50,9 @@ def advance(kernel, images, cells, *rest):
     return blocks
 Kernel.advance = advance
 {0}
-print(taken / computed)
+print(taken / computed if computed else 1.0)
 """
-"""Prints the share of full lanes in a run; a leap counts as its steps, of which there are few."""
+"""Prints the share of full lanes in a run, 1 where it has none; a leap counts as its steps, of which there are few."""
 
 
 def number(checkout: Path, code: str, run: str) -> float:
