@@ -36,8 +36,8 @@ def keep_busy(
 ) -> None:
     """Run the cells of `lives` through all their stages.
 
-    The lanes take whatever waits, the longest first, as far as is known; what is begun comes before what is not.
-    Neither the order nor the size of the chunks changes a result.
+    The lanes take whatever waits, first the cells whose stages have most steps left.  Neither the order nor the size of
+    the chunks changes a result.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def _advance(lives: Lives, rows: Array, blocks: int) -> int:
     least = max(1, int(blocks * _SHORT / CHUNK_SECONDS))
     taken = kernel.advance(images, rows[np.argsort(-left, kind="stable")], blocks, least)
     taken = max(1, taken // min(threads(), len(rows)))
-    return _rescale(taken, time.perf_counter() - began, CHUNK_SECONDS)
+    return _rescale(taken, time.perf_counter() - began)
 
 
 def execute(
@@ -94,14 +94,14 @@ def execute(
         kernel.advance(images, pending, blocks)
         kernel.carry(images)
         if chunk_blocks is None:
-            blocks = _rescale(blocks, time.perf_counter() - chunk_began, CHUNK_SECONDS)
+            blocks = _rescale(blocks, time.perf_counter() - chunk_began)
         after_chunk()
         point()
 
 
-def _rescale(blocks: int, seconds: float, wanted: float) -> int:
+def _rescale(blocks: int, seconds: float) -> int:
     # While the last trajectories pause often, every call is short, and `blocks` would grow without end.
-    return min(max(1, int(blocks * np.clip(wanted / seconds, 0.25, 8))), UNTIL_ALL_STOP)
+    return min(max(1, int(blocks * np.clip(CHUNK_SECONDS / seconds, 0.25, 8))), UNTIL_ALL_STOP)
 
 
 def nominal_seconds(steps: Array) -> float:

@@ -12,7 +12,7 @@ from sweep.engine.plan import plan
 from sweep.engine.winding import whole_blocks
 from sweep.kernels.status import RUNNING, SETTLED
 from sweep.models.stiff.precession import vertical_spin
-from sweep.models.stiff.slip import Constants, slow
+from sweep.models.stiff.slip import STIFF_MODEL, Constants, slow
 
 
 def test_a_pause_between_blocks_changes_no_bit() -> None:
@@ -38,7 +38,8 @@ def test_a_rolling_rattle_turns_the_vertical_spin_by_its_product_of_inertia_alon
     later, _ = slow(*states, p)
     after = states.copy()
     after[:5] += 1e-6 * np.array(later)
-    gain = (vertical_spin(after, p)[0] - vertical_spin(states, p)[0]) * p.I3 / 1e-6
+    afterwards, before = (vertical_spin(each, *STIFF_MODEL.energy(each, p))[0] for each in (after, states))
+    gain = (afterwards - before) * p.I3 / 1e-6
     w1, w2 = states[2] / (p.I1 + body["c"] ** 2), states[3] / (p.I2 + body["c"] ** 2)
     np.testing.assert_allclose(gain, p.A12 * (w1**2 - w2**2) - (p.A11 - p.A22) * w1 * w2, rtol=1e-3)
 
@@ -48,7 +49,7 @@ def test_upright_spin_has_nothing_to_lose() -> None:
     p = Constants.of(columns(n0=spin))
     states = np.zeros((7, 2))
     states[4] = -p.I3 * spin
-    left, total = vertical_spin(states, p)
+    left, total = vertical_spin(states, *STIFF_MODEL.energy(states, p))
     np.testing.assert_allclose(left, spin)
     np.testing.assert_allclose(total, spin**2)
 

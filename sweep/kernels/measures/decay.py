@@ -21,7 +21,7 @@ from sweep.kernels.layout import BEYOND, STABLE, Layout, constants_of
 from sweep.kernels.measures.measurement import Measurement
 from sweep.models.ladder import slip
 from sweep.models.model import MODES, Array, Columns, Model
-from sweep.models.stiff.precession import vertical
+from sweep.models.stiff.precession import vertical_spin
 from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum
 
 NEXT, EVERY = "watch_next", "watch_every"
@@ -77,7 +77,7 @@ class Decay(Measurement):
         @inline
         def look(group, lane, seen):
             due = seen.running & (group[DONE + lane] >= group[WATCHED + lane])
-            spin, total = vertical(states(group, lane), seen.J), 2.0 * seen.rattle / seen.J + seen.spin * seen.spin
+            spin, total = vertical_spin(states(group, lane), seen.spin, seen.rattle, seen.J)
             looks = group[COUNT + lane] + 1.0
             first, over = looks == 1.0, looks > LOOKS
             spin0, total0 = spin if first else group[SPIN0 + lane], total if first else group[TOTAL0 + lane]

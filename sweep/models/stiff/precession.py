@@ -17,28 +17,15 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.model import Array
-from sweep.models.stiff.slip import STIFF_MODEL, Constants
 
 
 @inline
-def vertical(y, inertia):
-    """M·u/I3, in sqrt(g/c); `y` are the states of `stiff.slip`, and `inertia` is I3."""
-    u1, u2, M1, M2, M3, _, _ = y
-    return (u1 * M1 + u2 * M2 - np.sqrt(1.0 - u1 * u1 - u2 * u2) * M3) / inertia
-
-
-def vertical_spin(states: Array, constants: Constants) -> tuple[Array, Array]:
+def vertical_spin(y, spin, rattle, inertia):
     """The spin M·u/I3 that would be left without rattle, and the spin that would have all the energy, squared.
 
-    Parameters
-    ----------
-    states : of `stiff.slip`, shape (7, cells)
-
-    Returns
-    -------
-    In sqrt(g/c) and g/c, each of shape (cells,).  The second, less the square of the first, is the energy that a rattle
-    can lose; of the three it alone has no ripple.
+    `y` are the states of `stiff.slip`, and the others what its `energy` gives.  The results are in sqrt(g/c) and g/c.
+    The second, less the square of the first, is the energy that a rattle can lose; of the three it alone has no ripple.
     """
-    spin, rattle, inertia = STIFF_MODEL.energy(states, constants)
-    return vertical(states, inertia), 2 * rattle / inertia + spin**2
+    u1, u2, M1, M2, M3, _, _ = y
+    vertical = (u1 * M1 + u2 * M2 - np.sqrt(1.0 - u1 * u1 - u2 * u2) * M3) / inertia
+    return vertical, 2.0 * rattle / inertia + spin * spin
