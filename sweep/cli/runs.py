@@ -133,9 +133,9 @@ def animate(
 ) -> None:  # fmt: skip
     """Show how single bodies turn, and their contact points' paths on the table.
 
-    The bodies are those of CONFIG, or of FILE, which `sweep trajectory` wrote (NAME_trajectory.nc), or the film and the
-    body that fits it of a FILE that `sweep fit` wrote (NAME_fit.nc).  They are shown
-    side by side on a common clock, above their spin curves.  A page (html) opens without network; an mp4 needs ffmpeg.
+    The bodies are those of CONFIG, or of a FILE that `sweep trajectory` wrote (NAME_trajectory.nc).  Of a FILE that
+    `sweep fit` wrote (NAME_fit.nc), they are the filmed body and the fitted one.  They are shown side by side on a
+    common clock, above their spin curves.  A page (html) opens without network; an mp4 needs ffmpeg.
     """
     from sweep.plots import animation
     from sweep.results.writing import require_writable

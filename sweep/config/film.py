@@ -14,7 +14,7 @@ import numpy as np
 
 from sweep.config import tables
 from sweep.config.document import text_of
-from sweep.config.tables import GAPS, SEPARATORS, Table
+from sweep.config.tables import GAPS, NAMED, SEPARATORS, Table
 from sweep.faults import ConfigError, brief, counted, either, fault_of, suggestion
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
@@ -32,9 +32,6 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "heading": ("heading", "angle", "theta", "θ"),
     "error": ("error", "sigma", "uncertainty"),
 }
-
-_NAMED = re.compile(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", re.DOTALL)
-"""A name, perhaps with a unit in parentheses behind it."""
 
 # phyphox translates its columns, such as "Gyroskop Z" and "Żyroskop - składowa z"; units and the letter stay.
 _UPRIGHT = re.compile(r"(.*\W)?z")
@@ -163,7 +160,7 @@ def _asked(table: Table, time_column: str, spin_column: str) -> dict[str, int]:
     for option, text in (("--time-column", time_column), ("--spin-column", spin_column)):
         if not text:
             continue
-        named = _NAMED.fullmatch(text.strip())
+        named = NAMED.fullmatch(text.strip())
         name, unit = (named[1], named[2]) if named else (text, "")
         if name not in table.names:
             words = f"there is no column {brief(text)}{suggestion(name, table.names)}; "

@@ -90,6 +90,9 @@ class Table:
         return [cell if (value := number(cell)) is None else value for cell in cells]
 
 
+NAMED = re.compile(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", re.DOTALL)
+"""A name, perhaps with a unit in parentheses behind it."""
+
 Lines = list[tuple[int, list[str]]]
 """The cells of lines, each with its number."""
 
@@ -104,7 +107,7 @@ def read(file: str, text: str) -> Table:
     """
     separator, ((top, header), *rows) = _lines(file, text)
     _require_even(file, (top, header), rows, separator)
-    named = [re.fullmatch(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", cell, re.DOTALL) for cell in header]
+    named = [NAMED.fullmatch(cell) for cell in header]
     names, units = ([(each[part] or "").strip() if each else "" for each in named] for part in (1, 2))
     under = top
     if len(rows) > 1 and _is_of_units(rows[0][1]):
