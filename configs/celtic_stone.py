@@ -20,12 +20,12 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.general import rigid_body
-from sweep.models.general.variants import variant
 from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, zeros
+from sweep.models.variants import variant
 from sweep.parameters import Parameter
 
 GRAVITY = 100.0
-NOSLIP = variant("noslip+solid+paraboloid")
+NOSLIP = variant("noslip+solid+gravity+paraboloid")
 motion = NOSLIP.rhs
 
 PARAMETERS = (
@@ -64,12 +64,13 @@ class Constants(NOSLIP.constants):  # type: ignore[misc, name-defined]
 
 def attitude(columns: Columns) -> tuple[tuple[Array, ...], Array]:
     """u1, u2 and the direction of ω at the start, and the square of the factor that gives it the energy."""
-    u1, u2 = np.cos(columns["roll"]) * np.sin(columns["pitch"]), -np.sin(columns["roll"])
-    w, p = [columns[f"omega{i}"] for i in (1, 2, 3)], Constants.of(columns)
-    _, resting, _ = NOSLIP.energy((u1, u2, 0 * u1, 0 * u1, 0 * u1), p)
-    spin, rattle, J = NOSLIP.energy((u1, u2, *w), p)
+    axes, p = rigid_body.axes(body(columns)), Constants.of(columns)
+    u = rigid_body.turned(np.cos(columns["roll"]) * np.sin(columns["pitch"]), -np.sin(columns["roll"]), axes)
+    w = *rigid_body.turned(columns["omega1"], columns["omega2"], axes), columns["omega3"]
+    _, resting, _ = NOSLIP.energy((*u, 0 * u[0], 0 * u[0], 0 * u[0]), p)
+    spin, rattle, J = NOSLIP.energy((*u, *w), p)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return (u1, u2, *w), (columns["E"] - GRAVITY - resting) / (rattle + J * spin**2 / 2 - resting)
+        return (*u, *w), (columns["E"] - GRAVITY - resting) / (rattle + J * spin**2 / 2 - resting)
 
 
 def start(columns: Columns) -> tuple[Array, ...]:
@@ -94,6 +95,7 @@ MODEL = replace(
     constants=Constants,
     start=start,
     slower_period=lambda columns: NOSLIP.slower_period(body(columns)),
+    turned=lambda columns: NOSLIP.turned(body(columns)),
     rhs=rhs,
     ripple=replace(NOSLIP.ripple, of=lambda columns: NOSLIP.ripple.of(body(columns))),
     fastest_decay=zeros,

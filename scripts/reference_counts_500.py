@@ -54,7 +54,7 @@ LEAST_FORCE = 0.1
 """Between two samples the normal force may be somewhat lower: below this, lift-off cannot be excluded."""
 
 SPIN = slip.MODEL.spin_state
-CONSTANTS = len(slip.Constants._fields)
+CONSTANTS = len(slip.MODEL.constants._fields)
 RATTLE = [i for i in range(len(slip.MODEL.states)) if i != SPIN]
 SCALE = np.array([1.0 if i == SPIN else UNIT for i in range(len(slip.MODEL.states))])
 
@@ -80,12 +80,12 @@ def system() -> list[tuple[Any, Any]]:
     equations, (spin, *_) = taylor_system(slip.MODEL, SCALE)
     unscaled = tuple(state * k for (state, _), k in zip(equations, SCALE, strict=True))
     *constants, K11, K12, K21, K22 = (heyoka.par[i] for i in range(CONSTANTS + 4))
-    M1, M2 = momentum(unscaled, slip.Constants(*constants))
+    M1, M2 = momentum(unscaled, slip.MODEL.constants(*constants))
     ripple = unscaled[0] * (K11 * M1 + K12 * M2) + unscaled[1] * (K21 * M1 + K22 * M2)
     return [*equations, (heyoka.make_vars("integral"), spin - ripple)]
 
 
-def momentum(states: tuple[Any, ...], p: slip.Constants) -> tuple[Any, Any]:
+def momentum(states: tuple[Any, ...], p: slip.MODEL.constants) -> tuple[Any, Any]:
     """M1 and M2 of M = I ω - x_p × v_g with v_g = v_p + x_p × ω, as symbols."""
     u1, u2, w1, w2, w3, v1, v2 = states
     u3 = -heyoka.sqrt(1.0 - (u1 * u1 + u2 * u2))
@@ -119,8 +119,8 @@ def follow(cell: Case, integrator: Any, real: Any) -> Run:
     """Integrate a cell to its end."""
     columns = {name: np.array([real(value)]) for name, value in cell.items()}
     window, K = window_of(cell)
-    constants = stack(slip.Constants.of(columns))[:, 0]
-    states = np.append(stack(slip.start(columns))[:, 0] / SCALE, real(0))
+    constants = stack(slip.MODEL.constants.of(columns))[:, 0]
+    states = np.append(stack(slip.MODEL.start(columns))[:, 0] / SCALE, real(0))
     run, steps = Run(window), np.arange(WINDOWS * SAMPLES + 1) / real(SAMPLES) * window
     while run.status == "running":
         integrator.time = real(0)
@@ -136,7 +136,7 @@ def follow(cell: Case, integrator: Any, real: Any) -> Run:
 def look(run: Run, path: Array, constants: Array) -> None:
     """Record a stretch of the path, shape (samples, 8), and end the run if it is done."""
     states = path[:, :-1].T * SCALE[:, None]
-    _, (_, _, force, _) = slip.rhs(tuple(states), slip.Constants(*constants))
+    _, (_, _, force, _) = slip.MODEL.rhs(tuple(states), slip.MODEL.constants(*constants))
     base = run.integrals[-1]
     run.integrals += [base + part for part in path[SAMPLES // 2 :: SAMPLES // 2, -1]]
     run.least_force = min(run.least_force, float(force.min()))
@@ -155,14 +155,14 @@ def reach(states: Array, constants: Array) -> float:
     The averaged equations (ndotab, abdot) integrate to Δn = sqrt(d² + 2E/I3) - d for a mode of energy E
     at distance d from its critical spin.
     """
-    _, rattle, inertia = slip.energy(states.astype(float), slip.Constants(*constants.astype(float)))
+    _, rattle, inertia = slip.MODEL.energy(states.astype(float), slip.MODEL.constants(*constants.astype(float)))
     return float(np.sqrt(np.maximum(2 * rattle / inertia, 0)))
 
 
 def has_settled(states: Array, constants: Array) -> bool:
     """Whether the rattle decays at all spins within reach and a margin, and these have one sign."""
-    p = slip.Constants(*constants)
-    spin, *_ = slip.energy(states, p)
+    p = slip.MODEL.constants(*constants)
+    spin, *_ = slip.MODEL.energy(states, p)
     within = MARGIN * reach(states, constants)
     near = spin + np.linspace(-1, 1, 5) * within
     return bool(within < abs(spin) and all(linear.growth_rate(slip.MODEL, p, n) < 0 for n in near))
@@ -196,7 +196,8 @@ def jacobian(constants: Array, spin: Any) -> Array:
         states = np.array(slip.MODEL.upright(spin)).astype(np.clongdouble)
         states[i] += 1j * step
         columns.append(
-            np.array(slip.rhs(states, slip.Constants(*constants.astype(np.longdouble)))[0])[RATTLE].imag / step
+            np.array(slip.MODEL.rhs(states, slip.MODEL.constants(*constants.astype(np.longdouble)))[0])[RATTLE].imag
+            / step
         )
     return np.array(columns).T
 

@@ -182,7 +182,7 @@ def radau_step(A: Array, rhs: Rhs, states: Array, step: Any) -> Array:
 
 def first_times(case: Case, longest: float) -> list[Any]:
     """Ends of steps that resolve the onset of slip, growing from a fifth of its decay time to `longest`."""
-    step = Extended(0.2 / slip.fastest_decay({name: np.array([value]) for name, value in case.items()})[0])
+    step = Extended(0.2 / slip.MODEL.fastest_decay({name: np.array([value]) for name, value in case.items()})[0])
     times = [Extended(0)]
     while step < longest:
         times.append(times[-1] + step)
@@ -206,7 +206,7 @@ def radau_spins(case: Case, longest: float) -> list[Any]:
     states, constants = (np.array(numbers) for numbers in problem(slip.MODEL, case, Extended))
 
     def rhs(y: Array) -> Any:
-        return slip.rhs(y, slip.Constants(*constants))[0]
+        return slip.MODEL.rhs(y, slip.MODEL.constants(*constants))[0]
 
     spins = {}
     for stop, reached in radau_path(rhs, states, first_times(case, longest), TIMES, longest):

@@ -148,7 +148,7 @@ def traced_integrator(tolerance: float) -> Any:
     return heyoka.taylor_adaptive(
         taylor_system(slip.MODEL, OTHER_SCALE)[0],
         state=np.zeros(7),
-        pars=np.ones(len(slip.Constants._fields)),
+        pars=np.ones(len(slip.MODEL.constants._fields)),
         tol=tolerance,
     )
 
@@ -156,14 +156,14 @@ def traced_integrator(tolerance: float) -> Any:
 def traced_spins(cell: Case, integrator: Any, end: float) -> Array:
     """Spins at those of `TIMES` that come before the end; NaN after it."""
     columns = {name: np.array([value]) for name, value in cell.items()}
-    p = slip.Constants(*(float(value[0]) for value in slip.Constants.of(columns)))
+    p = slip.MODEL.constants(*(float(value[0]) for value in slip.MODEL.constants.of(columns)))
     integrator.time = 0.0
-    integrator.state[:] = np.array([value[0] for value in slip.start(columns)]) / OTHER_SCALE
+    integrator.state[:] = np.array([value[0] for value in slip.MODEL.start(columns)]) / OTHER_SCALE
     integrator.pars[:] = p
     spins = np.full(len(TIMES), np.nan)
     for k, t in enumerate(TIMES[end >= TIMES]):
         integrator.propagate_until(t)
-        spins[k] = slip.energy(integrator.state * OTHER_SCALE, p)[0]
+        spins[k] = slip.MODEL.energy(integrator.state * OTHER_SCALE, p)[0]
     return spins
 
 

@@ -65,7 +65,7 @@ def cases() -> Iterator[Case]:
     yield Case([f"b = 1.001, μ = {x:g}" for x in mu], standard(b=1.001, mu=mu), 1000.0)
     # Without an angle between the axes nothing couples the rattle to the spin, which gains its energy at most.
     columns = standard(delta=[0.0, 1e-12])
-    spin, rattle, inertia = slip.energy(slip.start(columns), slip.Constants.of(columns))
+    spin, rattle, inertia = slip.MODEL.energy(slip.MODEL.start(columns), slip.MODEL.constants.of(columns))
     yield Case(["δ = 0", "δ = 1e-12"], columns, 3000.0, near=rattle / (inertia * spin), spin=spin)
     # Rattle may set the body spinning, but only as fast as its energy allows, much of which the first slip takes.
     yield Case(["n0 = 0"], standard(n0=0.0), LONGEST, SETTLED, energy=0.01, settle=True)

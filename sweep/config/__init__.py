@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from sweep import faults
 from sweep.config import cases, cross_checks, document, film, schema, user_models
-from sweep.config.configuration import FIRST_AXES, Config, film_in, model_of
+from sweep.config.configuration import FIRST_AXES, Config, film_in, model_of, present
 from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
 from sweep.config.messages import describe
@@ -28,10 +28,10 @@ from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.measurement import TANGENT
 from sweep.models.general.laws import LAWS
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.models.general.variants import PAPER_LAW, Physics
 from sweep.models.model import MODES, Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
+from sweep.models.variants import PAPER_LAW, Physics
 from sweep.parameters import PARAMETERS, Parameter, sections
 from sweep.units import SI, TIME
 
@@ -140,7 +140,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         columns, units = source.once("cases", values.cases, lambda: cases.read(source, values.cases, known))
         units_of_cases = {("cases", name): unit for name, unit in units.items() if unit}
     seen = film_in(values.measure or ())
-    physics = _physics(values, origin, frozenset((*given, *columns)))
+    physics = _physics(values, origin, frozenset((*present(given), *columns)))
     _refuse(source, cross_checks.of_physics(values, physics, origin))
     model = model_of(values.model, origin, physics)
     uncertain = {n: v.distribution for n, v in given.items() if v.distribution and n in model.parameters}
@@ -196,8 +196,8 @@ def _given(values: Any, source: document.Document, known: Mapping[str, Parameter
             found |= {name: getattr(getattr(values, key), name) for name in value if name in known}
         elif key in known:
             found[key] = getattr(values, key)
-    if known is PARAMETERS and "offset" in found and found["offset"].spec == 0.0:
-        del found["offset"]  # the default: it does not make a body other than the paper's
+    if known is PARAMETERS and "offset" not in present(found):
+        found.pop("offset", None)  # it does not make a body other than the paper's
     return found
 
 
@@ -247,10 +247,17 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
     if "method" not in said or (alone and integrator.method == methods.AUTO):
         choice = isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
         found["method"] = methods.AUTO if choice and not alone else methods.PLAIN
-    if "t_end" not in said and {"c", "gravity"} <= in_si.keys():
-        longest = schema.T_END * sqrt(max(in_si["c"]) / min(in_si["gravity"]))
-        # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
-        found["t_end"] = STRETCH * ceil(min(longest, schema.LATEST) / STRETCH)
-    if "t_end" not in said and MODES in model.offers and integrator.stop_when_settled:
-        found |= {"t_end": schema.LATER, "patience": integrator.patience or schema.T_END}
+    if "t_end" not in said:
+        found["t_end"] = _longest(schema.T_END, in_si)
+        if MODES in model.offers and integrator.stop_when_settled:
+            found |= {"t_end": _longest(schema.LATER, in_si), "patience": integrator.patience or found["t_end"]}
     return Integrator(**{**dict(integrator), **found})
+
+
+def _longest(time: float, in_si: Mapping[str, tuple[float, ...]]) -> float:
+    """A time given in sqrt(c/g): in SI that of the slowest body, in s."""
+    if not {"c", "gravity"} <= in_si.keys():
+        return time
+    longest = time * sqrt(max(in_si["c"]) / min(in_si["gravity"]))
+    # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
+    return float(STRETCH * ceil(min(longest, schema.LATEST) / STRETCH))

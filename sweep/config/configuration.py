@@ -24,10 +24,10 @@ from sweep.kernels.measures.misfit import Misfit
 from sweep.models import TIERS
 from sweep.models.general import laws
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.models.general.variants import BASES, PAPER_LAW, Physics
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
+from sweep.models.variants import BASES, PAPER_LAW, Physics
 from sweep.parameters import Parameter, sections
 from sweep.units import NUMBER, PAPER_UNITS, SI, TIME, named
 from sweep.variables import attributes
@@ -46,6 +46,15 @@ def model_of(name: str, origin: Origin | None, physics: Physics) -> Tier:
     if origin:
         return loading.find(origin, physics)
     return physics.variant(name) if physics.beyond and name in BASES else TIERS[name]
+
+
+def present(parameters: Mapping[str, Values]) -> list[str]:
+    """Name the parameters, without those by which the body has nothing that it would not have without them."""
+    return [name for name, value in parameters.items() if name not in _ABSENT or value.spec != 0.0]
+
+
+_ABSENT = ("offset", "Ixz", "Iyz")
+"""Parameters whose value 0 is as if they were left out."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +141,7 @@ class Config:
     @property
     def tier(self) -> Tier:
         """The model that runs it."""
-        names = frozenset((*self.parameters, *self.cases))
+        names = frozenset((*present(self.parameters), *self.cases))
         law = self.own_law or laws.LAWS[self.law]
         return model_of(self.model, self.origin, Physics(self.units, law, SURFACES[self.surface], names))
 

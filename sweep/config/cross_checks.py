@@ -23,10 +23,10 @@ from sweep.kernels.measures import misfit
 from sweep.kernels.measures.measurement import TANGENT
 from sweep.models.general import starts, validity
 from sweep.models.general.surfaces import SURFACES
-from sweep.models.general.variants import BASES, INERTIA, Physics
 from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.models.user import loading
+from sweep.models.variants import BASES, INERTIA, Physics
 from sweep.parameters import PARAMETERS
 from sweep.units import SI, TIME, named
 

@@ -21,9 +21,9 @@ from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
 from sweep.models.general.laws import LAWS
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.models.general.variants import PAPER_LAW
 from sweep.models.origin import Origin
 from sweep.models.user import loading
+from sweep.models.variants import PAPER_LAW
 from sweep.parameters import PARAMETERS, Parameter, sections
 from sweep.units import PAPER_UNITS, SI, TIME
 

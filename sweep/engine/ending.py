@@ -19,9 +19,7 @@ from sweep.kernels.layout import Table
 from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
-from sweep.models.ladder import slip
-from sweep.models.model import MODES
-from sweep.models.stiff.form import subset
+from sweep.models.model import MODES, Model
 from sweep.models.stiff.modes import bending
 from sweep.models.theory import linear
 
@@ -96,18 +94,18 @@ def too_early(cells: Cells, which: Array | bool = True) -> Array:
     early, unknown = left > 0, np.flatnonzero(settled & np.isnan(left) & ~wound)
     early[wound] &= _error(cells)[0][wound] < _LARGEST
     if len(unknown):
-        early[unknown] = ~_stays(cells.kernel, cells.images[unknown])
+        early[unknown] = ~_stays(cells.model, cells.kernel, cells.images[unknown])
     return np.asarray(early)
 
 
-def _stays(kernel: Kernel, images: Array) -> Array:
+def _stays(model: Model, kernel: Kernel, images: Array) -> Array:
     """Tell where the spin keeps its sign and the rattle decays even at `_REACH` times the change foreseen."""
-    constants = subset(slip.Constants, kernel.unpack(images)[1])
+    constants = kernel.unpack(images)[1]
     states = kernel.model_states(images)
-    spin, _, _ = slip.MODEL.energy(tuple(states), constants)
-    farthest = spin + _REACH * (linear.resting_spin(slip.MODEL, constants, states) - spin)
+    spin, _, _ = model.energy(tuple(states), constants)
+    farthest = spin + _REACH * (linear.resting_spin(model, constants, states) - spin)
     known = np.isfinite(farthest)
-    growth = linear.growth_rate(slip.MODEL, constants, np.where(known, farthest, spin))
+    growth = linear.growth_rate(model, constants, np.where(known, farthest, spin))
     return np.asarray(known & (spin * farthest > 0) & (growth < 0))
 
 
@@ -138,7 +136,7 @@ def settle(cells: Cells, which: Array | bool = True) -> Array:
 def _error(cells: Cells) -> tuple[Array, Array]:
     """Relative error of what the slow equations foresee, and the fastest spin that the energy allows, (cells,)."""
     fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.images)["energy"], 0) / cells.inertia)
-    return np.maximum(_NEGLECTED * bending(cells.columns) * fastest**2, _LEAST), fastest
+    return np.maximum(_NEGLECTED * bending(cells.model, cells.columns) * fastest**2, _LEAST), fastest
 
 
 def _wound(table: Table) -> Array:

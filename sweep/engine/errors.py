@@ -221,7 +221,7 @@ def _ratio(part: Cells) -> Array:
     if method.stable_step is None:
         return ratio
     with np.errstate(divide="ignore"):
-        stable = _NEARER * method.stable_step(part.model, part.columns)
+        stable = _NEARER * method.stable_step(part.model.fastest_decay(part.columns))
     return np.asarray(np.clip(stable / part.kernel.table(part.images)["step"], _NEARER, ratio))
 
 

@@ -58,11 +58,11 @@ def run(
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun must be {' or '.join(RERUN)}, not {rerun!r}")
     if rerun and fresh:
-        raise StoreError("--rerun needs the dataset that --fresh discards; leave out one of the two")
+        raise StoreError("--rerun: it needs the dataset that --fresh discards; leave out one of the two")
     if rerun and output is None:
-        raise StoreError("rerun needs output, the folder of the run whose cells are to be simulated again")
+        raise StoreError("rerun: it needs output, the folder of the run whose cells are to be simulated again")
     if rerun and config.refine:
-        raise StoreError("--rerun cannot simulate single cells of a refined run; start anew with --fresh")
+        raise StoreError("--rerun: single cells of a refined run cannot be simulated again; start anew with --fresh")
     dataset.check_names(config)
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)

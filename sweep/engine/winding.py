@@ -11,7 +11,8 @@ from sweep.engine.cells import Cells
 from sweep.grid import Array
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.measures.decay import EVERY, LEFT, LOOKS, NEXT
-from sweep.models.theory.rocking import Body, frequencies, rocking
+from sweep.models.general import rigid_body, starts
+from sweep.models.theory.rocking import frequencies
 
 # A window, as a share of the patience.
 _WINDOW = 0.1
@@ -30,8 +31,9 @@ def watch(cells: Cells, images: Array) -> None:
     table, patience = cells.kernel.table(images), cells.rules.patience
     if NEXT not in table.layout or patience is None:
         return
-    slower, faster = frequencies(rocking(Body.of(cells.columns)))
-    rolls = faster - slower < _ROLLS * np.abs(cells.columns["n0"])
+    surface = cells.model.variant.surface
+    slower, faster = frequencies(rigid_body.rocking(cells.columns, surface))
+    rolls = faster - slower < _ROLLS * np.abs(starts.spin(cells.columns, surface))
     table[EVERY] = every = whole_blocks(_WINDOW * patience / (LOOKS * table["step"]))
     last = whole_blocks(patience / table["step"]) - LOOKS * every
     table[NEXT] = np.where(rolls, 0.0, np.where(last < 0, np.inf, last))

@@ -8,17 +8,13 @@ function in it is bound to.
 
 from __future__ import annotations
 
-import hashlib
-import linecache
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from sweep.jit import compiled, full_width, inline
+from sweep.jit import compiled, full_width
 from sweep.kernels.layout import LANES, Layout, constants_of
+from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Model
-
-GENERATED: dict[str, dict[str, Any]] = {}
-"""What the names in each generated source are bound to, by the source's file name."""
 
 
 def make_load(names: Sequence[str], layout: Layout, record=None):
@@ -85,23 +81,3 @@ def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[s
     """
     loop = ["full_width()", f"for lane in range({LANES}):", *(f"    {line}" for line in lines)]
     return compiled(compile_inline(name, arguments, loop, names | {"full_width": full_width()}))
-
-
-def compile_inline(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]):
-    """Compiled (arguments) -> what `lines` return, which may use `names`.
-
-    Equal sources have equal file names in every process.
-    """
-    source = "\n".join([f"def {name}({arguments}):", *(f"    {line}" for line in lines)])
-    digest = hashlib.sha256(source.encode()).hexdigest()[:16]
-    filename = f"<sweep {name} {digest}>"
-    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    GENERATED[filename] = names
-    namespace = dict(names)
-    exec(compile(source, filename, "exec"), namespace)
-    return inline(namespace[name])
-
-
-def tuple_of(items: Iterable[str]) -> str:
-    """The source of a tuple."""
-    return f"({' '.join(item + ',' for item in items)})"

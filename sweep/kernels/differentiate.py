@@ -1,77 +1,62 @@
 """The directional derivative of a right-hand side, as straight-line source that is made by tracing it once.
 
-Functions of a model consist of plain arithmetic without branches (`sweep.models.model.Model`).  Called with `Traced`
-numbers they write down what they compute, and beside it the derivative by the rules of calculus.  No difference is
-taken, so that every component keeps its relative precision however small it is.
+Functions of a model are traced with `Dual` numbers, whose derivatives follow from the rules of calculus
+(`sweep.models.symbols`).  No difference is taken, so that every component keeps its relative precision however small it
+is.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from sweep.kernels.codegen import compile_inline, tuple_of
 from sweep.models.model import Model
+from sweep.models.symbols import Constants, Symbol, choose, power, specialised
 
-_ONE: dict[Any, tuple[str, str]] = {
-    np.negative: ("-{a}", "-{da}"),
-    np.sqrt: ("np.sqrt({a})", "0.5 * {da} / {r}"),
-    np.absolute: ("abs({a})", "({da} if {a} >= 0.0 else -{da})"),
-    np.exp: ("np.exp({a})", "{r} * {da}"),
-    np.log: ("np.log({a})", "{da} / {a}"),
-    np.sin: ("np.sin({a})", "np.cos({a}) * {da}"),
-    np.cos: ("np.cos({a})", "-np.sin({a}) * {da}"),
-    np.tanh: ("np.tanh({a})", "(1.0 - {r} * {r}) * {da}"),
-    np.square: ("{a} * {a}", "2.0 * {a} * {da}"),
+_RULES: dict[Any, Callable[..., Any]] = {
+    np.negative: lambda r, a, da: -da,
+    np.sqrt: lambda r, a, da: 0.5 * da / r,
+    np.absolute: lambda r, a, da: choose(">=", a, 0.0, da, -da),
+    np.exp: lambda r, a, da: r * da,
+    np.log: lambda r, a, da: da / a,
+    np.sin: lambda r, a, da: np.cos(a) * da,
+    np.cos: lambda r, a, da: -np.sin(a) * da,
+    np.tanh: lambda r, a, da: (1.0 - r * r) * da,
+    np.square: lambda r, a, da: 2.0 * a * da,
+    np.add: lambda r, a, b, da, db: da + db,
+    np.subtract: lambda r, a, b, da, db: da - db,
+    np.multiply: lambda r, a, b, da, db: da * b + a * db,
+    np.divide: lambda r, a, b, da, db: (da - r * db) / b,
+    np.minimum: lambda r, a, b, da, db: choose("<", a, b, da, db),
+    np.maximum: lambda r, a, b, da, db: choose(">", a, b, da, db),
 }
-"""The value r of an operation on a, and its derivative, da being that of a."""
-
-_TWO: dict[Any, tuple[str, str, str, str]] = {
-    np.add: ("{a} + {b}", "{da} + {db}", "{da}", "{db}"),
-    np.subtract: ("{a} - {b}", "{da} - {db}", "{da}", "-{db}"),
-    np.multiply: ("{a} * {b}", "{da} * {b} + {a} * {db}", "{da} * {b}", "{a} * {db}"),
-    np.divide: ("{a} / {b}", "({da} - {r} * {db}) / {b}", "{da} / {b}", "-({r} * {db}) / {b}"),
-    np.minimum: ("min({a}, {b})", *3 * ("({da} if {a} < {b} else {db})",)),
-    np.maximum: ("max({a}, {b})", *3 * ("({da} if {a} > {b} else {db})",)),
-}
-"""The value r of an operation on a and b, and its derivative: if both change, if a alone does, and if b alone does."""
-
-_ZERO = "0.0"
+"""The derivative of the value r of an operation, from what it is of and the derivatives of that."""
 
 
-class Traced(np.lib.mixins.NDArrayOperatorsMixin):
-    """A number of the trace: the names of its value and of its derivative in the source."""
+class Dual(np.lib.mixins.NDArrayOperatorsMixin):
+    """A number of the trace and its derivative."""
 
-    def __init__(self, lines: list[str], value: str, slope: str) -> None:
-        self.lines, self.value, self.slope = lines, value, slope
+    def __init__(self, value: Any, slope: Any) -> None:
+        self.value, self.slope = value, slope
 
-    def __array_ufunc__(self, ufunc, method: str, *inputs, **options):
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
         if ufunc is np.power and isinstance(inputs[1], int) and inputs[1] > 0:
-            product = inputs[0]
-            for _ in range(inputs[1] - 1):
-                product = product * inputs[0]
-            return product
-        if ufunc not in {**_ONE, **_TWO} or method != "__call__" or options:
+            return power(*inputs)
+        if ufunc not in _RULES or method != "__call__" or options:
             raise TypeError(f"{ufunc.__name__} cannot be differentiated")
-        number = len(self.lines)
-        words = {"r": f"t{number}"}
-        for key, each in zip("ab", inputs, strict=False):
-            traced = isinstance(each, Traced)
-            words |= {key: each.value if traced else repr(float(each)), f"d{key}": each.slope if traced else _ZERO}
-        if ufunc in _ONE:
-            value, slope = _ONE[ufunc]
-            changes = words["da"] != _ZERO
-        else:
-            value, both, first, second = _TWO[ufunc]
-            slope = first if words["db"] == _ZERO else second if words["da"] == _ZERO else both
-            changes = words["da"] != _ZERO or words["db"] != _ZERO
-        line = f"t{number} = {value.format(**words)}"
-        self.lines.append(f"{line}; d{number} = {slope.format(**words)}" if changes else line)
-        return Traced(self.lines, f"t{number}", f"d{number}" if changes else _ZERO)
+        values, slopes = zip(*map(_parts, inputs), strict=True)
+        result = ufunc(*values)
+        changes = any(isinstance(each, Symbol) or each != 0 for each in slopes)
+        return Dual(result, _RULES[ufunc](result, *values, *slopes) if changes else 0.0)
 
     def __bool__(self) -> bool:
         raise TypeError("a branch cannot be differentiated")
+
+
+def _parts(number: Any) -> tuple[Any, Any]:
+    return (number.value, number.slope) if isinstance(number, Dual) else (float(number), 0.0)
 
 
 def make_extended(model: Model):
@@ -84,16 +69,15 @@ def make_extended(model: Model):
     TypeError
         if the right-hand side of the model is not plain arithmetic.
     """
-    lines: list[str] = []
     n = len(model.states)
-    states = tuple(Traced(lines, f"z[{i}]", f"z[{n + i}]") for i in range(n))
-    constants = model.constants(*(Traced(lines, f"p.{name}", _ZERO) for name in model.constants._fields))
-    slopes, _ = model.rhs(states, constants)
-    parts = [(each.value, each.slope) if isinstance(each, Traced) else (repr(float(each)), _ZERO) for each in slopes]
-    result = tuple_of(part[i] for i in (0, 1) for part in parts)
-    lines.append(f"return {result}, (0.0, 0.0, 1.0, 1.0)")
-    # The source of a constant may be one of the latter two.
-    return compile_inline("extended", "z, p", lines, {"np": np, "inf": np.inf, "nan": np.nan})
+
+    def extended(z, p):
+        states = tuple(Dual(*each) for each in zip(z[:n], z[n:], strict=True))
+        constants = model.constants(*(Dual(getattr(p, name), 0.0) for name in model.constants._fields))
+        parts = [_parts(each) for each in model.rhs(states, constants)[0]]
+        return (*(value for value, _ in parts), *(slope for _, slope in parts)), (0.0, 0.0, 1.0, 1.0)
+
+    return specialised(extended, z=2 * n, p=Constants(model.constants._fields, {}))
 
 
 def undifferentiable(model: Model) -> str:

@@ -13,10 +13,11 @@ from functools import cache
 import numpy as np
 
 from sweep.jit import Cached, compiled, parallel
-from sweep.kernels.codegen import compile_inline, make_gather
+from sweep.kernels.codegen import make_gather
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
 from sweep.kernels.tableau import DOPRI5
+from sweep.models.generated import compile_inline
 from sweep.models.model import Array, Model, stack
 
 # Relative error of a step.  States below `_SMALL` count as if they were of this size.

@@ -107,7 +107,9 @@ class Kernel:
         self._ripples = tuple(f"ripple.{name}" for name in self._ripple.names)
         measured = (name for each in measurements for name in each.quantities)
         more = stepper.quantities(self.follows)
-        self.layout = Layout((*self.model.states, *self.constants, *_BASE, *self._ripples, *measured, *more))
+        self.layout = Layout(
+            (*self.model.states, *self.constants, *_BASE, *self._ripples, *measured, *more), self.model
+        )
         self.advancing = self._make_advancing()
 
     def _make_advancing(self) -> Cached:

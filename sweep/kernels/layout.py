@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from sweep.jit import INTERPRETED
 from sweep.models.model import Array, Model
@@ -36,6 +37,8 @@ class Layout:
     """The names of the quantities of an image, in order."""
 
     names: tuple[str, ...]
+    model: Any = None
+    """The one whose states and constants are among them."""
 
     def __contains__(self, name: str) -> bool:
         return name in self.names

@@ -51,11 +51,11 @@ class Method:
     """One line for the documentation."""
     stepper: Callable[[Model, float], Stepper]
     """(model, tolerance) -> what takes its steps."""
-    accurate_step: Callable[[Model, Columns, Array, float], Array]
-    """(model, columns, motion, tolerance) -> the step that keeps the error in spin at t = 400 within the tolerance,
-    shape (cells,), in sqrt(c/g), where `motion` is the `fastest_motion`."""
-    stable_step: Callable[[Model, Columns], Array] | None = None
-    """(model, columns) -> the longest stable step, shape (cells,), in sqrt(c/g); None if no limit is near."""
+    accurate_step: Callable[[Model, Columns, Array, Array, float], Array]
+    """(model, columns, motion, decay, tolerance) -> the step that keeps the error in spin at t = 400 within the
+    tolerance, shape (cells,), in sqrt(c/g), where `motion` is the `fastest_motion` and `decay` the `fastest_decay`."""
+    stable_step: Callable[[Array], Array] | None = None
+    """(decay) -> the longest stable step, shape (cells,), in sqrt(c/g); None if no limit is near."""
     step_words: str = ""
     """The words for what limits an automatic step beside the tolerance, for the provenance; "" if nothing does."""
     runs: Callable[[Model], bool] = lambda model: True

@@ -33,12 +33,12 @@ def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> 
 
     Returns the names of the methods, and step and rule as `automatic_step` gives them, each of shape (cells,).
     """
-    motion, names = fastest_motion(model, columns), allowed(model)
-    found = [_step(METHODS[name], model, columns, motion, tolerance) for name in names]
+    rates, names = (fastest_motion(model, columns), model.fastest_decay(columns)), allowed(model)
+    found = [_step(METHODS[name], model, columns, *rates, tolerance) for name in names]
     with np.errstate(divide="ignore"):  # at hardly any friction a method may have no step at all
         costs = [METHODS[name].step_cost * (t_end / step + METHODS[name].start_up_cost)
                  for name, (step, _) in zip(names, found, strict=True)]  # fmt: skip
-    chosen, cells = np.argmin(costs, axis=0), np.arange(len(motion))
+    chosen, cells = np.argmin(costs, axis=0), np.arange(len(rates[0]))
     steps, rules = (np.stack(values)[chosen, cells] for values in zip(*found, strict=True))
     return np.array(names)[chosen], steps, rules
 
@@ -50,15 +50,19 @@ def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: fl
 
 def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:
     """Step of each trajectory, in sqrt(c/g), and the rule that determined it; both of shape (cells,)."""
-    return _step(METHODS[method], model, columns, fastest_motion(model, columns), tolerance)
+    rates = fastest_motion(model, columns), model.fastest_decay(columns)
+    return _step(METHODS[method], model, columns, *rates, tolerance)
 
 
-def _step(method: Method, model: Model, columns: Columns, motion: Array, tolerance: float) -> tuple[Array, Array]:
+def _step(
+    method: Method, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: float
+) -> tuple[Array, Array]:
     with np.errstate(divide="ignore"):
-        step = np.minimum(method.accurate_step(model, columns, motion, tolerance), longest_step(model, columns))
+        accurate = method.accurate_step(model, columns, motion, decay, tolerance)
+        step = np.minimum(accurate, longest_step(model, columns))
         if method.stable_step is None:
             return step, np.full(len(step), ACCURACY)
-        stable = method.stable_step(model, columns)
+        stable = method.stable_step(decay)
     return np.minimum(step, stable), np.where(stable < step, STABILITY, ACCURACY)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels import tangent
-from sweep.kernels.codegen import compile_inline, make_access, tuple_of
+from sweep.kernels.codegen import make_access
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, PACK
@@ -21,6 +21,7 @@ from sweep.kernels.measures.measurement import TANGENT
 from sweep.kernels.method import TOLERANCE, Method
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
+from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Columns, Model
 
 
@@ -132,7 +133,7 @@ def method(tableau: Tableau) -> Method:
         summary=tableau.summary,
         stepper=lambda model, tolerance: RungeKutta(model, tableau),
         accurate_step=partial(_accurate_step, tableau),
-        stable_step=lambda model, columns: np.asarray(longest / model.fastest_decay(columns)),
+        stable_step=lambda decay: np.asarray(longest / decay),
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",
         step_cost=tableau.stages / DOPRI5.stages,
         error_order=tableau.order,
@@ -140,10 +141,11 @@ def method(tableau: Tableau) -> Method:
     )
 
 
-def _accurate_step(tableau: Tableau, model: Model, columns: Columns, motion: Array, tolerance: float) -> Array:
+def _accurate_step(
+    tableau: Tableau, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: float
+) -> Array:
     power = 1 / tableau.order
     step = tableau.phase * model.radians_a_step * (tolerance / TOLERANCE) ** power / motion
-    decay = model.fastest_decay(columns)
     if not decay.any():
         return np.asarray(step)
     # A slip that differs by v for a time 1/λ moves the rattle, of frequency ν, by (ν/λ)² of itself.

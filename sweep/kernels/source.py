@@ -7,9 +7,9 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from sweep.kernels.codegen import GENERATED
 from sweep.kernels.methods import make_kernel
 from sweep.models import find
+from sweep.models.generated import GENERATED
 
 
 def main(method: str, model: str, *measure: str) -> None:

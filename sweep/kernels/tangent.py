@@ -15,8 +15,9 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
-from sweep.kernels.codegen import compile_inline, make_access, make_load, tuple_of
+from sweep.kernels.codegen import make_access, make_load
 from sweep.kernels.layout import BLOCK, LANES, Layout
+from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Model
 
 GROWTH = "tangent_growth"

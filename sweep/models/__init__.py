@@ -1,6 +1,6 @@
 """The ladder of models, one file each; every model approximates the one before it."""
 
-from sweep.models.general import variants
+from sweep.models import variants
 from sweep.models.ladder import analytic, averaged, effective, noslip, slip
 from sweep.models.model import Model, Tier
 

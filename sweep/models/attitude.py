@@ -24,40 +24,32 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.model import Array
+from sweep.models.vectors import Vector
 
 
 def of_rolling(contact):
     """Make `Model.path` of the states (u1, u2, ω1, ω2, ω3) on a surface, of which `contact` tells the contact point."""
 
-    @inline
     def path(y, along, across, p):
-        u1, u2, w1, w2, w3 = y
-        (u3, _), _, _, moving = contact(u1, u2, w1, w2, w3, p)
-        return _rates(u1, u3, w1, w3, moving, along, across)
+        return moving((*y, 0.0, 0.0), along, across, p)
 
+    moving = of_slipping(contact)
     return path
 
 
 def of_slipping(contact):
     """As `of_rolling`, of the states (u1, u2, ω1, ω2, ω3, v1, v2)."""
 
-    @inline
     def path(y, along, across, p):
         u1, u2, w1, w2, w3, v1, v2 = y
-        (u3, inv_u3), _, _, (dx, dy, dz) = contact(u1, u2, w1, w2, w3, p)
-        velocity = v1 + dx, v2 + dy, dz - (v1 * u1 + v2 * u2) * inv_u3
-        return _rates(u1, u3, w1, w3, velocity, along, across)
+        (_, _, u3), inv_u3, _, _, dx = contact(u1, u2, Vector(w1, w2, w3), p)
+        m1, m2, m3 = dx + Vector(v1, v2, -(v1 * u1 + v2 * u2) * inv_u3)
+        square = u1 * u1 + u3 * u3
+        turning, h = (w1 * u1 + w3 * u3) / square, np.sqrt(square)
+        # The directions along and across turn with the heading.
+        return turning, (u1 * m3 - u3 * m1) / h + turning * across, -m2 / h - turning * along
 
     return path
-
-
-@inline
-def _rates(u1, u3, w1, w3, velocity, along, across):
-    m1, m2, m3 = velocity
-    square = u1 * u1 + u3 * u3
-    turning, h = (w1 * u1 + w3 * u3) / square, np.sqrt(square)
-    # The directions along and across turn with the heading.
-    return turning, (u1 * m3 - u3 * m1) / h + turning * across, -m2 / h - turning * along
 
 
 @inline

@@ -2,7 +2,7 @@
 
 A model is a system of autonomous ordinary differential equations y' = f(y) for the motion of a rattleback near upright
 spin.  It lives in one file, which defines one `Model` by the name `MODEL`; enter it in `sweep.models.__init__`.
-Kernels, executor, store and plots then work with it.  `noslip` is a short example.
+Kernels, executor, store and plots then work with it.  `averaged` is a short example.
 
 1. Choose the states, in such a way that all but one vanish in upright spin; the remaining one carries the spin
    (`states`, `spin_state`).  A rattle then keeps its relative precision however small it becomes.

@@ -15,7 +15,9 @@ from matplotlib.colors import to_rgb
 from scipy.spatial.transform import Rotation
 
 from sweep.grid import Array
+from sweep.models.general.rigid_body import contact_on
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES, offset
+from sweep.models.vectors import Vector
 
 SUN = {"azdeg": 225, "altdeg": 60}
 """Where the light comes from, in degrees."""
@@ -75,7 +77,9 @@ def moving(one: xr.Dataset, times: Array) -> Moving:
     """The body of a trajectory at some times."""
     columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "offset") if name in one}
     surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
-    constants = SimpleNamespace(**{k: v[0] for k, v in zip(surface.constants, surface.of(columns), strict=True)})
+    constants = SimpleNamespace(
+        **{k: v[0] for k, v in zip(surface.constants, surface.of(columns, np.zeros(1)), strict=True)}
+    )
     known = np.isfinite(one["heading"].values)
     heading, roll, pitch, *path = (
         np.interp(times, one["time"].values[known], one[name].values[known])
@@ -83,7 +87,7 @@ def moving(one: xr.Dataset, times: Array) -> Moving:
     )
     delta = float(one["delta"]) if "delta" in one else 0.0
     turns = rotation(heading, roll, pitch) @ Rotation.from_euler("z", -delta).as_matrix()
-    contacts = np.array(surface.contact(turns[:, 2, 0], turns[:, 2, 1], 0.0, 0.0, 0.0, constants)[1]).T
+    contacts = np.array(contact_on(surface)(turns[:, 2, 0], turns[:, 2, 1], Vector(0.0, 0.0, 0.0), constants)[2]).T
     return Moving(_points(surface is ELLIPSOID, columns), turns, contacts, np.array(path))
 
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from sweep.grid import Array
 from sweep.models import MODELS
+from sweep.models.general.rigid_body import slower_period
 from sweep.models.ladder import analytic
 from sweep.models.model import stack
 from sweep.models.theory import stability
 from sweep.models.theory.coefficients import coefficients
-from sweep.models.theory.rocking import slower_period
 from sweep.report import direct
 from sweep.report.direct import standard
 from sweep.report.rows import Row, Section, against, below

@@ -129,7 +129,7 @@ def read(write: Write) -> Read:
 
 def test_a_real_body(read: Read) -> None:
     config = read(STONE)
-    assert config.equations.name == "slip+coulomb-tanh+sigma"
+    assert config.equations.name == "slip+coulomb-tanh+sigma+offset+gravity"
     assert set(config.parameters) == set(config.tier.parameters)
     columns = config.grid.columns()
     assert columns["roll"] == pytest.approx(np.pi / 360)
@@ -141,7 +141,7 @@ def test_a_real_body(read: Read) -> None:
 
 def test_what_the_numbers_of_a_paraboloid_mean(read: Read) -> None:
     config = read(BOWL)
-    assert config.equations.name == "slip+coulomb-tanh+sigma+paraboloid"
+    assert config.equations.name == "slip+coulomb-tanh+sigma+gravity+paraboloid"
     assert config.described("a") == {
         "long_name": "coefficient a of the paraboloid",
         "description": "The paraboloid is z = c (1 - a (x/c)^2 - b (y/c)^2).",
@@ -174,13 +174,14 @@ def test_it_survives_its_own_document(text: str, read: Read) -> None:
 
 BEYOND = {
     "": "slip",
-    "body: {offset: 0.1}": "slip+viscous",
-    "body: {Ixx: 2, Iyy: 20, Izz: 21, Ixy: -0.3}": "slip+viscous",
+    "body: {offset: 0.1}": "slip+viscous+offset",
+    "body: {Ixx: 2, Iyy: 20, Izz: 21, Ixy: -0.3}": "slip",
+    "body: {Ixx: 2, Iyy: 20, Izz: 21, Iyz: -0.3}": "slip+viscous+skew",
     "friction: {mu: 10, sigma: 0.1}": "slip+viscous+sigma",
-    "start: {omega1: 0.1}": "slip+viscous",
+    "start: {omega1: 0.1}": "slip",
     "friction: {law: none}": "slip+none",
     "friction: {law: coulomb, mu: 0.2, speed: 0.01}": "slip+coulomb-sqrt",
-    "model: noslip\nbody: {offset: 0.1}": "noslip+solid",
+    "model: noslip\nbody: {offset: 0.1}": "noslip+solid+offset",
     "friction: {mu: 6, sigma: 0.1, mu_spinning: 0.1, radius_spinning: 0.1, speed_spinning: 0.1}":
         "slip+viscous+sigma+spinning",
     "friction: {law: contensou, mu: 0.3, radius_contact: 0.01, speed: 0.01}": "slip+contensou",
@@ -204,10 +205,15 @@ def test_angles_in_degrees_anywhere(read: Read) -> None:
 
 
 def test_the_default_time_of_bodies_in_si(read: Read) -> None:
-    """It is the paper's, 30000 sqrt(c/g), rounded up to hundreds of seconds."""
+    """The paper's 30000 sqrt(c/g), rounded up to hundreds of seconds: that of `patience` with viscous friction."""
     config = read(stone(("integrator: {t_end: 5}\n", ""), ("c: 0.02", "c: [0.01, 0.02]")))
     assert config.integrator.t_end == 1400
     assert 1300 < 30_000 * np.sqrt(0.02 / 9.81) < 1400
     assert read(config.to_yaml()) == config
-    assert read("body: {offset: 0.1, c: 0.5}\nfriction: {mu: 6}").integrator.t_end == 30_000
+    foreseen = read("body: {offset: 0.1, c: 0.5}\nfriction: {mu: 6}").integrator
+    assert (foreseen.patience, foreseen.t_end) == (30_000, 1e6)
+    toy = "units: SI\nbody: {a: 0.1, b: 0.03, c: 0.02, mass: 1, Ixx: 2e-4, Iyy: 1e-3, Izz: 1e-3}\nfriction: {mu: 30}\n"
+    foreseen = read(toy + "start: {n0: 1, x0: 1e-3, y0: 1e-3}").integrator
+    assert (foreseen.patience, foreseen.t_end) == (1400, 45_200)
+    assert 45_100 < 1e6 * np.sqrt(0.02 / 9.81) < 45_200
     assert read(STONE).integrator.t_end == 5

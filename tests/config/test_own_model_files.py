@@ -220,7 +220,7 @@ def test_a_configuration_keeps_its_model_wherever_it_goes(folder: Path, monkeypa
 
 def test_the_law_of_a_file_takes_the_place_of_law(folder: Path) -> None:
     file = folder / "fading.yaml"
-    assert load_config(file).equations.name == "slip+fading+sigma"
+    assert load_config(file).equations.name == "slip+fading+sigma+offset+gravity"
     for key, value, message in (
         ("friction.law", "coulomb", "friction.law: unknown key"),
         ("mu_static", 1.0, "mu_static: does not belong to the law fading; leave it out"),
@@ -233,7 +233,7 @@ def test_the_law_of_a_file_takes_the_place_of_law(folder: Path) -> None:
 
 LIKE_OURS = """\
 from sweep.jit import inline
-from sweep.models.general.variants import with_law
+from sweep.models.variants import with_law
 from sweep.models.general.laws import Law
 
 

@@ -66,7 +66,7 @@ def test_a_strong_rattle_that_hardly_decays_does_not_let_a_cell_settle() -> None
 def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, write: Write) -> None:
     write(CELLS, "cells.csv")
     config = write(SCENE)
-    found, interruptions, _ = in_sittings(300, config, config.parent / "out")
+    found, interruptions, _ = in_sittings(100, config, config.parent / "out")
     assert interruptions > 1
     same_numbers(found, run)
 

@@ -11,8 +11,11 @@ from sweep.engine import executor
 from sweep.engine.plan import plan
 from sweep.engine.winding import whole_blocks
 from sweep.kernels.status import RUNNING, SETTLED
+from sweep.models.ladder import slip
 from sweep.models.stiff.precession import vertical_spin
-from sweep.models.stiff.slip import STIFF_MODEL, Constants, slow
+from sweep.models.stiff.slip import form_of
+
+FORM = form_of(slip.MODEL)
 
 
 def test_a_pause_between_blocks_changes_no_bit() -> None:
@@ -33,23 +36,23 @@ def test_a_pause_between_blocks_changes_no_bit() -> None:
 def test_a_rolling_rattle_turns_the_vertical_spin_by_its_product_of_inertia_alone() -> None:
     """d (M·u)/dt = A12 (ω1² - ω2²) - (A11 - A22) ω1 ω2, to the third power of the rattle."""
     body, size = columns(b=8.0, delta=[0.3] * 3), 1e-4 * np.array([1.0, 0.5, 0.25])
-    p = Constants.of(body)
+    p = FORM.model.constants.of(body)
     states = np.array([0.3 * size, -0.7 * size, 5.0 * size, 2.0 * size, np.zeros(3), 0.0 * size, 0.0 * size])
-    later, _ = slow(*states, p)
+    later, _ = FORM.slow(*states, p)
     after = states.copy()
     after[:5] += 1e-6 * np.array(later)
-    afterwards, before = (vertical_spin(each, *STIFF_MODEL.energy(each, p))[0] for each in (after, states))
-    gain = (afterwards - before) * p.I3 / 1e-6
-    w1, w2 = states[2] / (p.I1 + body["c"] ** 2), states[3] / (p.I2 + body["c"] ** 2)
+    afterwards, before = (vertical_spin(each, *FORM.model.energy(each, p))[0] for each in (after, states))
+    gain = (afterwards - before) * p.J33 / 1e-6
+    w1, w2 = states[2] / (p.J11 + body["c"] ** 2), states[3] / (p.J22 + body["c"] ** 2)
     np.testing.assert_allclose(gain, p.A12 * (w1**2 - w2**2) - (p.A11 - p.A22) * w1 * w2, rtol=1e-3)
 
 
 def test_upright_spin_has_nothing_to_lose() -> None:
     spin = np.array([0.05, -0.02])
-    p = Constants.of(columns(n0=spin))
+    p = FORM.model.constants.of(columns(n0=spin))
     states = np.zeros((7, 2))
-    states[4] = -p.I3 * spin
-    left, total = vertical_spin(states, *STIFF_MODEL.energy(states, p))
+    states[4] = -p.J33 * spin
+    left, total = vertical_spin(states, *FORM.model.energy(states, p))
     np.testing.assert_allclose(left, spin)
     np.testing.assert_allclose(total, spin**2)
 

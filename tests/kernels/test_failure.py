@@ -14,7 +14,9 @@ from sweep.models.model import Array, stack
 def met(body: dict[str, np.ndarray], stretch: float) -> tuple[Array, ...]:
     """What cells meet within so long a time from their start."""
     cells = len(body["a"])
-    return approach(MODELS["slip"], stack(slip.start(body)), slip.Constants.of(body), np.full(cells, stretch))
+    return approach(
+        MODELS["slip"], stack(slip.MODEL.start(body)), slip.MODEL.constants.of(body), np.full(cells, stretch)
+    )
 
 
 @pytest.mark.parametrize("kind", ENDS)
@@ -49,9 +51,9 @@ def test_the_paradox_may_have_a_finite_force() -> None:
 
 def test_states_that_cannot_be_followed() -> None:
     body = columns()
-    states = stack(slip.start(body))
+    states = stack(slip.MODEL.start(body))
     states[2] = np.nan
-    (status,), (time,), *_ = approach(MODELS["slip"], states, slip.Constants.of(body), np.ones(1))
+    (status,), (time,), *_ = approach(MODELS["slip"], states, slip.MODEL.constants.of(body), np.ones(1))
     assert (status, time) == (DIVERGED, 0.0)
 
 

@@ -109,7 +109,7 @@ def test_the_exponent_is_that_of_the_variational_equations() -> None:
         full, length = int(table["full_bins"][i]), table["bin_width"][i] * BLOCK * table["step"][i]
         times = np.array([full - full // 2, full]) * length
         start = np.concatenate([stack(noslip.MODEL.start(body))[:, i], np.full(5, 5**-0.5), [0.0]])
-        constants = take(noslip.Constants.of(body), i)
+        constants = take(noslip.MODEL.constants.of(body), i)
         solution = solve_ivp(slopes, (0, times[1]), start, "DOP853", times, args=(constants,), rtol=1e-11, atol=1e-13)
         assert full >= BINS // 2
         assert found[i] == pytest.approx(np.diff(solution.y[-1])[0] / np.diff(times)[0], abs=1e-8)

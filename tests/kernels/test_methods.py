@@ -16,7 +16,10 @@ from sweep.kernels.layout import LANES, PACK
 from sweep.kernels.methods import METHODS, automatic_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
 from sweep.models import MODELS
-from sweep.models.stiff.slip import PAPER_FORM
+from sweep.models.ladder import slip
+from sweep.models.stiff.slip import form_of
+
+PAPER_FORM = form_of(slip.MODEL)
 
 KERNELS = {method: make(method) for method in METHODS}
 each_method = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
@@ -162,7 +165,7 @@ def assembly(function: Any, *arguments: Any) -> str:
 @pytest.mark.parametrize(
     ("method", "model"),
     [("dopri5", "slip"), *(pytest.param("adams", model, marks=pytest.mark.campaign)
-                           for model in ("slip", "slip+viscous+sigma"))],
+                           for model in ("slip", "slip+viscous+sigma+offset+skew+gravity"))],
 )  # fmt: skip
 def test_the_loop_over_lanes_is_vector_instructions(method: str, model: str) -> None:
     made: Any = make(method, model)

@@ -42,7 +42,7 @@ def misfit(spins: np.ndarray, times: np.ndarray) -> Any:
 def spins(times: np.ndarray) -> np.ndarray:
     """The standard case by another integrator."""
     *states, _ = adaptive.motion(columns(), np.unique(times), rtol=1e-13, atol=1e-16)
-    found = slip.rhs(tuple(states), take(slip.Constants.of(columns()), 0))[1][0]
+    found = slip.MODEL.rhs(tuple(states), take(slip.MODEL.constants.of(columns()), 0))[1][0]
     return np.asarray(found)[np.searchsorted(np.unique(times), times)]
 
 

@@ -5,13 +5,18 @@ import pytest
 from support import columns
 from support.kernels import images, kernel, run
 
+import sweep
 from sweep.kernels.adams import stretches
 from sweep.kernels.measures import noise
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import QUIET, RUNNING
 from sweep.models import MODELS
-from sweep.models.stiff import slip as stiff_slip
+from sweep.models.general import rigid_body
+from sweep.models.ladder import slip
 from sweep.models.stiff.modes import _rocking
+from sweep.models.stiff.slip import form_of
+
+PAPER_FORM = form_of(slip.MODEL)
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
 
@@ -29,6 +34,33 @@ def test_late_reversals_come_at_the_reference_times(tolerance: float) -> None:
         zip(ADAMS.table(table)["reversals"], ADAMS.table(table)["last_reversal"], strict=True)
     )
     assert not ADAMS.table(table)["noise_limited"].any()
+
+
+def test_so_they_do_for_a_real_body() -> None:
+    """The same body in SI, by its moments of inertia."""
+    length, gravity, mass = 0.02, 9.81, 0.3
+    time, moment = np.sqrt(length / gravity), mass * length**2
+    I1, I2, I3 = (float(each[0]) for each in rigid_body.homogeneous(columns()))
+    cos, sin = np.cos(0.03), np.sin(0.03)
+    inertia = {
+        "Ixx": I1 * cos**2 + I2 * sin**2,
+        "Iyy": I1 * sin**2 + I2 * cos**2,
+        "Izz": I3,
+        "Ixy": (I1 - I2) * sin * cos,
+    }
+    turned = {"x0": 0.01 * (cos - sin), "y0": 0.01 * (sin + cos)}
+    body = {"a": 10 * length, "b": 3 * length, "c": length, "mass": mass}
+    scene = {
+        "units": "SI",
+        "gravity": gravity,
+        "body": body | {name: moment * value for name, value in inertia.items()},
+        "friction": {"mu": [mu * time / length for mu in LAST | FIRM]},
+        "start": {"n0": 0.05 / time} | {name: length * value for name, value in turned.items()},
+    }
+    found = sweep.run(scene, method="adams", t_end=45_000 * time, estimate_errors=False)
+    assert list(found.reversals) == [n for n, _ in (LAST | FIRM).values()]
+    np.testing.assert_allclose(found.t_last_reversal / time, [t for _, t in (LAST | FIRM).values()], rtol=1e-3)
+    assert not found.noise_limited.any()
 
 
 def test_dopri5_flags_reversals_that_round_off_moved() -> None:
@@ -65,11 +97,11 @@ def test_a_mode_let_down_too_late_is_flagged() -> None:
 
 def test_growth_is_that_of_the_model() -> None:
     body = columns(b=[1.5, 3.0, 6.0], mu=[60.0, 200.0, 400.0], n0=[0.05, -0.1, 0.08])
-    c = noise.growth_coefficients(body)
-    constants = stiff_slip.Constants.of(body)
+    c = noise.growth_coefficients(slip.MODEL, body)
+    constants = PAPER_FORM.model.constants.of(body)
     for share in (-1.0, -0.4, 0.1, 0.7):
         spin = share * body["n0"]
-        rates, _, _ = _rocking(constants, spin)
+        rates, _, _ = _rocking(PAPER_FORM, constants, spin)
         largest = np.abs(c[:, 1] * body["n0"]).max()
         fitted = (c * spin ** np.arange(c.shape[1])[:, None]).sum(axis=1)
         np.testing.assert_allclose(fitted, rates.real.T, atol=0.03 * largest)

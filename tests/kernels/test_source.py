@@ -40,7 +40,8 @@ print(json.dumps([way, *(found[name].values.tolist() for name in ("spin_final", 
 
 
 @pytest.mark.parametrize(
-    ("method", "function", "wanted"), [("dopri5", slip.rhs, "step"), ("adams", stiff_slip.slow, "run_block")]
+    ("method", "function", "wanted"),
+    [("dopri5", slip.equations(slip.MODEL.variant), "step"), ("adams", stiff_slip._compliance, "run_block")],
 )
 def test_a_debugger_stops_in_the_equations(method: str, function: Callable[..., Any], wanted: str) -> None:
     """Without compilation a run takes the same steps in plain Python, to numbers that are the same to rounding."""
@@ -58,7 +59,8 @@ def test_a_debugger_stops_in_the_equations(method: str, function: Callable[..., 
 def test_the_printed_source_names_where_its_functions_are(capsys: pytest.CaptureFixture[str]) -> None:
     source.main("dopri5", "slip", "reversals")
     text = capsys.readouterr().out
-    step = text[text.index("# <sweep step") :]
-    assert step.splitlines()[1] == f"#   rhs: {slip.__file__}:{getsourcelines(slip.rhs)[1]}"
+    step, rhs = (text[text.index(f"# <sweep {name}") :] for name in ("step", "rhs"))
+    assert step.splitlines()[1] == f"#   rhs: {slip.MODEL.rhs.__code__.co_filename}:1"
     assert step.splitlines()[2:4] == ["def step(y, p, h):", "    k0, m0 = rhs(y, p)"]
-    assert "#   record: sweep.models.ladder.slip.Constants\ndef load(group, lane):\n" in text
+    assert f"#   rhs: {slip.__file__}:{getsourcelines(slip.equations(slip.MODEL.variant))[1]}\ndef rhs(y, p):\n" in rhs
+    assert "Record\ndef load(group, lane):\n" in text

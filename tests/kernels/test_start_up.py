@@ -15,8 +15,9 @@ from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import Columns, take
-from sweep.models.stiff import slip as stiff_slip
-from sweep.models.stiff.slip import PAPER_FORM
+from sweep.models.stiff.slip import form_of
+
+PAPER_FORM = form_of(slip.MODEL)
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
 
@@ -52,11 +53,11 @@ def test_states_history_and_work_against_dopri5(mu: float, step: float, bound: f
     for j in range(HISTORY):
         time = image[ADAMS.layout.index("begin")] - j * h
         twin = resolved(body, time, fine)
-        state = np.array(stiff_slip.momentum(twin[:7], p))
+        state = np.array(PAPER_FORM.momentum(twin[:7], p))
         slot = HISTORY - 1 - j
         slopes = image[ADAMS.layout.index(f"f{slot}_0") :][:5]
         # By the exact slow slopes, at the exact slip.
-        np.testing.assert_allclose(slopes, stiff_slip.slow(*state, p)[0], atol=100 * bound)
+        np.testing.assert_allclose(slopes, PAPER_FORM.slow(*state, p)[0], atol=100 * bound)
         np.testing.assert_allclose(image[ADAMS.layout.index(f"v{slot}_0") :][:2], state[5:], atol=10 * bound)
         if j == 0:
             np.testing.assert_allclose(image[:7], state, atol=10 * bound)
@@ -64,7 +65,7 @@ def test_states_history_and_work_against_dopri5(mu: float, step: float, bound: f
             work = twin[DOPRI.layout.index("work")]
             assert image[ADAMS.layout.index("work")] == pytest.approx(work, rel=2e-3 * (step / 0.1) ** 3, abs=1e-13)
         if j < 3:
-            power = slip.rhs(twin[:7], p)[1][1]
+            power = slip.MODEL.rhs(twin[:7], p)[1][1]
             assert image[ADAMS.layout.index(f"power{j}")] == pytest.approx(power, rel=1e-3, abs=1e-12)
 
 
@@ -114,7 +115,7 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
     ended = status != RUNNING
     assert 10 <= ended.sum() < n
     # No longer than start-up, in steps that dopri5 is stable at: else it would call any end diverged.
-    stable = 0.9 * DOPRI5.real_stability / slip.fastest_decay(body)
+    stable = 0.9 * DOPRI5.real_stability / slip.MODEL.fastest_decay(body)
     until = 1.01 * begin[~ended, ADAMS.layout.index("begin")].max()
     twins = finish(DOPRI, begun(body, np.minimum(stable, step / 4), DOPRI, until), settle=False)
     reached = DOPRI.times(twins, until)
@@ -123,5 +124,5 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
     assert (reached[~ended] > begin[~ended, ADAMS.layout.index("begin")]).all()
     assert set(status) == {RUNNING, LIFT_OFF}
     # They keep sound states, those of the start.
-    states = np.stack(stiff_slip.STIFF_MODEL.start(body), axis=-1)
+    states = np.stack(PAPER_FORM.model.start(body), axis=-1)
     np.testing.assert_allclose(begin[ended, :7], states[ended], rtol=1e-14, atol=1e-14)

@@ -12,10 +12,11 @@ from sweep.kernels.layout import BLOCK
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.ladder import slip
 from sweep.models.model import stack, take
-from sweep.models.stiff import slip as stiff_slip
-from sweep.models.stiff.form import subset
 from sweep.models.stiff.modes import RATTLE, Rattle, bending
+from sweep.models.stiff.slip import form_of
 from sweep.models.theory import linear, stability
+
+PAPER_FORM = form_of(slip.MODEL)
 
 ADAMS = kernel("adams")
 row = ADAMS.layout.index
@@ -42,23 +43,23 @@ def carried(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return seen
 
 
-def resolved(size: float, **parameters: Any) -> tuple[Rattle, np.ndarray, stiff_slip.Constants, dict[str, np.ndarray]]:
+def resolved(size: float, **parameters: Any) -> tuple[Rattle, np.ndarray, Any, dict[str, np.ndarray]]:
     body = columns(x0=size, y0=size, **parameters)
-    states, constants = stack(stiff_slip.STIFF_MODEL.start(body)), stiff_slip.Constants.of(body)
-    return Rattle.of(states, constants), states, constants, body
+    states, constants = stack(PAPER_FORM.model.start(body)), PAPER_FORM.model.constants.of(body)
+    return Rattle.of(PAPER_FORM, states, constants), states, constants, body
 
 
 def later(body: dict[str, np.ndarray], times: np.ndarray) -> np.ndarray:
     """States of the stiff form at `times`, by another integrator."""
     states = adaptive.motion(body, times, rtol=1e-11, atol=1e-20)[:7]
-    return stack(stiff_slip.momentum(states, take(stiff_slip.Constants.of(body), np.zeros(len(times), int))))
+    return stack(PAPER_FORM.momentum(states, take(PAPER_FORM.model.constants.of(body), np.zeros(len(times), int))))
 
 
 def test_modes_move_as_the_full_model() -> None:
     _, _, constants, body = resolved(1e-6, mu=60.0)
     times = np.array([20.0, 30.0, 100.0])  # the slip is there by then
     exact = later(body, times)
-    rattle = Rattle.of(exact, take(constants, np.zeros(3, int)))
+    rattle = Rattle.of(PAPER_FORM, exact, take(constants, np.zeros(3, int)))
     first = rattle.select(np.zeros(3, dtype=int))
     factors = np.exp(first.rates * (times - times[0])[:, None])
     ours = exact[list(RATTLE), :1].T + first.changes(factors, first.amplitudes)
@@ -72,12 +73,12 @@ def test_modes_move_as_the_full_model() -> None:
 
 def test_energies_of_the_modes_add_up() -> None:
     rattle, states, constants, _ = resolved(1e-6, mu=60.0, n0=[0.05, -0.02, 0.001])
-    _, whole, inertia = stiff_slip.STIFF_MODEL.energy(states, constants)
+    _, whole, inertia = PAPER_FORM.model.energy(states, constants)
     energies = rattle.unit_energies * np.abs(rattle.amplitudes) ** 2
     np.testing.assert_allclose(energies.sum(axis=1), 2 * whole / inertia, rtol=0.1)
     np.testing.assert_allclose(
         rattle.rates.real.max(axis=1),
-        linear.growth_rate(slip.MODEL, subset(slip.Constants, constants), np.array([0.05, -0.02, 0.001])),
+        linear.growth_rate(slip.MODEL, constants, np.array([0.05, -0.02, 0.001])),
         rtol=1e-9,
     )
 
@@ -141,13 +142,13 @@ def test_bending_is_the_size_of_what_steps_show() -> None:
     """The normal force of a rocking with e = 1e-8 differs from the weight by no more than c e."""
     for axis in ({"x0": 1e-3, "y0": 0.0}, {"x0": 0.0, "y0": 1e-3}):
         body = columns(n0=0.0, **axis)
-        constants = slip.Constants.of(body)
-        _, rattle, inertia = slip.energy(stack(slip.start(body)), constants)
+        constants = slip.MODEL.constants.of(body)
+        _, rattle, inertia = slip.MODEL.energy(stack(slip.MODEL.start(body)), constants)
         states = adaptive.motion(body, np.linspace(0, 6, 400), rtol=1e-9, atol=1e-15)[:7]
-        force = [slip.rhs(y, take(constants, 0))[1][2] for y in states.T]
+        force = [slip.MODEL.rhs(y, take(constants, 0))[1][2] for y in states.T]
         share = (np.abs(np.array(force) - 1) / (2 * rattle / inertia)).max()
-        assert share <= 1.05 * bending(body)
-    assert share > 0.1 * bending(body)
+        assert share <= 1.05 * bending(slip.MODEL, body)
+    assert share > 0.1 * bending(slip.MODEL, body)
 
 
 @pytest.mark.parametrize("size", [1e-30, 1e-12])
@@ -215,9 +216,9 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     cells: list[int] = []
     of = Rattle.of
 
-    def counted(states: np.ndarray, constants: stiff_slip.Constants) -> Rattle:
+    def counted(form: Any, states: np.ndarray, constants: Any) -> Rattle:
         cells.append(states.shape[1])
-        return of(states, constants)
+        return of(form, states, constants)
 
     monkeypatch.setattr(stretches.Rattle, "of", counted)
     return cells

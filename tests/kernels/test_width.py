@@ -24,7 +24,7 @@ def test_the_widest_vectors_against_the_preference_of_the_compiler(called: str, 
     code = f"""
 import numba
 from sweep.jit import compiled, full_width
-from sweep.kernels.codegen import compile_inline
+from sweep.models.generated import compile_inline
 add = compiled(compile_inline("add", "x, y", {lines}, {{"full_width": full_width()}}))
 add.compile((numba.float64[::1], numba.float64[::1]))
 print(next(iter(add.inspect_asm().values())))

@@ -102,7 +102,9 @@ CUTS: dict[str, Callable[[xr.Dataset, str, Random], xr.Dataset]] = {
     "mean": lambda dataset, dim, _: dataset.mean(dim),
     "mean of all": lambda dataset, *_: dataset.mean(),
     "max": lambda dataset, dim, _: dataset.max(dim, keep_attrs=True),
-    "stack": lambda dataset, dim, _: dataset.stack(both=[dim, *(each for each in dataset.dims if each != dim)][:2]),
+    "stack": lambda dataset, dim, _: dataset.stack(
+        {f"both_{dim}": [dim, *(each for each in dataset.dims if each != dim)][:2]}
+    ),
     "transpose": lambda dataset, *_: dataset.transpose(*reversed([*dataset.dims])),
     "drop": lambda dataset, _, random: dataset.drop_vars(random.choice([*dataset.data_vars])),
     "where": lambda dataset, *_: dataset.where(dataset["status"] > 1) if "status" in dataset else dataset,

@@ -28,6 +28,7 @@ def in_its_surface(p: dict[str, float]) -> dict[str, Any]:
 def set_off(p: dict[str, float]) -> np.ndarray:
     """The states at the start, by the energy above that of the plane."""
     y = np.array([np.cos(p["roll"]) * np.sin(p["pitch"]), -np.sin(p["roll"]), *(p[f"omega{i}"] for i in (1, 2, 3))])
+    y = newton.turned(y, -newton.axes(in_its_surface(p)))
     still, turning = (newton.energy(y * [1, 1, k, k, k], in_its_surface(p), None) + G for k in (0, 1))
     y[2:] *= np.sqrt((p["E"] - still) / (turning - still))
     return y

@@ -10,9 +10,8 @@ from support import STANDARD, newton, wide_bodies
 from support import cells as all_cells
 from support.physics import KANE_LEVINSON
 
-from sweep.models import find
-from sweep.models.general import rigid_body, variants
-from sweep.models.general import ripple as general_ripple
+from sweep.models import find, variants
+from sweep.models.general import rigid_body
 from sweep.models.general.bounds import strongest_grip
 from sweep.models.general.couples import COUPLES as KINDS
 from sweep.models.general.laws import LAWS, tanh_ratio
@@ -37,8 +36,14 @@ def cells(**parameters: Any) -> dict[str, np.ndarray]:
 
 def one(name: str, parameters: dict[str, Any]) -> tuple[Any, Any]:
     """A model and its constants for one body, as scalars."""
-    model = find(name)
+    model = any_body(name)
     return model, take(model.constants.of(cells(**parameters)), 0)
+
+
+def any_body(name: str) -> Model:
+    """The model of this name, of a body that may have all that there is; `slip` and `noslip` are of the paper's."""
+    base, *more = name.split("+paraboloid")
+    return find(f"{base}+offset+skew+gravity" + ("+paraboloid" if more else "") if "+" in name else name)
 
 
 def states(number: int, count: int) -> np.ndarray:
@@ -93,7 +98,7 @@ def agree(name: str, parameters: dict[str, Any], law: str | None, number: int) -
     ("name", "body"), [("noslip", STANDARD), ("noslip+solid", KANE_LEVINSON), ("noslip+solid", SKEW)]
 )
 def test_frequencies_are_those_of_the_equations(name: str, body: dict[str, float]) -> None:
-    model, columns = find(name), cells(**body)
+    model, columns = any_body(name), cells(**body)
     values = linear.jacobian(model, model.constants.of(columns), np.zeros(1))[0]
     expected = np.unique(np.abs(np.linalg.eigvals(values).imag).round(9))[-2:]
     np.testing.assert_allclose(np.ravel(frequencies(rigid_body.rocking(columns))), expected, rtol=1e-8)
@@ -108,9 +113,7 @@ def test_the_ripple_free_spin_of_a_real_body_hardly_ripples() -> None:
     times = np.linspace(0, 3 * rigid_body.slower_period(cells(**KANE_LEVINSON))[0], 400)
     course = newton.follow(y, KANE_LEVINSON, None, times)
     spin = model.energy(course, constants)[0]
-    steady_spin = spin - model.ripple.value(
-        course, constants, [k[0] for k in general_ripple.form(cells(**KANE_LEVINSON))]
-    )
+    steady_spin = spin - model.ripple.value(course, constants, [k[0] for k in model.ripple.of(cells(**KANE_LEVINSON))])
     trend = [values - np.polyval(np.polyfit(times, values, 3), times) for values in (spin, steady_spin)]
     assert np.std(trend[1]) < 0.05 * np.std(trend[0])
 
@@ -206,7 +209,7 @@ def fastest(model: Model, body: dict[str, np.ndarray], rows: list[int], draw: Ca
 def test_the_slip_decays_no_faster_than_the_bound(surface: Surface) -> None:
     bowl = {"a": 0.005, "b": 0.222} if surface is PARABOLOID else {}
     body = cells(**(KANE_LEVINSON | bowl | FRICTION), n0=4.0, x0=0.0, y0=0.0)
-    model = find("slip+viscous+paraboloid" if surface is PARABOLOID else "slip+viscous")
+    model = any_body("slip+viscous+paraboloid" if surface is PARABOLOID else "slip+viscous")
     grip, random = strongest_grip(body, surface)[0], np.random.default_rng(3)
 
     def draw() -> np.ndarray:
@@ -219,7 +222,7 @@ def test_the_spin_decays_no_faster_than_the_bound() -> None:
     """About zero spin, where spinning friction is steepest."""
     spinning = {"mu_spinning": 0.2, "radius_spinning": 0.003, "speed_spinning": 0.01}
     body = cells(**KANE_LEVINSON, **spinning, n0=3.0, x0=0.0, y0=0.0)
-    model, random = find("noslip+solid+spinning"), np.random.default_rng(7)
+    model, random = any_body("noslip+solid+spinning"), np.random.default_rng(7)
 
     def draw() -> np.ndarray:
         u, w = random.normal(size=2) * 0.1, random.normal(size=2) * 3
@@ -236,7 +239,7 @@ def test_a_small_rattle_knows_only_the_curvatures() -> None:
     for name in ("slip+viscous+sigma", "noslip+solid+sigma"):
         theirs = []
         for each, body in ((name, curved), (f"{name}+paraboloid", bowl)):
-            model, columns = find(each), cells(**body, mu=30.0, sigma=1e-4)
+            model, columns = any_body(each), cells(**body, mu=30.0, sigma=1e-4)
             near = {"n0": np.full(2, 1.0), "x0": np.full(2, 1e-7), "y0": np.full(2, -1e-7)}
             theirs.append(
                 [
@@ -276,7 +279,7 @@ def test_a_faint_rattle_slips_slowly() -> None:
 
 
 def test_a_body_that_cannot_spin_upright_has_no_critical_spins() -> None:
-    for model in (find("slip+viscous"), find("noslip+solid+sigma")):
+    for model in (any_body("slip+viscous"), any_body("noslip+solid+sigma")):
         straight, skew = (
             stability.stable_ranges(model, cells(**body, mu=20, sigma=1e-4)) for body in (KANE_LEVINSON, SKEW)
         )
@@ -296,6 +299,12 @@ def test_every_law_is_viscous_to_the_linear_theory() -> None:
         found = linear.jacobian(model, model.constants.of(cells(**KANE_LEVINSON, **FRICTION)), spin)
         alike = linear.jacobian(viscous, viscous.constants.of(cells(**KANE_LEVINSON, mu=mu)), spin)
         np.testing.assert_allclose(found, alike, rtol=1e-12, atol=1e-9)
+
+
+def test_no_variant_takes_a_body_that_it_does_not_describe() -> None:
+    for name, constant in (("slip+viscous+gravity", "offset"), ("slip+viscous+offset", "g")):
+        with pytest.raises(ValueError, match=f"^{constant}: no such body is in this scene"):
+            find(name).constants.of(cells(**KANE_LEVINSON, mu=1.0))
 
 
 def test_unknown_variants() -> None:

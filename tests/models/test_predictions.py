@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from support import columns
 
 from sweep.models import MODELS
+from sweep.models.general.rigid_body import slower_period
 from sweep.models.ladder import analytic, slip
 from sweep.models.theory import linear
 from sweep.models.theory.coefficients import coefficients
-from sweep.models.theory.rocking import slower_period
 
 SLIP = MODELS["slip"]
 
@@ -67,13 +67,13 @@ def test_frequencies() -> None:
     # Rocking without slip and spin: inertia J about the contact, height r = c + uᵀ(A - c²)u / 2c.
     # The paper neglects c² beside A («(1 - s) y ~ y» under Eq. ng); the full model does not.
     body = columns(mu=1e9)
-    A11, A12, A22, _ = (float(v[0]) for v in slip.Constants.of(body)[:4])
+    A11, A12, A22, _ = (float(v[0]) for v in slip.MODEL.constants.of(body)[:4])
     A, J = np.array([[A11, A12], [A12, A22]]), np.diag([(100 + 6) / 5, (9 + 6) / 5])
     k = coefficients(body)
     paper = np.sort(np.sqrt(np.linalg.eigvals(np.linalg.inv(J) @ A)))
     np.testing.assert_allclose(np.sort([k.nu1[0], k.nu2[0]]), paper, rtol=1e-12)
     exact = np.sort(np.sqrt(np.linalg.eigvals(np.linalg.inv(J) @ (A - np.eye(2)))))
-    values = np.linalg.eigvals(linear.jacobian(SLIP, slip.Constants.of(body), np.zeros(1)))[0]
+    values = np.linalg.eigvals(linear.jacobian(SLIP, slip.MODEL.constants.of(body), np.zeros(1)))[0]
     np.testing.assert_allclose(np.sort(values.imag[values.imag > 0.1]), exact, rtol=1e-6)
 
 

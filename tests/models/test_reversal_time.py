@@ -24,8 +24,8 @@ def bodies() -> dict[str, tuple[str, dict[str, np.ndarray]]]:
     offset = wide_bodies(20)
     return {
         "paper": ("noslip", columns(b=[2.0, 3.0, 5.0, 8.5], delta=[0.03, -0.1, 0.3, 0.2])),
-        "wide": ("noslip+solid", offset | {"offset": 0.4 * offset["c"]}),
-        "real": ("noslip+solid", cells(**KANE_LEVINSON)),
+        "wide": ("noslip+solid+offset", offset | {"offset": 0.4 * offset["c"]}),
+        "real": ("noslip+solid+offset+gravity", cells(**KANE_LEVINSON)),
     }
 
 
@@ -43,7 +43,7 @@ def test_the_modes_grow_as_the_eigenvalues_say(name: str) -> None:
 
 def test_the_energies_of_the_modes_make_up_that_of_the_rattle() -> None:
     body = cells(**KANE_LEVINSON, **{name: 1e-4 * value for name, value in ANGLES.items()})
-    model = find("noslip+solid")
+    model = find("noslip+solid+offset+gravity")
     _, rattle, _ = model.energy(model.start(body), model.constants.of(body))
     assert sum(energies(body))[0] == pytest.approx(rattle[0], rel=1e-4)
 
@@ -51,10 +51,11 @@ def test_the_energies_of_the_modes_make_up_that_of_the_rattle() -> None:
 def test_a_mode_by_itself_keeps_the_other_at_rest() -> None:
     """The modes are eigenvectors of the Jacobian at rest, found without the formulas."""
     body = cells(**KANE_LEVINSON)
-    model = find("noslip+solid")
+    model = find("noslip+solid+offset+gravity")
     rates, modes = np.linalg.eig(linear.jacobian(model, model.constants.of(body), np.zeros(1))[0])
     for mode, place in zip(np.argsort(rates.imag)[-2:], (0, 1), strict=True):
-        u1, u2, w1, w2 = 1e-6 * (modes[:, mode] / modes[:, mode][0]).real
+        own = 1e-6 * (modes[:, mode] / modes[:, mode][0]).real
+        (u1, u2), (w1, w2) = (rigid_body.turned(*own[i : i + 2], -rigid_body.axes(body)[0]) for i in (0, 2))
         found = energies(body | cells(roll=-u2, pitch=u1, omega1=w1, omega2=w2, omega3=0.0))
         assert found[1 - place][0] < 1e-9 * found[place][0]
 

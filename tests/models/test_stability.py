@@ -91,14 +91,14 @@ def test_the_spin_that_stays_is_where_an_adaptive_integrator_ends(mu: float, n0:
     """Also with little friction, where the slip modes are no faster than the rocking."""
     values = {"a": 3.0, "b": 2.0, "c": 1.0, "delta": 0.2, "mu": mu, "n0": n0, "x0": 0.003, "y0": y0}
     body = {name: np.array([value]) for name, value in values.items()}
-    constants = slip.Constants.of(body)
+    constants = slip.MODEL.constants.of(body)
     end = motion(body, [0, 300], rtol=1e-12, atol=1e-16)[:7, -1]
-    changed = slip.rhs(tuple(end), take(constants, 0))[1][0] - n0
-    found = linear.resting_spin(slip.MODEL, constants, stack(slip.start(body))) - n0
+    changed = slip.MODEL.rhs(tuple(end), take(constants, 0))[1][0] - n0
+    found = linear.resting_spin(slip.MODEL, constants, stack(slip.MODEL.start(body))) - n0
     assert found == pytest.approx([changed], rel=1e-4)
 
 
 def test_no_spin_stays_where_the_rattle_grows() -> None:
     body = columns(n0=0.05)
-    states = stack(slip.start(body))
-    assert np.isnan(linear.resting_spin(slip.MODEL, slip.Constants.of(body), states)).all()
+    states = stack(slip.MODEL.start(body))
+    assert np.isnan(linear.resting_spin(slip.MODEL, slip.MODEL.constants.of(body), states)).all()

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from support import columns
 
-from sweep.models.stiff.slip import STIFF_MODEL
+from sweep.models.ladder import slip
+from sweep.models.stiff.slip import form_of
+
+STIFF_MODEL = form_of(slip.MODEL).model
 
 
 def test_no_function_takes_the_states_of_another_model() -> None:

@@ -172,7 +172,7 @@ def test_a_start_by_angles_has_no_spin_to_search(write: Write) -> None:
 
 
 def test_vectors_of_a_trajectory_are_along_the_same_axes_with_any_equations() -> None:
-    """Those of the paper's model are along the axes of inertia; the general equations know those of the surface."""
+    """Along the axes of inertia of a body that is given by `delta`, with whatever terms its equations have."""
     body, scene = {"a": 10, "b": 3, "delta": 0.3}, {"start": {"n0": 0.2, "x0": 0.3, "y0": -0.1}}
     papers, general = (
         sweep.trajectory(scene | {"body": body | more, "friction": {"mu": 3}}, t_end=20, every=0.5)

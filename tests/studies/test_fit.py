@@ -48,7 +48,7 @@ def seen() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     times = np.arange(0, 150, 0.5)
     body = columns(**TRUTH)
     *states, _ = adaptive.motion(body, times, rtol=1e-10, atol=1e-13)
-    spin = slip.rhs(tuple(states), take(slip.Constants.of(body), 0))[1][0]
+    spin = slip.MODEL.rhs(tuple(states), take(slip.MODEL.constants.of(body), 0))[1][0]
     return times, noisy(spin), noisy(heading(body, "viscous", np.array(states)[:, 0], times), 0.02)
 
 

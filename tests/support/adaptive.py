@@ -13,8 +13,8 @@ from sweep.models.model import stack, take
 
 def motion(body: dict[str, np.ndarray], times: Any, *, rtol: float, atol: float) -> np.ndarray:
     """The seven states and the integral of the spin of one cell from t = 0, shape (8, times)."""
-    constants = take(slip.Constants.of(body), 0)
-    start = np.array([*stack(slip.start(body))[:, 0], 0.0])
+    constants = take(slip.MODEL.constants.of(body), 0)
+    start = np.array([*stack(slip.MODEL.start(body))[:, 0], 0.0])
     solution = solve_ivp(
         _extended(), (0, times[-1]), start, "DOP853", times, args=(constants,), rtol=rtol, atol=atol
     )  # fmt: skip
@@ -24,19 +24,19 @@ def motion(body: dict[str, np.ndarray], times: Any, *, rtol: float, atol: float)
 
 def spin(body: dict[str, np.ndarray], time: float, method: str = "DOP853") -> float:
     """The spin of one cell, by one of SciPy's methods."""
-    constants, extended = take(slip.Constants.of(body), 0), _extended()
+    constants, extended = take(slip.MODEL.constants.of(body), 0), _extended()
 
     def slopes(t: float, y: np.ndarray) -> np.ndarray:
         return np.asarray(extended(t, y, constants)[:7])
 
-    solution = solve_ivp(slopes, (0, time), stack(slip.start(body))[:, 0], method, rtol=1e-11, atol=1e-15)
+    solution = solve_ivp(slopes, (0, time), stack(slip.MODEL.start(body))[:, 0], method, rtol=1e-11, atol=1e-15)
     assert solution.success
-    return float(slip.rhs(tuple(solution.y[:, -1]), constants)[1][0])
+    return float(slip.MODEL.rhs(tuple(solution.y[:, -1]), constants)[1][0])
 
 
 @cache
 def _extended() -> Any:
-    rhs = slip.rhs
+    rhs = slip.MODEL.rhs
 
     @exactly_compiled
     def extended(_: float, y: np.ndarray, p: Any) -> np.ndarray:

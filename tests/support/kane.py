@@ -25,7 +25,7 @@ from sweep.models import find
 from sweep.models.model import take
 from sweep.parameters import PARAMETERS
 
-from .newton import LAWS
+from .newton import LAWS, axes, turned
 
 Array = np.ndarray
 
@@ -130,12 +130,13 @@ def random_case(random: np.random.Generator) -> tuple[dict[str, float], Array]:
 
 def difference(law: str | None, couples: tuple[str, ...], trials: int) -> float:
     """Find the largest relative difference of y', and of N, at random states of random bodies."""
-    model = find("+".join(["slip", law, *couples] if law else ["noslip", "solid", *couples]))
+    model = find("+".join([*(["slip", law] if law else ["noslip", "solid"]), *couples, "offset", "skew", "gravity"]))
     random, worst = np.random.default_rng(1), 0.0
     for _ in range(trials):
         p, y = random_case(random)
         y = y[: len(model.states)]
-        expected, N = slopes(y, p, law, "rolling" in couples, "sigma" in couples)
+        expected, N = slopes(turned(y, axes(p)), p, law, "rolling" in couples, "sigma" in couples)
+        expected = turned(expected, -axes(p))
         columns = {name: np.array([value]) for name, value in p.items() if name in PARAMETERS}
         found, (_, _, force, _) = model.rhs(tuple(y), take(model.constants.of(columns), 0))
         worst = max(worst, np.abs(np.array(found) - expected).max() / np.abs(expected).max())

@@ -91,7 +91,7 @@ SHARED = [
     ("dopri5", "effective", default_measures("effective")),
     ("dopri5", "averaged", default_measures("averaged")),
     ("dopri5", "slip+coulomb-sqrt+sigma", default_measures("slip+coulomb-sqrt+sigma")),
-    ("dopri5", "slip+viscous", default_measures("slip+viscous")),
+    ("dopri5", "slip+viscous+offset", default_measures("slip+viscous+offset")),
     ("dopri5", "slip", ()),
     ("dopri5", "slip", ("reversals",)),
     ("dopri5", "slip", ("reversals", "first_reversal")),

@@ -49,8 +49,8 @@ def derivative(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vect
 
     Parameters
     ----------
-    y : u1, u2, ω1, ω2, ω3 and, with a law, v1 and v2, in the body's axes
-    p : parameters by name; without `Ixx` of the paper's body, in its axes of inertia, at `delta` from its own
+    y : u1, u2, ω1, ω2, ω3 and, with a law, v1 and v2, in the axes of inertia about z (`axes`)
+    p : parameters by name; without `Ixx` of the paper's body, whose axes of inertia are at `delta` from its own
     """
     slopes, N, power, _ = _solution(y, p, law)
     return slopes, N, power
@@ -140,6 +140,8 @@ def spin(y: Vector) -> Vector:
 def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector, rtol: float = 1e-12) -> Vector:
     """Heading, roll and pitch, and the contact point on the table, shape (5, times).
 
+    The angles are of the axes of the surface, or of those of inertia of the paper's body.
+
     By the matrix that turns the body and by its centre of mass: no angle is integrated, and no contact point.
     """
     n, (u, _) = len(y), _attitude(y, law)
@@ -158,6 +160,7 @@ def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector, rtol
         turn = z[n:-3].reshape(3, 3)
         place = z[-3:] + turn @ contact(_attitude(z[:n], law)[0], p)
         assert abs(place[2]) < 100 * rtol
+        turn = turn @ _turn(axes(p) if "Ixx" in p else 0.0).T
         y_axis = turn[:, 1]
         found.append(
             [np.arctan2(y_axis[0], -y_axis[1]), -np.arcsin(y_axis[2]), np.arctan2(turn[2, 0], -turn[2, 2]), *place[:2]]
@@ -168,16 +171,42 @@ def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector, rtol
 def inertia(p: Mapping[str, float]) -> Vector:
     if "Ixx" not in p:
         return np.diag([p["b"] ** 2 + p["c"] ** 2, p["a"] ** 2 + p["c"] ** 2, p["a"] ** 2 + p["b"] ** 2]) / 5
+    turn = _turn(axes(p))
+    return np.asarray(turn.T @ _given(p) @ turn)
+
+
+def _given(p: Mapping[str, float]) -> Vector:
+    """The matrix of inertia in the axes of the surface."""
     xy, xz, yz = (p.get(name, 0.0) for name in ("Ixy", "Ixz", "Iyz"))
     return np.array([[p["Ixx"], xy, xz], [xy, p["Iyy"], yz], [xz, yz, p["Izz"]]])
 
 
+def axes(p: Mapping[str, float]) -> float:
+    """The angle from the axes of the surface to the principal axes of inertia about z, the one nearest to them."""
+    if "Ixx" not in p:
+        return p["delta"]
+    _, vectors = np.linalg.eigh(_given(p)[:2, :2])
+    nearest = vectors[:, np.argmax(np.abs(vectors[0]))]
+    return float(np.arctan2(nearest[1], nearest[0]) if nearest[0] > 0 else np.arctan2(-nearest[1], -nearest[0]))
+
+
+def turned(y: Vector, angle: float) -> Vector:
+    """States, or their rates, along axes from which those that they are given along are turned by `angle`."""
+    turn, y = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]), y.copy()
+    for first in (0, 2, 5)[: 3 if len(y) > 5 else 2]:
+        y[first : first + 2] = turn @ y[first : first + 2]
+    return y
+
+
 def contact(u: Vector, p: Mapping[str, float]) -> Vector:
     """The lowest point of the surface, from the centre of mass."""
+    turn = _turn(axes(p))
     if p.get("surface") == "paraboloid":  # where the gradient of z + (a x² + b y²)/c is along -u
+        u = turn @ u
         x, y = p["c"] / 2 / p["a"] * u[0] / u[2], p["c"] / 2 / p["b"] * u[1] / u[2]
-        return np.array([x, y, p["c"] * (1 - p["a"] * (x / p["c"]) ** 2 - p["b"] * (y / p["c"]) ** 2) - p["offset"]])
-    semi, turn = np.array([p["a"], p["b"], p["c"]]), _turn(0.0 if "Ixx" in p else p["delta"])
+        z = p["c"] * (1 - p["a"] * (x / p["c"]) ** 2 - p["b"] * (y / p["c"]) ** 2) - p["offset"]
+        return np.asarray(turn.T @ np.array([x, y, z]))
+    semi = np.array([p["a"], p["b"], p["c"]])
     return turn.T @ (-semi * _unit(semi * (turn @ u))) - np.array([0, 0, p.get("offset", 0.0)])
 
 

@@ -15,13 +15,13 @@ def rolling(states: np.ndarray, body: dict[str, np.ndarray]) -> np.ndarray:
 
 def form(body: dict[str, np.ndarray]) -> np.ndarray:
     """K, shape (2, 2): twice the u-M block of Q, Q_ij = G_ij / (λ_i + λ_j), from n' = zᵀ G z and z' = L z."""
-    constants, size = take(noslip.Constants.of(body), 0), 1e-3 * float((body["c"] / body["a"])[0]) ** 2
+    constants, size = take(noslip.MODEL.constants.of(body), 0), 1e-3 * float((body["c"] / body["a"])[0]) ** 2
     moments = np.array([1.0, 1.0, *(1 / (rolling(np.array([0, 0, 1.0, 0]), body)[2:3])),
                         *(1 / (rolling(np.array([0, 0, 0, 1.0]), body)[3:4]))])  # fmt: skip
 
     def slopes(z: np.ndarray) -> tuple[np.ndarray, float]:
         y = rolling(z, body)
-        dy = np.array(noslip.rhs(tuple(y), constants)[0])
+        dy = np.array(noslip.MODEL.rhs(tuple(y), constants)[0])
         u = np.array([*y[:2], -np.sqrt(1 - y[:2] @ y[:2])])
         return dy[:4] * moments, float(u @ dy[2:])
 

@@ -37,16 +37,16 @@ from sweep.kernels.adams.step import (
     names,
     places,
 )
-from sweep.kernels.codegen import compile_inline
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES, PACK, Table
 from sweep.kernels.measures.measurement import WORK, Stretch
 from sweep.kernels.method import Method
 from sweep.kernels.status import DIVERGED, RUNNING
+from sweep.models.generated import compile_inline
 from sweep.models.model import MODES, Array, Columns, Model, stack
 from sweep.models.stiff.form import StiffForm, velocities
-from sweep.models.stiff.general import form_of
 from sweep.models.stiff.modes import bending
+from sweep.models.stiff.slip import form_of, has_form
 from sweep.models.theory import linear
 from sweep.models.theory.rocking import frequencies, implicit
 
@@ -138,14 +138,15 @@ class Adams(Stepper):
     def _set_looks(self, table: Table, columns: Columns) -> None:
         """Set below which energy, and after which step, looks search for a stretch of small rattle."""
         reach, goal = linear.fastest_spin(self.model, columns), table["goal"]
+        tolerance = self.tolerance / self.form.time_unit(columns)
         table["quiet_energy"] = stretches.quiet_energy(reach)
         time = goal * table["step"]
-        table["quiet_after"] = stretches.first_look(columns, reach, time, goal, self.tolerance)
-        table["bending"] = bending(columns)
+        table["quiet_after"] = stretches.first_look(self.model, columns, reach, time, goal, tolerance)
+        table["bending"] = bending(self.model, columns)
 
     def carry(self, kernel: Kernel, images: Array) -> None:
         """As `Kernel.carry`."""
-        stretches.carry(kernel, images, self.tolerance)
+        stretches.carry(self.form, kernel, images, self.tolerance)
 
     def make_run_block(self, kernel: Kernel):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes.
@@ -207,24 +208,22 @@ _POWER = 6
 _LONGEST_PHASE = 0.4
 
 
-def accurate_step(model: Model, columns: Columns, motion: Array, tolerance: float) -> Array:
+def accurate_step(model: Model, columns: Columns, motion: Array, decay: Array, tolerance: float) -> Array:
     """Step at which the error in spin at t = 400 sqrt(c/g) is about `tolerance`, in the model's units, shape (cells,).
 
     Parameters
     ----------
-    motion : the `fastest_motion`, shape (cells,)
+    motion, decay : the `fastest_motion` and the `fastest_decay`, shape (cells,)
     """
     form = form_of(model)
-    assert form is not None
-    rise, reach = form.rise(columns), linear.fastest_spin(form.full, columns) * form.time_unit(columns)
+    reach, at_rest = linear.fastest_spin(form.full, columns) * form.time_unit(columns), form.rest_decay(columns)
+    rise = np.divide(decay, at_rest, out=np.ones_like(decay), where=at_rest > 0) - 1
     phase = (tolerance / np.maximum(rise * reach, tolerance)) ** (1 / _POWER)
     return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, form.damping(columns)))
 
 
 def _stepper(model: Model, tolerance: float) -> Adams:
-    form = form_of(model)
-    assert form is not None
-    return Adams(form, tolerance)
+    return Adams(form_of(model), tolerance)
 
 
 METHOD = Method(
@@ -234,7 +233,7 @@ METHOD = Method(
     "friction does not limit its step",
     stepper=_stepper,
     accurate_step=accurate_step,
-    runs=lambda model: form_of(model) is not None,
+    runs=has_form,
     # On one thread start-up takes 8 to 11 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
     start_up_cost=650.0,

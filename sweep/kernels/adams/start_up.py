@@ -185,7 +185,7 @@ def _record(form: StiffForm, at: At) -> list[str]:
         *load_lines(form, at),
         "s = momentum(y, p)",
         "f, geometry = slow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)",
-        "_, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, p, 0.0, 0.0, 0.0)",
+        "_, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, 0.0, 0.0, 0.0, p)",
         *(f"{at(name.format(0))} = f[{i}]" for i, name in enumerate(SLOPES)),
         *(f"{at(name.format(0))} = s[{5 + i}]" for i, name in enumerate(SLIPS)),
         f"{at('power0')} = power(num / den, s[5], s[6], geometry, p)",

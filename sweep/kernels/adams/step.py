@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from sweep.jit import inline
-from sweep.kernels.codegen import tuple_of
 from sweep.kernels.layout import LANES, constants_of
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
+from sweep.models.generated import tuple_of
 from sweep.models.stiff.form import StiffForm
 
 HISTORY = 8
@@ -86,7 +86,7 @@ def make_solve(form: StiffForm):
     @inline
     def solve(q, g, e, b, p, weight, per_weight, gamma, P):
         f, geometry = slow(q[0], q[1], q[2], q[3], q[4], e[0], e[1], p)
-        v0, v1, num, den = newton(q[0], q[1], e[0], e[1], geometry, p, gamma, b[0], b[1])
+        v0, v1, num, den = newton(q[0], q[1], e[0], e[1], geometry, gamma, b[0], b[1], p)
         _, d = correct(q, g, f, weight, P)
         q = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4])
         f, geometry = slow(q[0], q[1], q[2], q[3], q[4], v0, v1, p)

@@ -20,7 +20,7 @@ Figures, and what else was tried: scripts/LOG.md.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,10 +29,9 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, Table
 from sweep.kernels.measures.measurement import WORK, Stretch
 from sweep.kernels.status import QUIET, RUNNING
-from sweep.models.ladder import slip
-from sweep.models.model import Array, Columns
+from sweep.models.model import Array, Columns, Model
+from sweep.models.stiff.form import STATES, StiffForm
 from sweep.models.stiff.modes import RATTLE, Rattle, fastest_growth
-from sweep.models.stiff.slip import STIFF_MODEL, Constants
 
 # Largest size of the modes of a rattle that leaps, which is where a leap ends, and of a lifted mode.  The second value
 # of each pair is for rattles whose fast mode decays far more quickly than the slow one grows: the ratio of their
@@ -70,7 +69,7 @@ POWERS = ("power0", "power1", "power2")
 """Quantities of an image that hold the power of friction at the last three points, newest first; they exist only if a
 measurement needs the work of friction."""
 
-_RATTLE = tuple(STIFF_MODEL.states[i] for i in RATTLE)
+_RATTLE = tuple(STATES[i] for i in RATTLE)
 
 
 @dataclass(frozen=True)
@@ -96,14 +95,14 @@ def quiet_energy(reach: Array) -> Array:
     return np.asarray((2 * _LATE * _LARGEST[1] * reach) ** 2)
 
 
-def first_look(columns: Columns, reach: Array, time: Array, steps: Array, tolerance: float) -> Array:
+def first_look(model: Model, columns: Columns, reach: Array, time: Array, steps: Array, tolerance: Array) -> Array:
     """Step from which on looks are of use in a run of length `time` and `steps` steps: 0 or infinity, shape (cells,).
 
     Assumes that at the start neither mode is tiny compared with the other.
     """
     with np.errstate(divide="ignore", over="ignore"):
         share = np.log(tolerance / reach)
-        return np.where(_brief(fastest_growth(columns, reach), share, 0.0, time, steps), np.inf, 0.0)
+        return np.where(_brief(fastest_growth(model, columns, reach), share, 0.0, time, steps), np.inf, 0.0)
 
 
 def _brief(rate: Array, share: Array, lowest: Array | float, time: Array, steps: Array) -> Array:
@@ -116,17 +115,18 @@ def _brief(rate: Array, share: Array, lowest: Array | float, time: Array, steps:
     return np.asarray((steps < WORTHWHILE) & (rate * time < -2 * below + np.minimum(lowest, 0)))
 
 
-def carry(kernel: Kernel, images: Array, tolerance: float) -> None:
+def carry(form: StiffForm, kernel: Kernel, images: Array, tolerance: float) -> None:
     """Carry the images that are `QUIET` on by the modes of their rattle, where that is of use, and set them running."""
     quiet = np.flatnonzero(kernel.table(images)["status"] == QUIET)
     if not len(quiet):
         return
     table = kernel.table(images[quiet])
-    rattle = Rattle.of(*kernel.unpack(table.images))
+    states, constants = kernel.unpack(table.images)
+    rattle = Rattle.of(form, states, constants)
     sizes = rattle.sizes(table["bending"])
     lifts = _given_up(kernel, table, sizes)
     step, done, goal = table["step"], table["done"], table["goal"]
-    leap = plan(rattle, sizes, lifts, table["spin"], step, goal - done, tolerance)
+    leap = plan(rattle, sizes, lifts, table["spin"], step, goal - done, tolerance * form.unit(constants))
     wait = np.ceil(np.minimum(leap.wait / step, goal))
     table["quiet_after"] = done + np.where(leap.now, leap.steps, 0) + wait
     table["status"] = RUNNING
@@ -150,14 +150,14 @@ def _given_up(kernel: Kernel, table: Table, sizes: Array) -> Array:
     return lifts
 
 
-def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, left: Array, tolerance: float) -> Leap:
+def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, left: Array, tolerance: Array) -> Leap:
     """Decide which rattles leap, how far, and which modes are lifted.
 
     Parameters
     ----------
     sizes : sizes α of the modes as the state holds them, shape (cells, 2)
     lifts : present s of the modes, whose true sizes are α e^-s, shape (cells, 2)
-    spin, step : in sqrt(g/c) and sqrt(c/g), shape (cells,)
+    spin, step, tolerance : of shape (cells,), the tolerance being that of a spin
     left : number of steps to the time limit, shape (cells,)
     """
     with np.errstate(all="ignore"):
@@ -165,7 +165,7 @@ def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, l
         growing = np.argmax(rates, axis=1)
         seen, true = _Modes.of(logs, rates, growing), _Modes.of(logs - lifts, rates, growing)
         hard = np.divide(*(np.abs(rattle.slopes[:, k]) for k in (1, 0))) >= _RATIO
-        smaller = min(1.0, (tolerance / _LOOSE) ** 0.25)
+        smaller = np.minimum(1.0, (tolerance / rattle.form.unit(rattle.constants) / _LOOSE) ** 0.25)
         largest = np.log(smaller * np.where(hard, _LARGEST[1], _LARGEST[0]))
         # The time at which the first mode leaves the linear range, by the true sizes.
         ends = np.where(rates > 0, (largest[:, None] - (logs - lifts)) / rates, np.inf).min(axis=1)
@@ -287,8 +287,8 @@ def move(kernel: Kernel, images: Array, rattle: Rattle, steps: Array, lifts: Arr
     table["M3"] += rattle.turned(after) - rattle.turned(rattle.amplitudes)
     _move_history(table, rattle, factors)
     if WORK in kernel.follows:
-        _move_powers(table, kernel.unpack(images)[1])
-    spin, energy, inertia = STIFF_MODEL.energy(*kernel.unpack(images))
+        _move_powers(rattle.form, table, kernel.unpack(images)[1])
+    spin, energy, inertia = kernel.model.energy(*kernel.unpack(images))
     table["spin"] = spin
     before = table["energy"].copy()
     table["energy"] = energy + 0.5 * inertia * spin**2
@@ -311,8 +311,9 @@ def _move_history(table: Table, rattle: Rattle, factors: Array) -> None:
         table[turn] = rattle.turn(factors * slopes / rattle.rates)
 
 
-def _move_powers(table: Table, constants: Constants) -> None:
-    """Set the power of friction at the last points, for a normal force of one."""
+def _move_powers(form: StiffForm, table: Table, constants: Any) -> None:
+    """Set the power of friction and couples at the last points, for upright spin and a normal force as at rest."""
+    geometry = form.slow(*table.columns(STATES).T, constants)[1]
     for j, name in enumerate(POWERS):
         v1, v2 = (table[slip.format((-1 - j) % HISTORY)] for slip in SLIPS)
-        table[name] = slip.dissipation(1.0, v1, v2, 0.0, constants)
+        table[name] = form.power(form.unit(constants) ** 2, v1, v2, geometry, constants)

@@ -4,7 +4,7 @@ Nobody asks for it: every kernel that counts the reversals of a model with two r
 slow equations foresee of a state (`resting_spin.endings`), so that they are solved once, and it watches rattles that
 roll round and round, as those of nearly round bodies do: no equations for these are at hand.
 
-At regular looks it takes M·u/I3, where the spin goes while the rattle decays (`sweep.models.stiff.precession`), and
+At regular looks it takes M·u/J33, where the spin goes while the rattle decays (`sweep.models.stiff.precession`), and
 finds the slope with which that changes with the energy, by least squares over all looks of a window (Welford 1962,
 Technometrics 4, 419).  If `STEEPER` times this slope and all the energy left carry the spin neither through zero nor to
 where a rattle grows, no reversal will come.  Of 423 cells of `configs/mu_b.yaml` that nothing else settles by
@@ -16,13 +16,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from sweep.jit import inline
-from sweep.kernels.codegen import make_gather, make_load
+from sweep.kernels.codegen import make_load
 from sweep.kernels.layout import BEYOND, STABLE, Layout, constants_of
 from sweep.kernels.measures.measurement import Measurement
-from sweep.models.ladder import slip
 from sweep.models.model import MODES, Array, Columns, Model
+from sweep.models.stiff.form import STATES
 from sweep.models.stiff.precession import vertical_spin
-from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum
+from sweep.models.stiff.slip import form_of
 
 NEXT, EVERY = "watch_next", "watch_every"
 """The step of the next look, infinite if there is none, and the steps between two."""
@@ -33,17 +33,17 @@ how many windows more it takes to wind down at this rate, 0 if its energy has no
 
 LOOKS = 256
 """Looks in a window, less one.  Of the roundest bodies of `mu_b` a rattle loses 0.03 % of its energy in a tenth of the
-patience, so that few looks would not tell this from the ripple of M·u/I3, which is 3e-6."""
+patience, so that few looks would not tell this from the ripple of M·u/J33, which is 3e-6."""
 
 STEEPER = 8.0
-"""The slope of M·u/I3 over the energy grows as the rattle decays, in nearly round bodies about as the sixth power of
+"""The slope of M·u/J33 over the energy grows as the rattle decays, in nearly round bodies about as the sixth power of
 1/spin.  Then the spin stays away from zero if it would with seven times the slope."""
 
 # A rattle that loses a larger share of its energy in a window is soon small enough for others.
 _SLOW = 0.5
 
 _WINDOW = ("looks", "first_spin", "first_total", "mean_spin", "mean_total", "sum_squares", "sum_products")
-"""Of the present window: the number of looks; M·u/I3 and the spin squared that would have all the energy, at the first
+"""Of the present window: the number of looks; M·u/J33 and the spin squared that would have all the energy, at the first
 look and on average; the sum of the squares of the latter's deviations from its average, and that of the products."""
 
 FORESEEN = ("foreseen_at", "foreseen_spin", "foreseen_reversals", "foreseen_overshoot", "foreseen_nearest")
@@ -104,18 +104,16 @@ class Decay(Measurement):
 
 
 def _make_states(layout: Layout):
-    """Inline (group, lane) -> the states of `stiff.slip`, of a lane that has either set of variables."""
-    stiff = STIFF_MODEL.states[2] in layout
-    model = STIFF_MODEL if stiff else slip.MODEL
+    """Inline (group, lane) -> the states of the stiff form, of a lane that has either set of variables."""
+    model = layout.model
     load, constants = make_load(model.states, layout), make_load(constants_of(model), layout, model.constants)
-    if stiff:
+    if model.states == STATES:
         return load
-    inertia = (f"1.0 / p.inv_{name}" for name in ("I1", "I2", "I3"))
-    both = make_gather("p", (*inertia, *(f"p.{name}" for name in slip.Constants._fields)), Constants)
+    momentum = form_of(model).momentum
 
     @inline
     def states(group, lane):
-        return momentum(load(group, lane), both(constants(group, lane)))
+        return momentum(load(group, lane), constants(group, lane))
 
     return states
 

@@ -19,10 +19,11 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch, measured
-from sweep.models.ladder import slip
+from sweep.models.general import starts
+from sweep.models.general.reversal_time import energies
 from sweep.models.model import MODES, Array, Columns, Model, stack
+from sweep.models.stiff.slip import form_of
 from sweep.models.theory import linear
-from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.units import NUMBER
 
 # Ratio of amplitudes below which a mode counts as round-off of the other.
@@ -35,8 +36,9 @@ SEEN = 1e-4
 _LOGS, _DEPTHS = ("log_amplitude0", "log_amplitude1"), ("depth0", "depth1")
 _RATES = tuple(f"rate{k}_{i}" for k in (0, 1) for i in range(len(linear.NODES)))
 
-_BODY = ("a", "b", "c", "delta", "mu")
 _ZERO = 1e-300
+
+_STARTS = (*starts.POINT, *starts.ANGLES, *starts.SLIP)
 
 
 class NoiseLimited(Measurement):
@@ -58,10 +60,12 @@ class NoiseLimited(Measurement):
     }  # fmt: skip
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
-        shares = _shares(columns)
+        shares = _shares(model, columns)
         logs = [0.5 * np.log(np.maximum(share * rattle, _ZERO)) for share in shares]
-        rates = growth_coefficients(columns).reshape(len(_RATES), -1)
-        return dict(zip((*_LOGS, *_RATES), (*logs, *rates), strict=True)) | {"tracked_spin": columns["n0"]}
+        rates = growth_coefficients(model, columns).reshape(len(_RATES), -1)
+        return dict(zip((*_LOGS, *_RATES), (*logs, *rates), strict=True)) | {
+            "tracked_spin": starts.spin(columns, model.variant.surface)
+        }
 
     def make_look(self, layout: Layout):
         """Follows the modes from one look to the next, as `Measurement.make_look`."""
@@ -118,26 +122,25 @@ class NoiseLimited(Measurement):
         table["noise_limited"] = np.where(images, 1.0, table["noise_limited"])
 
 
-def growth_coefficients(columns: Columns) -> Array:
+def growth_coefficients(model: Model, columns: Columns) -> Array:
     """Coefficients c_i of Re λ(n) = Σ c_i n^i for the slower and the faster mode, shape (2, nodes, cells).
 
     The polynomial is fitted at five spins, in units of the fastest spin within reach; this is rounded up, so that
     most starts of a body share a fit.  Five spins take 0.3 s for 4000 bodies.
     """
-    reach = np.exp2(np.ceil(8 * np.log2(np.maximum(linear.fastest_spin(slip.MODEL, columns), 1e-6))) / 8)
-    bodies, which = np.unique(stack((*(columns[name] for name in _BODY), reach)), axis=1, return_inverse=True)
-    constants = slip.Constants.of(dict(zip(_BODY, np.tile(bodies, len(linear.NODES)), strict=False)))
-    rates = linear.rocking_rates(slip.MODEL, constants, np.outer(linear.NODES, bodies[-1]).ravel())
+    full = form_of(model).full
+    reach = np.exp2(np.ceil(8 * np.log2(np.maximum(linear.fastest_spin(full, columns), 1e-6))) / 8)
+    names = [name for name in columns if name not in _STARTS]
+    bodies, which = np.unique(stack((*(columns[name] for name in names), reach)), axis=1, return_inverse=True)
+    constants = full.constants.of(dict(zip(names, np.tile(bodies, len(linear.NODES)), strict=False)))
+    rates = linear.rocking_rates(full, constants, np.outer(linear.NODES, bodies[-1]).ravel())
     fit = linear.through_nodes(rates.reshape(2, len(linear.NODES), -1).swapaxes(0, 1))
     powers = bodies[-1] ** np.arange(len(fit))[:, None, None]
     return np.asarray((fit / powers).swapaxes(0, 1)[:, :, which.reshape(-1)])
 
 
-def _shares(columns: Columns) -> Array:
-    """Shares of the slower and the faster mode in the energy of the rattle at t = 0 (abdef), shape (2, cells)."""
-    k = coefficients(columns)
-    X, Y = normal_coordinates(columns)
-    energies = stack((np.abs(k.nu1**2 - 1) * X**2, np.abs(k.nu2**2 - 1) * Y**2))
-    energies = np.where(k.nu1 < k.nu2, energies, energies[::-1])
-    total = energies.sum(axis=0)
-    return np.asarray(np.divide(energies, total, out=np.zeros_like(energies), where=total > 0))
+def _shares(model: Model, columns: Columns) -> Array:
+    """Shares of the slower and the faster mode in the energy of the rattle at t = 0, shape (2, cells)."""
+    found = stack(energies(columns, model.variant.surface))
+    total = found.sum(axis=0)
+    return np.asarray(np.divide(found, total, out=np.zeros_like(found), where=total > 0))

@@ -10,6 +10,7 @@ still hold at t = 1e5, because the rattle that will turn them back is below 1e-1
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +19,11 @@ from sweep.kernels.layout import Table, constants_of
 from sweep.kernels.measures.decay import FORESEEN
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.status import SETTLED
-from sweep.models.ladder import slip
 from sweep.models.model import MODES, Array, stack
 from sweep.models.stiff.final_spin import Ending, ending
-from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum
+from sweep.models.stiff.form import STATES
+from sweep.models.stiff.slip import form_of
 from sweep.units import SPIN
-
-_NEEDED = {*constants_of(slip.MODEL)}
 
 _AT_A_TIME = 512
 """Cells whose ends one thread finds together, at 30 kB a cell while that goes on."""
@@ -53,39 +52,33 @@ def endings(table: Table, which: Array) -> Ending:
     A table that has a place for it keeps what was foreseen of a state.
     """
     result, keeps = Ending(*np.full((4, len(table.images)), np.nan)), FORESEEN[0] in table.layout
-    if set(table.layout.names) >= _NEEDED:
-        new = which & np.isfinite(table.columns(_states(table))).all(axis=1)
-        if keeps:
-            kept = new & (table[FORESEEN[0]] == table["done"] + 1)
-            new &= ~kept
-            for whole, name in zip(result, FORESEEN[1:], strict=True):
-                whole[kept] = table[name][kept]
-        cells = np.flatnonzero(new)
+    model = table.layout.model
+    if model is None or MODES not in model.offers:
+        return result
+    new = which & np.isfinite(table.columns(model.states)).all(axis=1)
+    if keeps:
+        kept = new & (table[FORESEEN[0]] == table["done"] + 1)
+        new &= ~kept
+        for whole, name in zip(result, FORESEEN[1:], strict=True):
+            whole[kept] = table[name][kept]
+    cells = np.flatnonzero(new)
 
-        def find(first: int) -> None:
-            some = cells[first : first + _AT_A_TIME]
-            found = ending(*slow_states(Table(table.images[some], table.layout)))
-            for whole, part in zip(result, found, strict=True):
-                whole[some] = part
+    def find(first: int) -> None:
+        some = cells[first : first + _AT_A_TIME]
+        found = ending(form_of(model), *slow_states(Table(table.images[some], table.layout)))
+        for whole, part in zip(result, found, strict=True):
+            whole[some] = part
 
-        on_all_threads(find, range(0, len(cells), _AT_A_TIME))
-        if keeps:
-            for name, values in zip(FORESEEN, (table["done"] + 1, *result), strict=True):
-                table[name][cells] = values[cells]
+    on_all_threads(find, range(0, len(cells), _AT_A_TIME))
+    if keeps:
+        for name, values in zip(FORESEEN, (table["done"] + 1, *result), strict=True):
+            table[name][cells] = values[cells]
     return result
 
 
-def slow_states(table: Table) -> tuple[Array, Constants]:
-    """States and constants of `stiff.slip`, from images of a model with modes in either set of variables."""
-    kept = {name: table[f"constant.{name}"] for name in slip.Constants._fields}
-    constants = Constants(*(1 / kept[f"inv_{name}"] for name in ("I1", "I2", "I3")), **kept)
-    states = table.columns(_states(table)).T
-    return (states if _is_stiff(table) else stack(momentum(tuple(states), constants))), constants
-
-
-def _states(table: Table) -> tuple[str, ...]:
-    return STIFF_MODEL.states if _is_stiff(table) else slip.MODEL.states
-
-
-def _is_stiff(table: Table) -> bool:
-    return STIFF_MODEL.states[2] in table.layout
+def slow_states(table: Table) -> tuple[Array, Any]:
+    """States and constants of the stiff form, from images of a model with modes in either set of variables."""
+    model = table.layout.model
+    constants = model.constants(*table.columns(constants_of(model)).T)
+    states = table.columns(model.states).T
+    return (states if model.states == STATES else stack(form_of(model).momentum(tuple(states), constants))), constants

@@ -10,10 +10,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from sweep.models.general import rigid_body, starts
-from sweep.models.general.common import record
 from sweep.models.general.couples import Couple
+from sweep.models.general.rigid_body import about_centre
 from sweep.models.general.surfaces import ELLIPSOID, Surface
 from sweep.models.model import Array, Columns
+from sweep.models.vectors import Vector
 
 
 def faint_energy(speed: Array, columns: Columns, surface: Surface) -> Array:
@@ -47,17 +48,20 @@ def couples_decay(couples: Sequence[Couple], columns: Columns, surface: Surface)
 def _energy_start(columns: Columns, surface: Surface) -> Array:
     """Energy above rest at the start, per unit mass, shape (cells,)."""
     y = starts.slipping(columns, surface) if "slip1" in columns else (*starts.rolling(columns, surface), 0.0, 0.0)
-    spin, rattle, inertia = rigid_body.energy_on(surface)(y, record(surface).of(columns))
+    spin, rattle, inertia = rigid_body.energy_on(surface)(y, rigid_body.constants(columns, surface))
     return np.asarray(rattle + 0.5 * inertia * spin**2)
 
 
-_AZIMUTHS, _SHARES = 12, 9
+_AZIMUTHS, _SHARES, _ROUNDS = 4, 7, 6
+
+# Tilts that are looked at, and how far beyond the last round, which comes from below.
+_FAINT, _FARTHEST, _BEYOND, _FLAT = 1e-6, 1.5, 1.01, 1e-30
 
 
-def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Array, Array]]:
+def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Vector, Array]]:
     """Attitudes that a body may reach, for more and more tilted ones.
 
-    Yields normals u, shape (azimuths, cells, 3), with bounds on the normal force R, shape (azimuths, cells).
+    Yields normals u with bounds on the normal force R, all of shape (azimuths, cells).
 
     A body tilts at most until the height of G takes up the whole energy at the start, E0.  If it tilts towards the
     azimuth ψ at the rate φ', then R - g <= r'' φ'², where r is the height of G at the tilt φ above that at rest, and
@@ -66,35 +70,35 @@ def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Array, Arra
 
     where J_t is the least moment of inertia about the axis of tilting, with free spin.
     """
-    constants, g = record(surface).of(columns), rigid_body.gravity(columns)
-    E0, J = _energy_start(columns, surface), rigid_body.matrix(rigid_body.inertia(columns))
-    psi = np.linspace(0, np.pi, _AZIMUTHS, endpoint=False)[:, None]
+    p, E0 = rigid_body.constants(columns, surface), _energy_start(columns, surface)
+    psi = np.linspace(0, np.pi, _AZIMUTHS, endpoint=False)[:, None] - rigid_body.axes(columns)
     cos, sin = np.cos(psi), np.sin(psi)
+
+    def tilted(phi: Array) -> Vector:
+        return Vector(cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi))
 
     def height(phi: Array) -> Array:
         """The height of G above that at rest, if the body is tilted by φ."""
-        return np.asarray(surface.elevation(cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi), constants))
+        return np.asarray(surface.elevation(tilted(phi), p))
 
-    # The largest tilt that the energy allows, by bisection; heights grow with the tilt, at least at first.
-    low, high = np.zeros((_AZIMUTHS, E0.size)), np.full((_AZIMUTHS, E0.size), 1.5)
-    for _ in range(40):
-        middle = (low + high) / 2
-        within = g * height(middle) < E0
-        low, high = np.where(within, middle, low), np.where(within, high, middle)
-    axis = np.concatenate([-sin, cos, 0 * sin], axis=-1)[:, None]
+    # The largest tilt that the energy allows.  Heights grow with its square at first, and more slowly later.
+    k11, k12, k22, _ = surface.stiffness(p)
+    energy = np.maximum(E0, 0) / p.g
+    farthest = np.sqrt(2 * energy / np.maximum(k11 * cos**2 + 2 * k12 * cos * sin + k22 * sin**2, _FLAT))
+    for _ in range(_ROUNDS):
+        farthest = np.clip(farthest, _FAINT, _FARTHEST)
+        farthest = farthest * np.sqrt(energy / np.maximum(height(farthest), _FLAT))
+    farthest = np.minimum(_BEYOND * farthest, _FARTHEST)
+    axis = Vector(-sin, cos, 0.0)
     for share in np.linspace(0, 1, _SHARES):
-        phi, d = high * share, 1e-4
+        phi, d = farthest * share, 1e-4
         r, ahead, behind = height(phi), height(phi + d), height(phi - d)
         slope, bend = (ahead - behind) / (2 * d), (ahead - 2 * r + behind) / d**2
-        u = np.stack([cos * np.sin(phi), sin * np.sin(phi), -np.cos(phi)], axis=-1)
-        tt, tu, uu = (_product(p, J, q) for p, q in ((axis, axis), (axis, u), (u, u)))
-        square = 2 * np.maximum(E0 - g * r, 0) / (tt - tu**2 / uu + slope**2)
-        yield u, g + np.maximum(bend, 0) * square
-
-
-def _product(p: Array, matrix: Array, q: Array) -> Array:
-    """Pᵀ M q, of vectors of shape (..., cells, 3) and matrices of shape (cells, 3, 3)."""
-    return np.asarray(np.einsum("...i,...ij,...j->...", p, matrix, q))
+        u = tilted(phi)
+        turning, spinning = rigid_body.momentum(axis, p), rigid_body.momentum(u, p)
+        least = axis.dot(turning) - axis.dot(spinning) ** 2 / u.dot(spinning)
+        square = 2 * np.maximum(E0 - p.g * r, 0) / (least + slope**2)
+        yield u, p.g + np.maximum(bend, 0) * square
 
 
 def _hardest_press(columns: Columns, surface: Surface) -> Array:
@@ -104,26 +108,33 @@ def _hardest_press(columns: Columns, surface: Surface) -> Array:
 
 def hardest_turn(columns: Columns, surface: Surface) -> Array:
     """Bound on R uᵀ J⁻¹ u over the trajectory, shape (cells,): the decay of the spin per unit of its resistance."""
-    inverse = rigid_body.matrix(rigid_body.inverse(rigid_body.inertia(columns)))
-    found = [R * _product(u, inverse, u) for u, R in _attitudes(columns, surface)]
-    return np.asarray(np.max(found, axis=(0, 1)))
+    p = rigid_body.constants(columns, surface)
+    return np.asarray(np.max([R * u.dot(about_centre(u, p)) for u, R in _attitudes(columns, surface)], axis=(0, 1)))
 
 
 def strongest_grip(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
     """Bound on the decay rate of the slip per unit of friction's resistance, shape (cells,).
 
-    Friction on a slip v changes it by -R k (1 - [x_p] J⁻¹ [x_p]) v, where [x] is the matrix of x ×.
+    Friction on a slip v changes it by -R k (1 + G) v with G = -[x_p] J⁻¹ [x_p], where [x] is the matrix of x ×.  One
+    eigenvalue of G is zero, along x_p.  The sum of the others is the trace of G, and their product is
+    |x_p|² x_pᵀ J x_p / det J.
     """
-    constants = record(surface).of(columns)
-    inverse = rigid_body.matrix(rigid_body.inverse(rigid_body.inertia(columns)))
+    p, contact = rigid_body.constants(columns, surface), rigid_body.contact_on(surface)
+    volume = p.J11 * p.J22 * p.J33 - p.J11 * p.J23**2 - p.J22 * p.J13**2
+    trace_of_inverse = p.inv_J11 + p.inv_J22 + p.inv_J33
     worst = np.zeros_like(columns["a"])
     for u, R in _attitudes(columns, surface):
-        _, point, _, _ = surface.contact(u[..., 0], u[..., 1], 0.0, 0.0, 0.0, constants)
-        x_p = np.stack(point, axis=-1)
-        X = np.cross(np.eye(3), x_p[..., None, :])
-        G = X @ inverse @ np.swapaxes(X, -1, -2)
-        # One eigenvalue is zero, along x_p; the larger of the others follows from the traces of G and G².
-        trace, squares = np.trace(G, axis1=-2, axis2=-1), (G * G).sum(axis=(-1, -2))
-        largest = 0.5 * (trace + np.sqrt(np.maximum(2 * squares - trace**2, 0)))
+        _, _, x_p, _, _ = contact(u.x, u.y, Vector(0.0, 0.0, 0.0), p)
+        square = x_p.dot(x_p)
+        half = 0.5 * (trace_of_inverse * square - x_p.dot(about_centre(x_p, p)))
+        product = square * x_p.dot(rigid_body.momentum(x_p, p)) / volume
+        largest = half + np.sqrt(np.maximum(half**2 - product, 0))
         worst = np.maximum(worst, (R * (1 + largest)).max(axis=0))
     return worst
+
+
+def grip_at_rest(columns: Columns) -> Array:
+    """The decay rate of the slip per unit of friction's resistance at upright rest, shape (cells,)."""
+    i11, i22, _, i12, _, _ = rigid_body.inverse(rigid_body.inertia(columns))
+    largest = 0.5 * (i11 + i22) + np.sqrt(0.25 * (i11 - i22) ** 2 + i12**2)
+    return np.asarray(rigid_body.gravity(columns) * (1 + rigid_body.height(columns) ** 2 * largest))

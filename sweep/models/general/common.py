@@ -1,55 +1,96 @@
-"""Holds what the variants with slip and without share: their constants, what they offer, and how they are made."""
+"""Holds what the models with slip and without share: their scene, their constants, and how they are made."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
+from sweep.jit import inline
 from sweep.models.general import rigid_body, validity
 from sweep.models.general.couples import Couple
-from sweep.models.general.laws import Law
+from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.surfaces import ELLIPSOID, Surface
-from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, Model, named, zeros
+from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, zeros
+from sweep.models.symbols import Constants, specialised
 
 SOLID = "solid"
 """Stands in place of the law in the names of variants without slip."""
 
+PAPER_LAW = LAWS["viscous"]
+
+EXTRAS: dict[str, dict[str, float]] = {
+    "offset": {"offset": 0.0},
+    "skew": dict.fromkeys(("J13", "J23", "inv_J12", "inv_J13", "inv_J23"), 0.0),
+    "gravity": {"g": 1.0},
+}
+"""What a body may have that the paper's does not: a centre of mass off the ellipsoid's, a third axis that is no axis of
+inertia, and gravity in other units; with the constants that are known without it."""
+
 
 @dataclass(frozen=True)
 class Variant:
-    """What a variant of `slip` or `noslip` is made of."""
+    """The scene of `slip` or `noslip`: what is not in it leaves no instruction in a kernel."""
 
     law: Law | None
     """Of slip friction; None for a body that does not slip."""
     couples: tuple[Couple, ...] = ()
     surface: Surface = ELLIPSOID
+    extras: frozenset[str] = frozenset()
+    """Out of `EXTRAS`."""
 
     @property
     def name(self) -> str:
-        """Name the variant, as in datasets and in the cache of compiled code."""
-        base = ["slip", self.law.name] if self.law else ["noslip", SOLID]
-        shape = [self.surface.name] if self.surface != ELLIPSOID else []
-        return "+".join([*base, *(couple.name for couple in self.couples), *shape])
+        """Name the variant, as in datasets and in the cache of compiled code: the paper's is `slip` or `noslip`."""
+        base, law = ("slip", self.law.name) if self.law else ("noslip", SOLID)
+        more = [couple.name for couple in self.couples] + [name for name in EXTRAS if name in self.extras]
+        more += [self.surface.name] if self.surface != ELLIPSOID else []
+        return "+".join([base, law, *more] if more or law not in (PAPER_LAW.name, SOLID) else [base])
 
+    @property
+    def skew(self) -> bool:
+        """Whether the third axis may be no axis of inertia."""
+        return "skew" in self.extras
 
-def record(
-    surface: Surface, couples: Sequence[Couple] = (), more: Sequence[str] = (),
-    of_more: Callable[[Columns], tuple[Array, ...]] = lambda columns: (),
-) -> type[Any]:  # fmt: skip
-    """The constants of a variant: of the surface, the inertia, its inverse and the couples, and `more`."""
-    body = (*surface.constants, "g", *rigid_body.INERTIA, *(name.replace("J", "inv_J") for name in rigid_body.INERTIA))
+    @property
+    def known(self) -> dict[str, float]:
+        """The constants that are known, and their values."""
+        return {
+            name: value for extra, each in EXTRAS.items() if extra not in self.extras for name, value in each.items()
+        }
 
-    class Constants(named(*body, *(name for couple in couples for name in couple.constants), *more)):  # type: ignore[misc]
-        @classmethod
-        def of(cls, columns: Columns) -> Constants:
-            J, g = rigid_body.inertia(columns), rigid_body.gravity(columns)
-            of_couples = (value for couple in couples for value in couple.of(columns))
-            return cls(*surface.of(columns), g, *J, *rigid_body.inverse(J), *of_couples, *of_more(columns))
+    @cached_property
+    def body(self) -> tuple[str, ...]:
+        """The constants of body and surface that are not known."""
+        return tuple(name for name in (*self.surface.constants, *rigid_body.BODY) if name not in self.known)
 
-    return Constants
+    def record(
+        self, more: Sequence[str] = (), of_more: Callable[[Columns], tuple[Array, ...]] = lambda columns: ()
+    ) -> type[Any]:
+        """The constants of body, surface and couples, and `more`, as a `NamedTuple` class.
+
+        Its `of` raises a ValueError for bodies with what this scene does not have.
+        """
+        body, couples, surface, known = self.body, self.couples, self.surface, self.known
+
+        class Record(named(*body, *(name for couple in couples for name in couple.constants), *more)):  # type: ignore[misc]
+            @classmethod
+            def of(cls, columns: Columns) -> Record:
+                names = (*surface.constants, *rigid_body.BODY)
+                of_body = dict(zip(names, rigid_body.values(columns, surface), strict=True))
+                if others := [name for name in known if name in of_body and np.any(of_body[name] != known[name])]:
+                    raise ValueError(f"{', '.join(others)}: no such body is in this scene; name it in the variant")
+                of_couples = (value for couple in couples for value in couple.of(columns))
+                return cls(*(of_body[name] for name in body), *of_couples, *of_more(columns))
+
+        return Record
+
+    def inline(self, record: type[Any], function: Callable[..., Any], **arguments: Any):
+        """`function` of `arguments` and the constants p, for this scene (`sweep.models.symbols.specialised`)."""
+        return specialised(function, **arguments, p=Constants(record._fields, self.known))
 
 
 def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
@@ -58,18 +99,23 @@ def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
     return frozenset({COUNT, SPIN, ENERGY} | theory)
 
 
-def of_any_body(base: Model, variant: Variant, **made) -> Model:
-    """A variant of `base`; `made` are the fields that `slip` and `noslip` have of their own."""
+@inline
+def tilt(y):
+    """sin² of the angle between u and the z axis, from states that begin with u1 and u2."""
+    return y[0] * y[0] + y[1] * y[1]
+
+
+def of_any_body(variant: Variant) -> dict[str, Any]:
+    """The fields that the models of a scene have in common."""
     surface = variant.surface
-    return replace(
-        base,
-        name=variant.name,
-        variant=variant,
-        summary=f"{base.summary}, for any body",
-        slower_period=lambda columns: rigid_body.slower_period(columns, surface),
+    return {
+        "name": variant.name,
+        "variant": variant,
+        "spin_state": 4,
+        "tilt": tilt,
+        "slower_period": lambda columns: rigid_body.slower_period(columns, surface),
         # x and y are the axes of inertia of a body given by δ, and those of the surface otherwise.
-        turned=lambda columns: np.asarray(columns.get("delta", zeros(columns))),
-        spin_unit=rigid_body.spin_unit,
-        impossible=lambda columns: validity.impossible(columns, surface),
-        **made,
-    )
+        "turned": lambda columns: zeros(columns) if "delta" in columns else -rigid_body.axes(columns),
+        "spin_unit": rigid_body.spin_unit,
+        "impossible": partial(validity.impossible, surface=surface),
+    }

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import inline, nothing
+from sweep.jit import inline
 from sweep.models.general.laws import Law, rounded
 from sweep.models.general.rigid_body import mass
 from sweep.models.model import Array, Columns
@@ -76,59 +76,31 @@ COUPLES: dict[str, Couple] = {
 
 
 def damping_of(couples: Sequence[Couple]):
-    """Inline, (ω, constants) -> the couple by itself, τ0, and the power that it takes."""
-    resistance = _resistance([couple for couple in couples if not couple.needs_normal_force])
-    # A product with 0.0 would remain: the compiler has to allow for infinity.  A sum with it does not.
-    damps = resistance is not nothing
+    """(ω, constants) -> the couple by itself, τ0, and the power that it takes."""
+    of = [couple for couple in couples if not couple.needs_normal_force]
 
-    @inline
-    def damping(w1, w2, w3, p):
-        c1, c2, c3, power = 0.0, 0.0, 0.0, 0.0
-        if damps:
-            square = w1 * w1 + w2 * w2 + w3 * w3
-            k = resistance(square, p)
-            c1, c2, c3, power = -k * w1, -k * w2, -k * w3, k * square
-        return (c1, c2, c3), power
+    def damping(w, p):
+        square = w.dot(w)
+        k = sum((couple.resistance(square, p) for couple in of), 0.0)
+        return w.times(-k), k * square
 
     return damping
 
 
 def friction_of(couples: Sequence[Couple], law: Law | None = None):
-    """Inline, (v², ω, u, constants) -> (k, d, power): the friction -k v and the couple -d, per unit of normal force.
+    """(v², ω, u, constants) -> (k, d, power): the friction -k v and the couple -d, per unit of normal force.
 
     The power is that of the couple.
     """
-    of_slip = (law and law.coupled) or _without_couple(law.resistance if law else nothing)
-    rolling, spinning = (
-        _resistance([couple for couple in couples if couple.needs_normal_force and couple.about_normal == about_normal])
-        for about_normal in (False, True)
-    )
-    rolls, spins = rolling is not nothing, spinning is not nothing or bool(law and law.coupled)
+    of_slip = law.both if law else (lambda square, spin_square, p: (0.0, 0.0))
+    of = [couple for couple in couples if couple.needs_normal_force]
 
-    @inline
-    def friction(square, w1, w2, w3, u1, u2, u3, p):
-        n = u1 * w1 + u2 * w2 + u3 * w3
-        k, m = of_slip(square, n * n, p)
-        d1, d2, d3, power = 0.0, 0.0, 0.0, 0.0
-        if rolls:
-            turn_square = w1 * w1 + w2 * w2 + w3 * w3
-            r = rolling(turn_square, p)
-            d1, d2, d3, power = r * w1, r * w2, r * w3, r * turn_square
-        if spins:
-            m = (m + spinning(n * n, p)) * n
-            d1, d2, d3, power = d1 + m * u1, d2 + m * u2, d3 + m * u3, power + m * n
-        return k, (d1, d2, d3), power
+    def friction(square, w, u, p):
+        n, turn_square = u.dot(w), w.dot(w)
+        k, about_normal = of_slip(square, n * n, p)
+        r = sum((couple.resistance(turn_square, p) for couple in of if not couple.about_normal), 0.0)
+        about_normal = about_normal + sum((couple.resistance(n * n, p) for couple in of if couple.about_normal), 0.0)
+        m = about_normal * n
+        return k, w.times(r) + u.times(m), r * turn_square + m * n
 
     return friction
-
-
-def _resistance(couples: Sequence[Couple]):
-    return couples[0].resistance if couples else nothing
-
-
-def _without_couple(resistance):
-    @inline
-    def of_slip(square, spin_square, p):
-        return resistance(square, p), 0.0
-
-    return of_slip

@@ -18,6 +18,7 @@ import numpy as np
 
 from sweep.jit import inline, nothing
 from sweep.models.model import Array, Columns
+from sweep.models.symbols import Symbol, call
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,18 @@ class Law:
     """(columns) -> slip velocity up to which k is constant to a few per cent, shape (cells,); None if k is constant."""
     pure: frozenset[str] = frozenset()
     """Parameters that are pure numbers here although `sweep.parameters` gives them a unit."""
+
+    def both(self, square, spin_square, p):
+        """k and m of `coupled`, m being 0 of a law that does not depend on the spin.
+
+        A user's law is called as a whole: its lines are those of its file.
+        """
+        own = LAWS.get(self.name) is not self and isinstance(square, Symbol)
+        if self.coupled:
+            if own:
+                return call(self.coupled, "law", 2, square, spin_square)
+            return self.coupled(square, spin_square, p)
+        return call(self.resistance, "law", 0, square) if own else self.resistance(square, p), 0.0
 
 
 _TINY = 1e-20

@@ -56,26 +56,29 @@ would grow has no energy; friction stops the reversal; or body or friction have 
 def growth(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """σ of the slower and of the faster mode, half the rate per spin at which its energy grows, shape (cells,)."""
     k1, k2 = rigid_body.stiffness(columns, surface)  # R1 - h and R2 - h
-    rocking = rigid_body.rocking(columns, surface)
-    lower, higher = frequencies(rocking)
+    J11, J22, _, J12, _, _ = rigid_body.about_surface(columns)
+    h = rigid_body.height(columns)
+    coupling = J12 / ((J11 + h**2) * (J22 + h**2) - J12**2)
+    lower, higher = frequencies(rigid_body.rocking(columns, surface))
     with np.errstate(divide="ignore", invalid="ignore"):
-        shared = -rigid_body.height(columns) * (k1 - k2) * rocking.B11 / (2 * (higher**2 - lower**2))
+        shared = h * (k1 - k2) * coupling / (2 * (higher**2 - lower**2))
     # Of a body that is round both ways the modes are arbitrary, and nothing is coupled.
-    shared = np.where((k1 == k2) | (rocking.B11 == 0), 0.0, shared)
+    shared = np.where((k1 == k2) | (coupling == 0), 0.0, shared)
     return shared * lower**2, -shared * higher**2
 
 
 def energies(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """Energies of the slower and of the faster mode at the start, per unit mass, shape (cells,)."""
-    J11, J22, _, J12, _, _ = rigid_body.inertia(columns)
+    J11, J22, _, J12, _, _ = rigid_body.about_surface(columns)
     h2 = rigid_body.height(columns) ** 2
     k1, k2 = (np.sqrt(rigid_body.gravity(columns) * k) for k in rigid_body.stiffness(columns, surface))
     # In the coordinates (k1 u1, k2 u2) the stiffness is one, and the eigenvalues of the inertia are 1/ν².
     M11, M22, M12 = (J22 + h2) / k1**2, (J11 + h2) / k2**2, -J12 / (k1 * k2)
     values, modes = np.linalg.eigh(matrix(M11, M12, M12, M22))
     u1, u2, w1, w2, w3 = starts.rolling(columns, surface)
-    u3 = -np.sqrt(1 - u1**2 - u2**2)
-    moves = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3  # u' = u × ω
+    u3, back = -np.sqrt(1 - u1**2 - u2**2), -rigid_body.axes(columns)
+    moves = rigid_body.turned(u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, back)  # u' = u × ω, in the axes of the surface
+    u1, u2 = rigid_body.turned(u1, u2, back)
     q, p = (np.einsum("...i,...ik->...k", np.stack([k1 * x, k2 * y], axis=-1), modes) for x, y in ((u1, u2), moves))
     found = 0.5 * (q**2 + values * p**2)
     return found[..., 1], found[..., 0]

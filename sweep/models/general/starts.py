@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, Surface
 from sweep.models.model import Array, Columns
 
@@ -21,11 +22,12 @@ def rolling(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...]
     """u1, u2, ω1, ω2 and ω3 at t = 0, each of shape (cells,)."""
     if "n0" in columns:
         u1, u2, u3 = surface.normal(columns, *point(columns))
+        u1, u2 = rigid_body.turned(u1, u2, rigid_body.axes(columns))
         n0 = columns["n0"]
         return u1, u2, n0 * u1, n0 * u2, n0 * u3
     roll, pitch = columns["roll"], columns["pitch"]
-    u1, u2 = np.cos(roll) * np.sin(pitch), -np.sin(roll)
-    return u1, u2, columns["omega1"], columns["omega2"], columns["omega3"]
+    u = rigid_body.turned(np.cos(roll) * np.sin(pitch), -np.sin(roll), rigid_body.axes(columns))
+    return *u, *rigid_body.turned(columns["omega1"], columns["omega2"], rigid_body.axes(columns)), columns["omega3"]
 
 
 def spin(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
@@ -35,7 +37,7 @@ def spin(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
 
 
 def slipping(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...]:
-    """As `rolling`, and the slip v1 and v2.
+    """As `rolling`, and the slip v1 and v2, all in the axes of the states.
 
     `slip1` and `slip2` are components along the ground: along the direction that x has, seen from above, when the body
     is turned from upright first by `roll` about x and then by `pitch` about y, and across it.
@@ -44,7 +46,8 @@ def slipping(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...
     if "n0" in columns:
         return *states, np.zeros_like(states[0]), np.zeros_like(states[0])
     roll, pitch, along, across = (columns[name] for name in ("roll", "pitch", *SLIP))
-    return *states, along * np.cos(pitch) + across * np.sin(roll) * np.sin(pitch), across * np.cos(roll)
+    v1, v2 = along * np.cos(pitch) + across * np.sin(roll) * np.sin(pitch), across * np.cos(roll)
+    return *states, *rigid_body.turned(v1, v2, rigid_body.axes(columns))
 
 
 def point(columns: Columns) -> tuple[Array, Array]:

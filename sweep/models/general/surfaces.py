@@ -1,18 +1,22 @@
 """The surfaces on which a rigid body rolls and slips: the ellipsoid, and the elliptic paraboloid.
 
-The axes are those of the surface, x and y along its principal curvatures at the lowest point of the body at rest, z
-down; they begin at the centre of mass G, at the height h = c - offset above that point.  u is the upward normal of the
-plane.  A variant of the equations is made for one surface and has no instruction of the other.  To add a surface, enter
-its `Surface` in `SURFACES`.
+Each is given in the axes of the states (`sweep.models.general.rigid_body`), which are turned by an angle α about z,
+down, against the axes of the surface: x and y along its principal curvatures at the lowest point of the body at rest.
+They begin at the centre of mass G, at the height h = c - offset above that point.  u is the upward normal of the
+plane.  To add a surface, enter its `Surface` in `SURFACES`.
 
-Ellipsoid with the semi-axes a, b and c, its centre `offset` above G.  With A = diag(a², b², c²) and r = sqrt(uᵀ A u),
+Ellipsoid with the semi-axes a, b and c, its centre `offset` above G.  With the matrix A of the squared semi-axes and
+r = sqrt(uᵀ A u),
 
     x_p = -A u / r - offset ẑ,   -x_p · u = r + offset u3.
 
-Paraboloid z = c (1 - a (x/c)² - b (y/c)²), its origin `offset` above G: c is the length in which it is measured, and a
-and b are pure numbers.  With the radii of curvature at its lowest point, s1 = c/(2 a) and s2 = c/(2 b), and t = u/u3,
+Takano (2011) uses an expansion of this (xp, u).
 
-    x_p = (s1 t1, s2 t2, h - (s1 t1² + s2 t2²)/2),   -x_p · u = -u3 (h + (s1 t1² + s2 t2²)/2).
+Paraboloid z = c (1 - a (x/c)² - b (y/c)²), its origin `offset` above G: c is the length in which it is measured, and a
+and b are pure numbers.  With the matrix S of the radii of curvature at its lowest point, c/(2 a) and c/(2 b), and
+t = u/u3,
+
+    x_p = (S t, h - tᵀ S t / 2),   -x_p · u = -u3 (h + tᵀ S t / 2).
 """
 
 from __future__ import annotations
@@ -23,8 +27,8 @@ from typing import Any
 
 import numpy as np
 
-from sweep.jit import inline
 from sweep.models.model import Array, Columns
+from sweep.models.vectors import Symmetric, Vector
 from sweep.units import NUMBER
 
 
@@ -35,19 +39,22 @@ class Surface:
     name: str
     """As in the configuration."""
     constants: tuple[str, ...]
-    of: Callable[[Columns], tuple[Array, ...]]
-    """(columns) -> values of `constants`, each of shape (cells,)."""
+    of: Callable[[Columns, Array], tuple[Array, ...]]
+    """(columns, α) -> values of `constants`, each of shape (cells,)."""
     excess: Callable[[Columns], tuple[Array, Array]]
-    """(columns) -> radii of curvature along x and y at the lowest point of the body at rest, less c and without loss of
-    digits, each of shape (cells,)."""
-    contact: Callable[..., Any]
-    """Inline, (u1, u2, ω1, ω2, ω3, constants) -> (u3, 1/u3), the contact point x_p, u' = u × ω, and x_p', the velocity
-    of the contact point in the body."""
+    """(columns) -> radii of curvature along the axes of the surface at the lowest point of the body at rest, less c and
+    without loss of digits, each of shape (cells,)."""
+    point: Callable[..., Any]
+    """(u, u3², constants) -> (a, ρ, ρ²): the contact point is x_p = -a/ρ."""
+    velocity: Callable[..., Any]
+    """(u' = u × ω, x_p, 1/ρ, u/u3, 1/u3, constants) -> x_p', the velocity of the contact point in the body."""
     elevation: Callable[..., Any]
-    """Inline, (u1, u2, u3, constants) -> the height above that at rest, quadratic in u1 and u2 and precise however
-    small they are."""
+    """(u, constants) -> the height of G above that at rest, quadratic in u1 and u2 and precise however small
+    they are."""
+    stiffness: Callable[..., Any]
+    """(constants) -> (k11, k12, k22, h): the second derivatives of that by u1 and u2 at rest, and the height there."""
     normal: Callable[[Columns, Array, Array], tuple[Array, Array, Array]]
-    """(columns, x, y) -> u for the contact point at x and y, which has to be one."""
+    """(columns, x, y) -> u for the contact point at x and y, which has to be one; all in the axes of the surface."""
     homogeneous: bool
     """Whether the inertia is that of a homogeneous body unless it is given."""
     interior: str
@@ -76,31 +83,38 @@ def _ellipsoid_excess(columns: Columns) -> tuple[Array, Array]:
     return (a**2 - c**2) / c, (b**2 - c**2) / c
 
 
-@inline
-def contact(u1, u2, w1, w2, w3, p):
-    """As `Surface.contact`, of the ellipsoid."""
-    a2, b2, c2 = p.a2, p.b2, p.c2
-    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    au1, au2, au3 = a2 * u1, b2 * u2, c2 * u3
-    r = np.sqrt(u1 * au1 + u2 * au2 + u3 * au3)
-    # One division is enough for both 1/r and 1/u3.
-    shared = 1.0 / (r * u3)
-    inv_r, inv_u3 = shared * u3, shared * r
-    x, y, below = -au1 * inv_r, -au2 * inv_r, -au3 * inv_r
-
-    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
-    s = (du1 * au1 + du2 * au2 + du3 * au3) * inv_r
-    dx, dy, dz = -inv_r * (a2 * du1 + x * s), -inv_r * (b2 * du2 + y * s), -inv_r * (c2 * du3 + below * s)
-    return (u3, inv_u3), (x, y, below - p.offset), (du1, du2, du3), (dx, dy, dz)
+def _ellipsoid_matrix(columns: Columns, angle: Array) -> tuple[Array, ...]:
+    """A11, A12, A22 and A33, and the offset."""
+    a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
+    cos, sin = np.cos(angle), np.sin(angle)
+    mixed = (b2 - a2) * sin * cos
+    return a2 * cos**2 + b2 * sin**2, mixed, a2 * sin**2 + b2 * cos**2, c2, offset(columns)
 
 
-@inline
-def _ellipsoid_elevation(u1, u2, u3, p):
-    r = np.sqrt(p.a2 * u1 * u1 + p.b2 * u2 * u2 + p.c2 * u3 * u3)
+def _ellipsoid_point(u: Vector, c3, p):
+    A = Symmetric(p.A11, p.A22, p.A33, p.A12, 0.0, 0.0).of(u)
+    r2 = u.x * A.x + u.y * A.y + p.A33 * c3
+    r = np.sqrt(r2)
+    return A + Vector(0.0, 0.0, p.offset * r), r, r2
+
+
+def _ellipsoid_velocity(du: Vector, x_p: Vector, inv_r, t, inv_u3, p) -> Vector:
+    """x_p' = -(A u' - x (u' · x)) / r with x = -A u / r."""
+    x = x_p + Vector(0.0, 0.0, p.offset)
+    return (x.times(du.dot(x)) - Symmetric(p.A11, p.A22, p.A33, p.A12, 0.0, 0.0).of(du)).times(inv_r)
+
+
+def _ellipsoid_elevation(u: Vector, p):
+    A = Symmetric(p.A11, p.A22, p.A33, p.A12, 0.0, 0.0)
     # r - c = (r² - c²) / (r + c) and 1 + u3 = (u1² + u2²) / (1 - u3)
-    c = np.sqrt(p.c2)
-    height = ((p.a2 - p.c2) * u1 * u1 + (p.b2 - p.c2) * u2 * u2) / (r + c)
-    return height + p.offset * (u1 * u1 + u2 * u2) / (1.0 - u3)
+    r, square = np.sqrt(u.dot(A.of(u))), u.x * u.x + u.y * u.y
+    excess = (p.A11 - p.A33) * u.x * u.x + 2.0 * p.A12 * u.x * u.y + (p.A22 - p.A33) * u.y * u.y
+    return excess / (r + np.sqrt(p.A33)) + p.offset * square / (1.0 - u.z)
+
+
+def _ellipsoid_stiffness(p):
+    c = np.sqrt(p.A33)
+    return (p.A11 - p.A33) / c + p.offset, p.A12 / c, (p.A22 - p.A33) / c + p.offset, c - p.offset
 
 
 def _ellipsoid_normal(columns: Columns, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -121,23 +135,33 @@ def _paraboloid_excess(columns: Columns) -> tuple[Array, Array]:
     return c * (0.5 - a) / a, c * (0.5 - b) / b
 
 
-@inline
-def _paraboloid_contact(u1, u2, w1, w2, w3, p):
-    u3 = -np.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    inv_u3 = 1.0 / u3
-    t1, t2 = u1 * inv_u3, u2 * inv_u3
-    x, y = p.radius1 * t1, p.radius2 * t2
-    du1, du2, du3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
-    dt1, dt2 = (du1 - t1 * du3) * inv_u3, (du2 - t2 * du3) * inv_u3
-    z = p.h - 0.5 * (x * t1 + y * t2)
-    return (u3, inv_u3), (x, y, z), (du1, du2, du3), (p.radius1 * dt1, p.radius2 * dt2, -(x * dt1 + y * dt2))
+def _paraboloid_matrix(columns: Columns, angle: Array) -> tuple[Array, ...]:
+    """S11, S12 and S22, and h."""
+    radius1, radius2 = _paraboloid_radii(columns)
+    cos, sin = np.cos(angle), np.sin(angle)
+    mixed = (radius2 - radius1) * sin * cos
+    h = columns["c"] - offset(columns)
+    return radius1 * cos**2 + radius2 * sin**2, mixed, radius1 * sin**2 + radius2 * cos**2, h
 
 
-@inline
-def _paraboloid_elevation(u1, u2, u3, p):
-    x, y = p.radius1 * u1 / u3, p.radius2 * u2 / u3
+def _paraboloid_point(u: Vector, c3, p):
+    s1, s2 = p.S11 * u.x + p.S12 * u.y, p.S12 * u.x + p.S22 * u.y
+    return Vector(-s1 * u.z, -s2 * u.z, 0.5 * (u.x * s1 + u.y * s2) - p.h * c3), c3, c3 * c3
+
+
+def _paraboloid_velocity(du: Vector, x_p: Vector, inv_c3, t, inv_u3, p) -> Vector:
+    dt1, dt2 = (du.x - t[0] * du.z) * inv_u3, (du.y - t[1] * du.z) * inv_u3
+    return Vector(p.S11 * dt1 + p.S12 * dt2, p.S12 * dt1 + p.S22 * dt2, -(x_p.x * dt1 + x_p.y * dt2))
+
+
+def _paraboloid_elevation(u: Vector, p):
+    across = u.x * (p.S11 * u.x + p.S12 * u.y) + u.y * (p.S12 * u.x + p.S22 * u.y)
     # 1 + u3 = (u1² + u2²) / (1 - u3)
-    return -0.5 * (x * u1 + y * u2) - p.h * (u1 * u1 + u2 * u2) / (1.0 - u3)
+    return -0.5 * across / u.z - p.h * (u.x * u.x + u.y * u.y) / (1.0 - u.z)
+
+
+def _paraboloid_stiffness(p):
+    return p.S11 - p.h, p.S12, p.S22 - p.h, p.h
 
 
 def _paraboloid_normal(columns: Columns, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -149,11 +173,13 @@ def _paraboloid_normal(columns: Columns, x: Array, y: Array) -> tuple[Array, Arr
 
 ELLIPSOID = Surface(
     name="ellipsoid",
-    constants=("a2", "b2", "c2", "offset"),
-    of=lambda columns: (*(columns[axis] ** 2 for axis in "abc"), offset(columns)),
+    constants=("A11", "A12", "A22", "A33", "offset"),
+    of=_ellipsoid_matrix,
     excess=_ellipsoid_excess,
-    contact=contact,
+    point=_ellipsoid_point,
+    velocity=_ellipsoid_velocity,
     elevation=_ellipsoid_elevation,
+    stiffness=_ellipsoid_stiffness,
     normal=_ellipsoid_normal,
     homogeneous=True,
     interior="the ellipsoid; keep |offset| < c",
@@ -167,11 +193,13 @@ _SHAPE = "The paraboloid is z = c (1 - a (x/c)^2 - b (y/c)^2)."
 
 PARABOLOID = Surface(
     name="paraboloid",
-    constants=("radius1", "radius2", "h"),
-    of=lambda columns: (*_paraboloid_radii(columns), columns["c"] - offset(columns)),
+    constants=("S11", "S12", "S22", "h"),
+    of=_paraboloid_matrix,
     excess=_paraboloid_excess,
-    contact=_paraboloid_contact,
+    point=_paraboloid_point,
+    velocity=_paraboloid_velocity,
     elevation=_paraboloid_elevation,
+    stiffness=_paraboloid_stiffness,
     normal=_paraboloid_normal,
     homogeneous=False,
     interior="the paraboloid; keep offset < c",

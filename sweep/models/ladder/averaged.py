@@ -17,9 +17,9 @@ from collections import namedtuple
 import numpy as np
 
 from sweep.jit import inline
+from sweep.models.general.rigid_body import slower_period
 from sweep.models.model import COUNT, ENERGY, FORMULAS, LINEAR, SPIN, Array, Columns, Model
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
-from sweep.models.theory.rocking import slower_period
 
 
 class Constants(namedtuple("Constants", "half_k1 half_k4 half_m1 half_m4 I3")):

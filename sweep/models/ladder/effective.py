@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.jit import inline
+from sweep.models.general.rigid_body import slower_period
 from sweep.models.model import COUNT, FORMULAS, LINEAR, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.ripple import FORM, ripple_of_states
-from sweep.models.theory.rocking import slower_period
 
 _CONSTANTS = "rate1_squared rate2_squared k1 k2 k3 k4 m1 m2 m3 m4 nu1_squared nu2_squared root_J slip gravity I3"
 

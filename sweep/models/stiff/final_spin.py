@@ -1,6 +1,6 @@
 """What becomes of a small rattle that is left to itself: the slow equations.
 
-A mode of energy E_k = I3 e_k / 2 grows at the rate r_k of the linear theory and changes the spin by (ndotab, abdot),
+A mode of energy E_k = J33 e_k / 2 grows at the rate r_k of the linear theory and changes the spin by (ndotab, abdot),
 
     e_k' = 2 r_k(n) e_k,   n' = -Σ s_k(n) e_k,
 
@@ -11,14 +11,14 @@ neglects is of the order of `bending` times n² + Σ e_k, and grows where the tw
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sweep.jit import Cached, called, serial
 from sweep.models.model import Array, take
+from sweep.models.stiff.form import StiffForm
 from sweep.models.stiff.modes import Rattle, slow_rates
-from sweep.models.stiff.slip import Constants
 from sweep.models.theory.linear import NODES, through_nodes
 
 # The fastest spin within reach, in units of the spin whose energy is there.
@@ -52,22 +52,22 @@ class Ending(NamedTuple):
     """Smallest |spin| after that."""
 
 
-def ending(states: Array, constants: Constants) -> Ending:
+def ending(form: StiffForm, states: Array, constants: Any) -> Ending:
     """How a small rattle ends; the spin is without its ripple.
 
     Parameters
     ----------
-    states : of `stiff.slip`, shape (7, cells)
+    states : of `form`, shape (7, cells)
     """
-    rattle = Rattle.of(states, constants)
-    spin = -(states[4] - rattle.rippled(rattle.amplitudes)) / constants.I3
+    rattle = Rattle.of(form, states, constants)
+    spin = -(states[4] - rattle.rippled(rattle.amplitudes)) / constants.J33
     e = np.abs(rattle.amplitudes) ** 2 * rattle.unit_energies
     reach = _REACH * np.sqrt(spin**2 + e.sum(axis=1))
     result = Ending(*np.full((4, len(spin)), np.nan))
     known = np.flatnonzero(rattle.sound & np.isfinite(reach) & (reach > 0))
     if not len(known):
         return result
-    rates, slopes, apart = _fits(take(constants, known), reach[known])
+    rates, slopes, apart = _fits(form, take(constants, known), reach[known])
     known = known[apart]
     unit = reach[known]
     n, log_e = spin[known] / unit, np.log(np.maximum(e[known] / unit[:, None] ** 2, _TINY))
@@ -78,10 +78,10 @@ def ending(states: Array, constants: Constants) -> Ending:
     return result
 
 
-def _fits(constants: Constants, reach: Array) -> tuple[Array, Array, Array]:
+def _fits(form: StiffForm, constants: Any, reach: Array) -> tuple[Array, Array, Array]:
     """Coefficients of r_k and s_k, shape (cells, powers of n / `reach`, 2), and whether the modes are apart."""
     cells = np.tile(np.arange(len(reach)), len(NODES))
-    rates, slopes, sound = slow_rates(take(constants, cells), np.outer(NODES, reach).ravel())
+    rates, slopes, sound = slow_rates(form, take(constants, cells), np.outer(NODES, reach).ravel())
     gap = np.abs(np.diff(rates.imag, axis=1))[:, 0]
     apart = (sound & (gap > _APART * np.abs(rates.real).max(axis=1))).reshape(len(NODES), -1).all(axis=0)
     nodes = (values.reshape(len(NODES), -1, 2) for values in (rates.real, slopes))

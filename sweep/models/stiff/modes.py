@@ -8,7 +8,7 @@ To second order the rattle changes the spin: M3' = Σ B_jk z_j z_k, summed over 
 M3 - Σ B_jk z_j z_k / (λ_j + λ_k) remains constant, whatever becomes of the z_k.
 
 By the averaged equations (ndotab, abdot), a mode of energy E_k changes the spin by d α²/2 in total while it decays or
-grows, where d is the distance of n from the critical spin of the mode, and α = sqrt(2 E_k / I3)/d is called the *size*
+grows, where d is the distance of n from the critical spin of the mode, and α = sqrt(2 E_k / J33)/d is called the *size*
 of the mode.  Neglected are terms of order α⁴ d in spin, and terms of order α_j³ by which mode j changes the other.
 """
 
@@ -16,20 +16,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from sweep.models import ellipsoid
-from sweep.models.ladder import averaged, slip
-from sweep.models.model import Array, Columns, stack, take
-from sweep.models.stiff.form import subset
-from sweep.models.stiff.slip import STIFF_MODEL, Constants, momentum, slow
+from sweep.models.general import rigid_body
+from sweep.models.general.reversal_time import growth
+from sweep.models.model import Array, Columns, Model, stack, take
+from sweep.models.stiff.form import StiffForm
 from sweep.models.theory import linear
+from sweep.models.theory.rocking import frequencies
 
 RATTLE = (0, 1, 2, 3, 5, 6)
-"""Indices of the states that vanish in upright spin; the remaining one is then M3 = -I3 n."""
+"""Indices of the states that vanish in upright spin; the remaining one is then M3 = -J33 n."""
 
-# Decay rate of the slip, in sqrt(g/c), above which friction counts as stopping the slip fast compared with the rattle.
+# Decay rate of the slip, in sqrt(g/h), above which friction counts as stopping the slip fast compared with the rattle.
 _SLIP_DECAY = 0.3
 
 # Amplitude at which quadratic forms are evaluated: the terms that they leave out are 1e-16 of them.
@@ -52,38 +53,40 @@ class Rattle:
     amplitudes: Array
     """Amplitudes z, shape (cells, 2)."""
     unit_energies: Array
-    """2 E_k / I3 for z_k = 1, averaged over a period, in units of spin², shape (cells, 2)."""
+    """2 E_k / J33 for z_k = 1, averaged over a period, in units of spin², shape (cells, 2)."""
     slopes: Array
     """d Re λ_k / dn from the effect of the mode on the spin alone (the form that (abdot) gives), shape (cells, 2)."""
     upright: Array
     """M3 in upright spin with the same n, shape (cells,)."""
-    constants: Constants
+    form: StiffForm
+    """The model."""
+    constants: Any
     """Constants of the model."""
 
     @classmethod
-    def of(cls, states: Array, constants: Constants) -> Rattle:
-        """Resolve states of `stiff.slip`, shape (7, cells), all of which except the spin have to be small."""
-        spin, _, inertia = STIFF_MODEL.energy(states, constants)
-        rates, modes, sound = _rocking(constants, spin)
+    def of(cls, form: StiffForm, states: Array, constants: Any) -> Rattle:
+        """Resolve states of `form`, shape (7, cells), all of which except the spin have to be small."""
+        spin, _, inertia = form.model.energy(states, constants)
+        rates, modes, sound = _rocking(form, constants, spin)
         pairs = np.concatenate([modes[:, :4], modes[:, :4].conj()], axis=2)
         sound &= np.abs(np.linalg.det(pairs)) > 0
         pairs[~sound] = np.eye(4)
         readings = np.linalg.inv(pairs)[:, :2]
         amplitudes = (readings @ states[list(RATTLE[:4])].T[..., None])[..., 0]
         upright = -inertia * spin
-        unit, turn = _unit_energies_and_turns(modes, upright, constants)
+        unit, turn = _unit_energies_and_turns(form, modes, upright, constants)
         slopes = turn / (unit * inertia[:, None])
-        return cls(sound, rates, modes, readings, amplitudes, unit, slopes, upright, constants)
+        return cls(sound, rates, modes, readings, amplitudes, unit, slopes, upright, form, constants)
 
     def select(self, cells: Array) -> Rattle:
         """The rattles of the cells given by a mask or by indices."""
-        arrays = {f.name: getattr(self, f.name)[cells] for f in fields(self) if f.name != "constants"}
-        return Rattle(constants=take(self.constants, cells), **arrays)
+        arrays = {f.name: getattr(self, f.name)[cells] for f in fields(self) if f.name not in ("form", "constants")}
+        return Rattle(form=self.form, constants=take(self.constants, cells), **arrays)
 
     @cached_property
     def turning(self) -> Array:
         """B over the modes and their conjugates, in the order R_1, R_2, R_1*, R_2*, shape (cells, 4, 4)."""
-        return _turning(self.modes, self.upright, self.constants)
+        return _turning(self.form, self.modes, self.upright, self.constants)
 
     def distances(self) -> Array:
         """Distance d of the spin from the critical spin of each mode, in sqrt(g/c), shape (cells, 2).
@@ -126,64 +129,72 @@ class Rattle:
         return np.asarray(self.turning / (rates[:, :, None] + rates[:, None, :]))
 
 
-def slow_rates(constants: Constants, spin: Array) -> tuple[Array, Array, Array]:
+def slow_rates(form: StiffForm, constants: Any, spin: Array) -> tuple[Array, Array, Array]:
     """`rates`, `slopes` and `sound` of `Rattle` at a spin, without a rattle."""
-    rates, modes, sound = _rocking(constants, spin)
-    unit, turn = _unit_energies_and_turns(modes, -constants.I3 * spin, constants)
-    return rates, turn / (unit * constants.I3[:, None]), sound
+    rates, modes, sound = _rocking(form, constants, spin)
+    unit, turn = _unit_energies_and_turns(form, modes, -constants.J33 * spin, constants)
+    return rates, turn / (unit * constants.J33[:, None]), sound
 
 
-def bending(columns: Columns) -> Array:
-    """Bound on how strongly a rattle of e = 2 E / I3 = 1 makes the motion nonlinear, shape (cells,).
+def bending(model: Model, columns: Columns) -> Array:
+    """Bound on how strongly a rattle of e = 2 E / J33 = 1 makes the motion nonlinear, shape (cells,).
 
-    The measure is its part in the normal force.  For rocking about one axis, at the height c,
-    R - 1 = (a² - c²)/c φ'² with φ'² = I3 e / (I + c²).
+    The measure is its part in the normal force.  For rocking about one axis R - g = k φ'² with φ'² = J33 e / (J + h²),
+    the stiffness k and the height h of the centre of mass.
     """
-    a, b, c = columns["a"], columns["b"], columns["c"]
-    I1, I2, I3 = ellipsoid.inertia(columns)
-    return np.asarray(I3 / c * np.maximum((a**2 - c**2) / (I2 + c**2), (b**2 - c**2) / (I1 + c**2)))
+    p, surface = rigid_body.constants(columns, model.variant.surface), model.variant.surface
+    k11, _, k22, h = surface.stiffness(p)
+    return np.asarray(p.J33 / p.g * np.maximum(k11 / (p.J22 + h**2), k22 / (p.J11 + h**2)))
 
 
-def fastest_growth(columns: Columns, reach: Array) -> Array:
-    """Largest |Re λ| of the modes, by (abdot), at spins up to `reach`; in sqrt(g/c), shape (cells,)."""
-    k = averaged.Constants.of(columns)
-    first, second = np.abs(k.half_k1) * reach + np.abs(k.half_m1), np.abs(k.half_k4) * reach + np.abs(k.half_m4)
-    return np.asarray(np.maximum(first, second))
+def fastest_growth(model: Model, columns: Columns, reach: Array) -> Array:
+    """Bound on |Re λ| of the modes at spins up to `reach`, shape (cells,).
+
+    The spin adds σ n (`sweep.models.general.reversal_time`).  The slip that a mode of frequency ν needs at rest,
+    h ν ω/(μ g), takes the power h² ν² ω²/(μ g) of its energy, which is J_P ω²/2.
+    """
+    surface = model.variant.surface
+    p = rigid_body.constants(columns, surface)
+    h, (_, faster) = rigid_body.height(columns), frequencies(rigid_body.rocking(columns, surface))
+    with np.errstate(divide="ignore"):
+        slip = (h * faster) ** 2 / (columns["mu"] * p.g * (np.minimum(p.J11, p.J22) + h**2))
+    return np.asarray(np.abs(growth(columns, surface)).max(axis=0) * reach + slip)
 
 
-def _rocking(constants: Constants, spin: Array) -> tuple[Array, Array, Array]:
+def _rocking(form: StiffForm, constants: Any, spin: Array) -> tuple[Array, Array, Array]:
     """Rates and modes, as in `Rattle`, and whether there are two rocking modes, shape (cells,)."""
-    rates, modes = np.linalg.eig(linear.jacobian(slip.MODEL, subset(slip.Constants, constants), spin))
+    rates, modes = np.linalg.eig(linear.jacobian(form.full, constants, spin))
     # With little friction the slip is not stopped fast, but oscillates slowly, and these two modes do not describe
     # that: at μ = 1e-3 leaving it out cost 3e-7 in spin.
     falling = np.argsort(-rates.imag, axis=1)
-    gone = (np.take_along_axis(rates.real, falling[:, 2:4], axis=1) < -_SLIP_DECAY).all(axis=1)
+    fast = np.take_along_axis(rates.real, falling[:, 2:4], axis=1) < -_SLIP_DECAY * form.unit(constants)[:, None]
     order = falling[:, 1::-1]
     rates = np.take_along_axis(rates, order, axis=1)
     modes = np.take_along_axis(modes, order[:, None, :], axis=2).astype(complex)
-    to_momentum = linear.derivative(lambda y: momentum(y, constants), stack(slip.MODEL.upright(spin)), RATTLE)
-    return rates, to_momentum @ modes, np.asarray(gone & (rates.imag > 0).all(axis=1))
+    upright = stack(form.full.upright(spin))
+    to_momentum = linear.derivative(lambda y: form.momentum(y, constants), upright, RATTLE)
+    return rates, to_momentum @ modes, np.asarray(fast.all(axis=1) & (rates.imag > 0).all(axis=1))
 
 
-def _turning(modes: Array, upright: Array, constants: Constants) -> Array:
+def _turning(form: StiffForm, modes: Array, upright: Array, constants: Any) -> Array:
     """B by polarisation: B(x, y) = (M3'(x + y) - M3'(x - y))/4."""
     both = np.moveaxis(np.concatenate([modes, modes.conj()], axis=2), 0, -1) * _SMALL
     one, other = both[:, :, None], both[:, None, :]
     forms = []
     for rattle in (one + other, one - other):
-        slopes, _ = slow(*np.insert(rattle, 4, upright, axis=0), constants)
+        slopes, _ = form.slow(*np.insert(rattle, 4, upright, axis=0), constants)
         forms.append(slopes[4])
     return np.asarray(np.moveaxis((forms[0] - forms[1]) / (4 * _SMALL**2), -1, 0))
 
 
-def _unit_energies_and_turns(modes: Array, upright: Array, constants: Constants) -> tuple[Array, Array]:
-    """2 E / I3 and M3' of each mode at z = 1, averaged over a period, each of shape (cells, 2)."""
+def _unit_energies_and_turns(form: StiffForm, modes: Array, upright: Array, constants: Any) -> tuple[Array, Array]:
+    """2 E / J33 and M3' of each mode at z = 1, averaged over a period, each of shape (cells, 2)."""
     energies = turns = np.zeros((modes.shape[2], len(upright)))
     for part in (modes.real, modes.imag):
         states = np.insert(np.moveaxis(part, 0, -1) * _SMALL, 4, upright, axis=0)
-        _, rattle, inertia = STIFF_MODEL.energy(states, constants)
+        _, rattle, inertia = form.model.energy(states, constants)
         energies = energies + 4 * rattle / inertia / _SMALL**2
-        turns = turns + 2 * slow(*states, constants)[0][4] / _SMALL**2
+        turns = turns + 2 * form.slow(*states, constants)[0][4] / _SMALL**2
     return energies.T, turns.T
 
 

@@ -6,9 +6,9 @@ takes energy from it, which can last 10⁶ sqrt(c/g).  As the rattle is not smal
 (`sweep.models.stiff.final_spin`).  But the contact force has no torque about the contact point, so that the angular
 momentum about it along the vertical,
 
-    d (M·u)/dt = A12 (ω1² - ω2²) - (A11 - A22) ω1 ω2,
+    d (M·u)/dt = h (S12 (ω1² - ω2²) - (S11 - S22) ω1 ω2),
 
-changes by what averages to zero while the contact point goes round (docs/explanation/reversal.md).  M·u/I3 is where
+changes by what averages to zero while the contact point goes round (docs/explanation/reversal.md).  M·u/J33 is where
 the spin goes while the rattle decays.
 """
 
@@ -21,7 +21,7 @@ from sweep.jit import inline
 
 @inline
 def vertical_spin(y, spin, rattle, inertia):
-    """The spin M·u/I3 that would be left without rattle, and the spin that would have all the energy, squared.
+    """The spin M·u/J33 that would be left without rattle, and the spin that would have all the energy, squared.
 
     `y` are the states of `stiff.slip`, and the others what its `energy` gives.  The results are in sqrt(g/c) and g/c.
     The second, less the square of the first, is the energy that a rattle can lose; of the three it alone has no ripple.

@@ -32,7 +32,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.model import Array, Columns, stack
-from sweep.models.theory.rocking import Body, Rocking, rocking
+from sweep.models.theory.rocking import Rocking
 
 FORM = ("K11", "K12", "K21", "K22")
 
@@ -40,24 +40,10 @@ _APART = 1e-9
 """Share by which the squares of two frequencies have to differ: the ripple at their difference is slow otherwise."""
 
 
-def form(columns: Columns) -> tuple[Array, ...]:
-    """K11, K12, K21 and K22, in 1/(m c^2), each of shape (cells,)."""
-    return for_each_body(_form, {name: columns[name] for name in ("a", "b", "c", "delta")})
-
-
 def for_each_body(of: Callable[[Columns], tuple[Array, ...]], columns: Columns) -> tuple[Array, ...]:
     """What `of` gives of columns, computed once for cells that are alike."""
     bodies, which = np.unique(stack(tuple(columns.values())), axis=1, return_inverse=True)
     return tuple(each[which.reshape(-1)] for each in of(dict(zip(columns, bodies, strict=True))))
-
-
-def _form(columns: Columns) -> tuple[Array, ...]:
-    p = Body.of(columns)
-    J1, J2 = p.I1 + p.A33, p.I2 + p.A33
-    P = matrix(1 - (p.I3 + p.A11) / J1, -p.A12 / J2, -p.A12 / J1, 1 - (p.I3 + p.A22) / J2)
-    off = (p.A22 - p.A11) / (2 * J1 * J2)
-    H = matrix(p.A12 / J1**2, off, off, -p.A12 / J2**2)
-    return ripple_free(rocking(p), H, P, p.I3)
 
 
 def ripple_free(of: Rocking, H: Array, P: Array, I3: Array) -> tuple[Array, ...]:

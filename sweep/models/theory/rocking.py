@@ -2,8 +2,8 @@
 
     u' = B M,   M' = C u
 
-to first order in u1, u2, M1, M2.  -ν² are the eigenvalues of B C.  In the axes of inertia, which are those of the
-paper's body, the diagonal of B vanishes; in those of the surface, which are those of other bodies, that of C does.
+to first order in u1, u2, M1, M2.  -ν² are the eigenvalues of B C.  What they are for a body is in
+`sweep.models.general.rigid_body`.
 
 The paper's ν1, ν2 neglect c² beside a² and b² in C: at a = 10, b = 3 they give 3.65 for the period of the slower mode,
 which is 3.87.
@@ -16,8 +16,7 @@ from collections import namedtuple
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models import ellipsoid
-from sweep.models.model import Array, Columns
+from sweep.models.model import Array
 
 LONGEST = 10.0
 """Ratio of the two periods of the rocking beyond which the spin is averaged over a shorter time than the longer one.
@@ -27,28 +26,11 @@ Rocking = namedtuple("Rocking", "B11 B12 B21 B22 C11 C12 C21 C22")
 """The elements of B and C."""
 
 
-class Body(namedtuple("Body", "I1 I2 I3 A11 A12 A22 A33")):
-    """What the rocking depends on, each of shape (cells,)."""
-
-    @classmethod
-    def of(cls, columns: Columns) -> Body:
-        return cls(*ellipsoid.inertia(columns), *ellipsoid.shape(columns))
-
-
-@inline
-def rocking(p):
-    """The rocking of the paper's body; `p` holds I1, I2 and A11 … A33."""
-    A11, A12, A22, A33 = p.A11, p.A12, p.A22, p.A33
-    inv_c = 1.0 / np.sqrt(A33)
-    B12, B21 = 1.0 / (p.I2 + A33), -1.0 / (p.I1 + A33)
-    return Rocking(0.0, B12, B21, 0.0, A12 * inv_c, (A22 - A33) * inv_c, (A33 - A11) * inv_c, -A12 * inv_c)
-
-
 def frequencies(of: Rocking) -> tuple[Array, Array]:
     """The lower and the higher frequency ν, each of shape (cells,)."""
     B11, B12, B21, B22, C11, C12, C21, C22 = of
     first, second = -B12 * C21 - B11 * C11, -B21 * C12 - B22 * C22
-    half_split = np.sqrt((0.5 * (first - second)) ** 2 + (B12 * C22 * B21 * C11 + B11 * C12 * B22 * C21))
+    half_split = np.sqrt((0.5 * (first - second)) ** 2 + (B11 * C12 + B12 * C22) * (B21 * C11 + B22 * C21))
     higher = 0.5 * (first + second) + half_split
     # The product of the squares is det(B C).  A difference would lose the lower one where a body is nearly round.
     determinant = (B12 * B21 - B11 * B22) * (C12 * C21 - C11 * C22)
@@ -65,11 +47,6 @@ def longer_period(of: Rocking) -> Array:
     lower, higher = frequencies(of)
     with np.errstate(divide="ignore"):
         return np.asarray(2 * np.pi / np.maximum(lower, higher / LONGEST))
-
-
-def slower_period(columns: Columns) -> Array:
-    """Return `longer_period` for the paper's body, in sqrt(c/g), shape (cells,)."""
-    return longer_period(rocking(Body.of(columns)))
 
 
 @inline

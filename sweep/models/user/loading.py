@@ -13,13 +13,13 @@ from importlib import metadata
 from types import ModuleType
 
 from sweep.faults import fault_of
-from sweep.models.general import variants
+from sweep.models import variants
 from sweep.models.general.laws import Law
-from sweep.models.general.variants import Physics, SlipWith
 from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.models.user import trial
 from sweep.models.user.blame import blamed
+from sweep.models.variants import Physics, SlipWith
 from sweep.parameters import PARAMETERS, Parameter
 
 GROUP = "sweep.models"

@@ -13,12 +13,12 @@ import numpy as np
 
 from sweep.faults import fault_of
 from sweep.models.general.laws import LAWS, Law
-from sweep.models.general.variants import SlipWith
 from sweep.models.model import COUNT, ENERGY, LINEAR, OWN, SPIN, Columns, Model, never_rocks, never_upright
 from sweep.models.origin import Origin
 from sweep.models.theory.linear import fastest_motion
 from sweep.models.theory.stability import stable_ranges
 from sweep.models.user.blame import blamed
+from sweep.models.variants import SlipWith
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.units import is_of_paper
 

@@ -1,11 +1,10 @@
-"""Any body and any law of friction: the equations of `slip` and `noslip` for a `sweep.models.general.rigid_body`.
+"""Chooses the variant of `slip` or `noslip` for a body and a law of friction.
 
-A model made here is a *variant* of `slip` or `noslip`, specialised for a law of friction and for couples, whose
-names make up its own: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`, and for a surface that is no ellipsoid
-`slip+viscous+paraboloid`.  What a variant does not name leaves no instruction in its kernel.  The states are those of
-`slip` and `noslip`, in the axes of the surface; the equations are those of `sweep.models.general.slip` and `noslip`.
+A *variant* is specialised for one law, and for the couples, extras (`sweep.models.general.common.EXTRAS`) and surface
+that its name lists: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`, `slip+viscous+offset+gravity`.  What it does not
+name leaves no instruction in its kernel.  The variant of the paper's body is `slip` itself.
 
-The `Physics` of a configuration chooses the variant that runs it, where it names what the paper's models do not know.
+The `Physics` of a configuration chooses the variant that runs it.
 """
 
 from __future__ import annotations
@@ -14,12 +13,12 @@ from dataclasses import dataclass
 from functools import cache
 
 from sweep.models.general import rigid_body, starts
-from sweep.models.general.common import SOLID, Variant
+from sweep.models.general.common import EXTRAS, SOLID, Variant
 from sweep.models.general.couples import COUPLES
 from sweep.models.general.laws import LAWS, Law
-from sweep.models.general.noslip import rolling
-from sweep.models.general.slip import slipping
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES, Surface
+from sweep.models.ladder.noslip import rolling
+from sweep.models.ladder.slip import slipping
 from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.parameters import PAPER_PARAMETERS, PARAMETERS, SI_ALONE, Parameter
@@ -76,7 +75,9 @@ def variant(name: str, own: Law | None = None) -> Model:
     if base not in BASES or (base == "noslip") != (law == SOLID):
         raise KeyError(name)
     surface = SURFACES[more.pop()] if more and more[-1] in SURFACES else ELLIPSOID
-    return make(Variant(None if law == SOLID else own or LAWS[law], tuple(COUPLES[each] for each in more), surface))
+    couples = tuple(COUPLES[each] for each in more if each not in EXTRAS)
+    extras = frozenset(more) & EXTRAS.keys()
+    return make(Variant(None if law == SOLID else own or LAWS[law], couples, surface, frozenset(extras)))
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,10 @@ class Physics:
         start = by_angles if self.names & {*starts.ANGLES, *starts.SLIP} else starts.POINT
         couples = tuple(couple for couple in COUPLES.values() if self.names & {*couple.parameters})
         parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-        return make(Variant(self.law if base == "slip" else None, couples, self.surface), parameters)
+        lies = self.names & {"offset"} & {*self.surface.constants}
+        has = {"offset": lies, "skew": self.names & {"Ixz", "Iyz"}, "gravity": self.units == SI}
+        extras = frozenset(extra for extra, named in has.items() if named)
+        return make(Variant(self.law if base == "slip" else None, couples, self.surface, extras), parameters)
 
     def misfits(self) -> dict[str, str]:
         """List the named parameters that do not go with the rest, and what to do about each."""
