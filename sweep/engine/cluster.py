@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from distributed import Client
 
 PATIENCE = "10s"
-"""How long to wait for a scheduler to answer."""
+"""Seconds to wait for a scheduler to answer."""
 
 _POLL = 0.01
-"""Time in seconds between two looks at whether a tile has come back."""
+"""Seconds between two checks whether a tile has come back."""
 
 _CELLS_A_LANE, _TASKS_A_WORKER = 32, 4
-"""Cells of a task for each lane of a worker, unless that would leave a worker fewer tasks than the second."""
+"""Cells of a task for each lane of a worker, and the least number of tasks for each worker, which takes precedence."""
 
 _LOST = "the dask scheduler is gone; finished tiles are kept, and the same command without --fresh resumes the run"
 
@@ -71,7 +71,7 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
 
 
 def _together(client: Client, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Sequence[int]]:
-    """Divide `todo` among tasks: as many cells in each as keep the lanes of a worker full, but some tasks a worker."""
+    """Divide `todo` among tasks: enough cells in each to fill the lanes of a worker, but several for each worker."""
     threads = [*client.nthreads().values()] or [1]
     largest = max((config.grid.part(tiles[i]).size for i in todo), default=1)
     enough = max(threads) * LANES * _CELLS_A_LANE // largest
@@ -80,7 +80,7 @@ def _together(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
 
 
 def _on_this_machine(client: Client) -> bool:
-    """Tell whether any worker runs on the machine of this process."""
+    """Return whether any worker runs on the machine of this process."""
     from distributed.comm import get_address_host
     from distributed.utils import get_ip
 
@@ -88,7 +88,7 @@ def _on_this_machine(client: Client) -> bool:
 
 
 def _arriving(running: Any) -> Iterator[Any]:
-    """Futures in the order in which they are done."""
+    """Yield futures in the order in which they finish."""
     while not running.is_empty():
         while not running.has_ready():
             time.sleep(_POLL)
@@ -97,7 +97,7 @@ def _arriving(running: Any) -> Iterator[Any]:
 
 
 Shared = tuple[Config, list[Tile], Identity]
-"""What the tasks of a run have in common."""
+"""What all tasks of a run share."""
 
 
 # Kernels of several tasks at once would share threads, which not all of numba's threading layers allow.
@@ -119,7 +119,7 @@ def _work(shared: Shared, together: Sequence[int]) -> list[Done]:
 
 @contextmanager
 def connected(client: Client | str | None) -> Iterator[Client | None]:
-    """Connect to the scheduler at an address; a client, or None, is handed on as it is.
+    """Connect to the scheduler at an address; a client, or None, is returned unchanged.
 
     Raises
     ------
@@ -135,10 +135,10 @@ def connected(client: Client | str | None) -> Iterator[Client | None]:
         words = "needs distributed, which is not installed: pip install 'dask[distributed]'"
         raise StoreError(f"{client}: {words}") from None
 
-    for logger in ("distributed", "distributed.client"):  # what a user has to know is raised as an error
+    for logger in ("distributed", "distributed.client"):  # user-visible problems are raised as errors
         logging.getLogger(logger).setLevel("CRITICAL")
     try:
-        # A client that is given a wrong address waits 20 s for itself when it is collected, and prints a traceback.
+        # When collected, a client with a wrong address would wait for itself for 20 s, and print a traceback.
         distributed.comm.resolve_address(client)
         there = distributed.Client(client, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
