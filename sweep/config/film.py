@@ -192,7 +192,7 @@ def _column(table: Table, place: int, unit: Unit, gaps: dict[int, str]) -> Array
     gaps |= texts
     odd = [row for row, cell in texts.items() if cell.lower() not in GAPS]
     if strange := [row for row in odd if not re.search("[^\\W\\d_]", texts[row])] or odd[: len(odd) * 10 // len(cells)]:
-        words = f"'{brief(texts[strange[0]], 40)}' is not a number; {len(odd)} of {len(cells)} cells are not"
+        words = f"'{brief(texts[strange[0]], 40)}' is not a number ({len(odd)} of {len(cells)} cells)"
         words += "; write numbers only, put the unit in the header, and leave missing cells empty"
         raise ConfigError([table.fault(words, place, strange[0])])
     return np.array([np.nan if isinstance(cell, str) else cell * scale for cell in cells])

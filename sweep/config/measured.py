@@ -35,11 +35,15 @@ _SHAPE = """\
 # of a, b and c is fitted to the lowest tenth of its height, within {misfit:.2g} m.
 """
 _BODY = """\
-# The errors behind ± are to first order, for independent measurements; brackets hold mean and error of a normal #
-distribution. units: {units} body: {entries} # These are guesses: of dry friction on wood, of a drag that stops the spin
-within a minute, and of a start in the sense # that turns back.  `run` shows what they lead to, and `fit` finds them
-from a film. friction: {{law: coulomb, mu: 0.3, regularisation: sqrt, speed: 5.0e-3, sigma: {sigma:.2g}}} start: {{n0:
-{n0:g}, x0: {x0:.2g}, y0: {y0:.2g}}}
+# The errors behind ± are to first order, for independent measurements; brackets hold mean and error of a normal
+# distribution.
+units: {units}
+body:
+{entries}
+# These are guesses: of dry friction on wood, of a drag that stops the spin within a minute, and of a start in the sense
+# that turns back.  `run` shows what they lead to, and `fit` finds them from a film.
+friction: {{law: coulomb, mu: 0.3, regularisation: sqrt, speed: 5.0e-3, sigma: {sigma:.2g}}}
+start: {{n0: {n0:g}, x0: {x0:.2g}, y0: {y0:.2g}}}
 """
 
 _SPIN, _LASTS = 5.0, 20.0

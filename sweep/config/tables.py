@@ -138,7 +138,7 @@ def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separat
     words = f"{values} values, but {columns} columns in line {top}, with {SEPARATORS[separator]} between them"
     words += f"; {len(ragged)} of {len(rows)} rows are like this" if len(ragged) > 1 else ""
     if separator == "," and values > columns:
-        words += "; separate the columns by semicolons if numbers have decimal commas"
+        words += "; use semicolons between columns if numbers have decimal commas"
     raise fault_of(words, file=file, line=line)
 
 

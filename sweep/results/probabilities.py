@@ -15,7 +15,7 @@ _END = "end of the 95 % interval of the probability, by Wilson's formula; it is 
 PROBABILITIES = {
     name: Variable("float64", NUMBER, long_name, description, along="count")
     for name, long_name, description in (
-        ("probability", "probability of at least this many spin reversals", ""),
+        ("probability", "probability of at least this many reversals", ""),
         ("probability_low", "probability, lower end of its 95 % interval", f"Lower {_END}"),
         ("probability_high", "probability, upper end of its 95 % interval", f"Upper {_END}"),
     )

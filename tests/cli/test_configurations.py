@@ -144,7 +144,7 @@ def test_a_copied_example_loads_measures_what_it_draws_and_is_not_overwritten(na
     assert (config.name, config.grid.size > 1) == (name, True)
     check_pictures(config)
     (folder / f"{name}.yaml").write_text("mine", encoding="utf-8")
-    refused(invoke("examples", name, "--output", folder), f"{name}.yaml: exists already; choose another folder")
+    refused(invoke("examples", name, "--output", folder), f"{name}.yaml: already exists; choose another folder")
     assert (folder / f"{name}.yaml").read_text(encoding="utf-8") == "mine"
 
 

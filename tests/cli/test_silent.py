@@ -32,7 +32,7 @@ def file(tmp_path: Path) -> Path:
         ("--var status --limits 0..5", "limits: status is drawn as categories, which have no scale; leave them out"),
         ("--sel n0=0.02 --cmap gray", "cmap: reversals_predicted is drawn as a curve, which has no colour scale"),
         ("--sel n0=5", "sel: n0 = 5 is far from all its values, 0.02 to 0.05; choose one of them"),
-        ("--sel n0=0.02 --sel n0=0.05", "--sel n0=0.05: n0 has another value already; draw one picture for each"),
+        ("--sel n0=0.02 --sel n0=0.05", "--sel n0=0.05: n0 is given twice; draw one picture for each value"),
         ("--var reversals_predict", "no variable reversals_predict (did you mean reversals_predicted?); choose"),
     ],
 )
@@ -78,7 +78,7 @@ def test_the_time_between_samples_is_a_positive_number(every: Any) -> None:
         sweep.trajectory({"model": "averaged", "friction": {"mu": 60}}, t_end=20, every=every)
 
 
-TAKEN = "taking the first value of each axis that is not named: "
+TAKEN = "taking the first value of each axis not given: "
 
 
 def test_a_trajectory_says_which_values_it_takes(write: Write, tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_cells_that_miss_the_tolerance_do_not_set_a_step() -> None:
 
 
 def test_a_status_that_was_averaged_is_no_status() -> None:
-    assert summary(status=("mu", [1.5, 2.0])) == "no status of single cells: averaged"
+    assert summary(status=("mu", [1.5, 2.0])) == "no status of individual cells: averaged"
 
 
 def test_a_probability_that_nobody_knows_is_no_number() -> None:

@@ -91,7 +91,7 @@ def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_pa
     reporter = Heard()
     found = swept(write(TEXT), tmp_path, reporter=reporter)
     same_numbers(found, edge)
-    assert "12 of 18 cells are taken over" in reporter.notes[0]
+    assert "12 of 18 cells are reused" in reporter.notes[0]
     assert found.attrs["impossible"] == edge.attrs["impossible"]
 
 
