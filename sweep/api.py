@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from distributed import Client
     from matplotlib.animation import FuncAnimation
+    from matplotlib.figure import Figure
 
     from sweep.config import Config, ConfigError, ConfigLike, load_config
     from sweep.config.film import Film
@@ -495,13 +496,19 @@ class Accessor:
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
-    def plot(self, variable: str | None = None, **options: Any) -> Any:
+    def __repr__(self) -> str:
+        from sweep.results.summary import describe
+
+        title = self._dataset.attrs.get("title", "no title")
+        return f"<sweep: {title}>\n{describe(self._dataset)}\nMethods: plot(), trajectory()"
+
+    def plot(self, variable: str | None = None, **options: Any) -> Figure:
         """Draw the dataset; arguments, figure and errors as for `sweep.plot`."""
         from sweep.plots.picture import plot  # loads matplotlib
 
         return plot(self._dataset, variable, **options)
 
-    def trajectory(self, **values: Any) -> Any:
+    def trajectory(self, **values: Any) -> xr.Dataset:
         """Follow individual cells with dense output, using the configuration of the dataset.
 
         Parameters

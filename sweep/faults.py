@@ -59,11 +59,16 @@ def counted(number: int, noun: str, plural: str = "") -> str:
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 
+_CLOCK = ((172800, 86400, "days", 3600, "h"), (3600, 3600, "h", 60, "min"), (120, 60, "min", 1, "s"))
+"""For each unit of time: seconds above which it is used, its size in seconds, and the next smaller unit."""
+
+
 def duration(seconds: float) -> str:
-    """Return a time in a unit that people use, such as "0.35 s", "57 min", "3.4 h" or "120 days"."""
-    for size, unit in ((86400, "days"), (3600, "h"), (60, "min")):
-        if seconds >= 2 * size:
-            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    """Return a time as people say it, such as "0.35 s", "57 min", "1 h 20 min" or "120 days"."""
+    for start, size, unit, part, smaller in _CLOCK:
+        if seconds >= start:
+            whole, rest = divmod(round(seconds / part), size // part)
+            return f"{round(seconds / size)} {unit}" if whole >= 10 or not rest else f"{whole} {unit} {rest} {smaller}"
     return "under 1 ms" if 0 < seconds < 1e-3 else f"{float(f'{seconds:.2g}'):g} s"
 
 

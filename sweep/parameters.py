@@ -64,10 +64,13 @@ class Parameter:
 
     @property
     def allowed(self) -> str:
-        """Return the bounds in words, for messages to the user."""
+        """Permitted values in words, for messages to the user."""
+        return f"a finite number {self.bounds()}".rstrip()
+
+    def bounds(self, largest: float = inf) -> str:
+        """Return the bounds below `largest`, such as "> 0 and < 1"."""
         marks = ((">", self.above), (">=", self.at_least), ("<", self.below))
-        bounds = " and ".join(f"{sign} {bound:.6g}" for sign, bound in marks if abs(bound) != inf)
-        return f"a finite number {bounds}".rstrip()
+        return " and ".join(f"{sign} {bound:.6g}" for sign, bound in marks if abs(bound) < largest)
 
 
 SI_ALONE = ("mass", "gravity")

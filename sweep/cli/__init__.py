@@ -8,7 +8,7 @@ from __future__ import annotations
 import click
 
 from sweep.cli import environment
-from sweep.cli.configurations import body, examples
+from sweep.cli.configurations import body, examples, parameters
 from sweep.cli.faults import Commands
 from sweep.cli.reports import bench, reproduce
 from sweep.cli.results import explore, info, plot
@@ -30,6 +30,7 @@ def main() -> None:
 
 
 for _command in (
-    examples, body, run, trajectory, animate, boundaries, critical, indices, fit, reproduce, bench, plot, info, explore,
+    examples, parameters, body, run, trajectory, animate, boundaries, critical, indices, fit, reproduce, bench, plot,
+    info, explore,
 ):  # fmt: skip
     main.add_command(_command)

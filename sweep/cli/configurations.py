@@ -1,4 +1,4 @@
-"""The commands that write a configuration: `body` and `examples`."""
+"""The commands that help to write a configuration: `body`, `examples` and `parameters`."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
 @click.argument("name", required=False)
 @click.option("--output", type=PATH, default=".", help="Folder to copy the example to [default: the current one].")
 def examples(name: str | None, output: Path) -> None:
-    """List the configurations that come with the package, or copy the one called NAME.
+    """List the examples of the package, or copy the example NAME.
 
     The model file and film of an example are copied too, if it has any. No file is overwritten.
     """
@@ -85,3 +85,20 @@ def examples(name: str | None, output: Path) -> None:
     for path in copied:
         shutil.copyfile(path, output / path.name)
         say(f"wrote {output / path.name}")
+
+
+@click.command()
+def parameters() -> None:
+    """List the parameters of a configuration.
+
+    Each takes a number, a list, a range such as {start: 20, stop: 200, num: 41, spacing: log}, or a distribution such
+    as {normal: [60, 5]}. The list gives units, defaults and bounds.
+    """
+    text = click.HelpFormatter(max_width=100)
+    text.write_dl([(p.path, _summary(p)) for p in PARAMETERS.values()])
+    say(text.getvalue().rstrip())
+
+
+def _summary(parameter: Parameter) -> str:
+    default = "" if parameter.default is None else f"default {parameter.default:g}"
+    return "; ".join(filter(None, [parameter.meaning, default, parameter.bounds(1e3)]))

@@ -16,9 +16,9 @@ from sweep.cli.options import report_folder
 @click.command()
 @report_folder("runs/reproduce")
 def reproduce(output: Path) -> None:
-    """Recompute the numbers and figures of Takano (2011) and compare them in one HTML report.
+    """Recompute the numbers and figures of Takano (2011).
 
-    The exit code is 0 if every row agrees, 1 otherwise.
+    Writes one HTML report, which compares them with the paper. The exit code is 0 if every row agrees, 1 otherwise.
     """
     from sweep.reproduce import reproduce as compare
 
@@ -28,14 +28,14 @@ def reproduce(output: Path) -> None:
 @click.command()
 @report_folder("runs/bench")
 def bench(output: Path) -> None:
-    """Measure speed against error for every method and model, and run difficult cases.
+    """Measure speed against error, and run difficult cases.
 
-    Takes about two minutes on two cores; writes bench.html, bench.png and bench.csv. The exit code is 0 if all
-    difficult cases pass, 1 otherwise; speed and error are reported but not judged.
+    Covers every method and model. Takes about two minutes on two cores; writes bench.html, bench.png and bench.csv. The
+    exit code is 0 if all difficult cases pass, 1 otherwise; speed and error are reported but not judged.
     """
     from sweep.bench import bench as measure
 
-    _write(measure, output, "bench.html, .png and .csv", "hard cases")
+    _write(measure, output, "bench.html, .png and .csv", "cases")
 
 
 def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path, files: str, rows: str) -> NoReturn:

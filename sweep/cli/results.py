@@ -35,7 +35,7 @@ def plot(
     file: Path, variable: str | None, cells: tuple[str, ...], limits: str | None, no_title: bool, output: Path | None,
     **how: Any,
 ) -> None:  # fmt: skip
-    """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries."""
+    """Draw maps, curves, trajectories, critical spins or boundaries."""
     sel = dict[str, float]()
     for cell in cells:
         name, value = parse_pair(cell, "--sel")
@@ -59,13 +59,15 @@ def plot(
 
 @click.command()
 @FILE
-def info(file: Path) -> None:
-    """Summarise a dataset: axes, counts, agreement with the prediction, and provenance."""
+@click.option("--all", "whole", is_flag=True, help="Add meanings, units, all attributes and the configuration.")
+def info(file: Path, whole: bool) -> None:
+    """Summarise the results, accuracy and contents of a dataset."""
     from sweep.results.kind import opened
-    from sweep.results.summary import contents, describe
+    from sweep.results.summary import contents, describe, overview
 
     dataset = opened(file)
-    say("\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)]))
+    lines = [str(dataset.attrs.get("title", file.name)), describe(dataset), overview(dataset)]
+    say("\n".join([*lines, contents(dataset)] if whole else lines))
 
 
 @click.command()

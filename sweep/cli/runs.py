@@ -13,7 +13,6 @@ import click
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
 from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured, loaded
 from sweep.interrupt import INTERRUPTED
-from sweep.parameters import PARAMETERS
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, DEVIATIONS, SPIN_WIDTH, WIDTHS
 
 if TYPE_CHECKING:
@@ -25,15 +24,6 @@ if TYPE_CHECKING:
 
 
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
-
-
-def _parameter_help() -> str:
-    """The table of parameters as help text."""
-    lines = ["\b", "Parameters (a number, a list, or {start, stop, num, spacing: linear|log}):"]
-    for p in PARAMETERS.values():
-        default = "no default" if p.default is None else f"default {p.default:g}"
-        lines.append(f"  {p.path:24} {p.meaning}; {default}; {p.allowed}")
-    return "\n".join(lines)
 
 
 DRY_RUN = click.option(
@@ -53,7 +43,7 @@ def _resumed(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-@click.command(epilog=_parameter_help())
+@click.command()
 @configured
 @click.option("--rerun", type=click.Choice(["failed", "limit"]),
               help="Repeat only the cells of the dataset that failed, or that reached t_end.")  # fmt: skip
@@ -94,11 +84,11 @@ def trajectory(
     config: Config, cells: tuple[str, ...], samples: int | None, output: Path | None, dry_run: bool, quiet: bool,
     **how: Any,
 ) -> None:  # fmt: skip
-    """Follow individual cells of CONFIG with dense output, up to t_end.
+    """Follow individual cells with dense output.
 
-    Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip, normal force,
-    energy and the work of friction. Several trajectories share one set of panels; for samples, only the spins are
-    drawn.
+    They run to t_end of CONFIG. Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact
+    point, slip, normal force, energy and the work of friction. Several trajectories share one set of panels; for
+    samples, only the spins are drawn.
     """
     at = cells_of(cells, config.table)  # which takes no time; what is loaded then takes a second
     if dry_run:
@@ -131,7 +121,7 @@ def animate(
     source: Path, settings: tuple[str, ...], cells: tuple[str, ...], begin: float, end: float | None,
     speed: float | None, output: Path | None, quiet: bool,
 ) -> None:  # fmt: skip
-    """Animate the motion of bodies and the paths of their contact points on the table.
+    """Animate bodies and the paths of their contact points.
 
     CONFIG describes the bodies; FILE is a dataset written by `sweep trajectory` (NAME_trajectory.nc) or by `sweep fit`
     (NAME_fit.nc), which shows the filmed body and the fitted one. Bodies are shown side by side on a common clock,
@@ -172,11 +162,11 @@ def animate(
               help="Maximum interpolation error of a curve, as a fraction of the axis length.")  # fmt: skip
 @_resumed
 def boundaries(config: Config, x: str | None, y: str | None, bracket: float, deviation: float, **how: Any) -> None:
-    """Find the curves over two axes of CONFIG on which the number of reversals changes.
+    """Find the curves on which the number of reversals changes.
 
-    The grid locates the curves; further simulations refine them, so that each point lies between two simulated cells.
-    Writes NAME_boundaries.nc and .png. An interrupted search keeps finished simulations, and the same command resumes
-    it.
+    The grid of CONFIG locates the curves over two of its axes; further simulations refine them, so that each point lies
+    between two simulated cells. Writes NAME_boundaries.nc and .png. An interrupted search keeps finished simulations,
+    and the same command resumes it.
     """
     from sweep.studies.boundaries import boundaries as search
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sweep.config import Config
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.status import FAILURES
@@ -28,15 +27,6 @@ class Rules:
     """Whether each cell is run a second time, to estimate its error."""
     repeats: bool = False
     """Whether cells above the tolerance are repeated."""
-
-    @classmethod
-    def of(cls, config: Config) -> Rules:
-        """Return the rules of a configuration."""
-        said, fixed = config.integrator, config.integrator.step != "auto"
-        return cls(
-            said.t_end, said.tolerance, said.patience, said.stop_when_settled, fixed, said.estimate_errors,
-            config.repeats and not fixed,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -63,6 +53,11 @@ class Cells:
     @property
     def method(self) -> str:
         return self.kernel.method
+
+    def recorded(self, name: str) -> Array:
+        """Return a quantity of the state rows, shape (cells,); NaN if the kernel does not record it."""
+        table = self.kernel.table(self.images)
+        return table[name] if name in table.layout else np.full(len(self.images), np.nan)
 
     @property
     def status(self) -> Array:

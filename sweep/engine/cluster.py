@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numba
 
 from sweep.config import Config
-from sweep.engine.local import Done, run_batch
+from sweep.engine.local import Done, run_batch, split
 from sweep.engine.plan import kernels
 from sweep.grid import Tile
 from sweep.interrupt import point
@@ -56,7 +56,7 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
         build(kernels(config), APPROACH)  # once, into the cache that those workers read
     # A task's result rather than scattered data, which would be lost along with the workers that hold it.
     shared = client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
-    numbers = {client.submit(_work, shared, some, pure=False): some for some in _together(client, config, tiles, todo)}
+    numbers = {client.submit(_work, shared, some, pure=False): some for some in _tasks(client, config, tiles, todo)}
     for future in _arriving(as_completed(numbers, loop=client.loop)):
         try:
             done: list[Done] = future.result()
@@ -70,13 +70,11 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
         yield from done
 
 
-def _together(client: Client, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Sequence[int]]:
+def _tasks(client: Client, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[list[int]]:
     """Divide `todo` among tasks: enough cells in each to fill the lanes of a worker, but several for each worker."""
     threads = [*client.nthreads().values()] or [1]
-    largest = max((config.grid.part(tiles[i]).size for i in todo), default=1)
-    enough = max(threads) * LANES * _CELLS_A_LANE // largest
-    together = max(1, min(enough, len(todo) // (_TASKS_A_WORKER * len(threads))))
-    return (todo[first : first + together] for first in range(0, len(todo), together))
+    cells = max(threads) * LANES * _CELLS_A_LANE
+    return split(config.grid, tiles, todo, cells, len(todo) // (_TASKS_A_WORKER * len(threads)))
 
 
 def _on_this_machine(client: Client) -> bool:

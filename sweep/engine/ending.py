@@ -15,7 +15,6 @@ from sweep.engine.lives import RUN, Lives
 from sweep.engine.winding import watch, whole_blocks, winds_down
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.layout import Table
 from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
@@ -92,7 +91,7 @@ def too_early(cells: Cells, which: Array | bool = True) -> Array:
         return np.zeros(len(settled), bool)
     table = cells.kernel.table(cells.images)
     left = endings(table, settled).reversals
-    wound = _wound(table)
+    wound = cells.recorded(WOUND) > 0
     early, unknown = left > 0, np.flatnonzero(settled & np.isnan(left) & ~wound)
     early[wound] &= _error(cells)[0][wound] < _LARGEST
     if len(unknown):
@@ -131,7 +130,7 @@ def settle(cells: Cells, which: Array | bool = True) -> Array:
     error, fastest = _error(cells)
     final = (left.reversals == 0) & (left.nearest_approach > error * fastest)
     foreseen = late & ~final & np.isfinite(left.reversals) & (error < _LARGEST)
-    table["status"][late & ~foreseen & (final | _wound(table))] = SETTLED
+    table["status"][late & ~foreseen & (final | (cells.recorded(WOUND) > 0))] = SETTLED
     return np.asarray(foreseen)
 
 
@@ -139,8 +138,3 @@ def _error(cells: Cells) -> tuple[Array, Array]:
     """Return the relative error of the slow equations, and the fastest spin that the energy allows, (cells,)."""
     fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.images)["energy"], 0) / cells.inertia)
     return np.maximum(_NEGLECTED * bending(cells.columns) * fastest**2, _LEAST), fastest
-
-
-def _wound(table: Table) -> Array:
-    """Return which rattles were watched, and will wind down without a reversal, shape (cells,)."""
-    return np.asarray(table[WOUND] > 0) if WOUND in table.layout else np.zeros(len(table.images), bool)

@@ -197,9 +197,7 @@ def compare(part: Cells, companion: Cells) -> Errors:
     difference, size = np.abs(spins[0] - spins[1]), np.abs(spins[0]) + np.abs(spins[1])
     apart = np.divide(difference, size, out=np.zeros_like(size), where=~failed & (size > 0))
     counts = other["reversals"] if "reversals" in kernel.measure else np.nan
-    margins = np.full((len(EXTREMES), len(failed)), np.nan)
-    if "margin" in kernel.measure:
-        margins = np.stack([np.abs(table[name] - other[name]) for name in EXTREMES]) / larger
+    margins = np.stack([np.abs(part.recorded(name) - companion.recorded(name)) for name in EXTREMES]) / larger
     margins[:, failed] = np.nan
     spin = np.where(failed, np.inf, difference / larger)
     rattle = np.where(failed, np.nan, rattle / larger)

@@ -82,10 +82,15 @@ def batches(
     if left and set(left.tiles) <= set(todo):
         yield left.tiles, left
         todo = [i for i in todo if i not in left.tiles]
+    for batch in split(grid, tiles, todo, BATCH, len(todo)):
+        yield batch, None
+
+
+def split(grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], cells: int, most: int) -> Iterator[list[int]]:
+    """Split `todo` into batches of about `cells` cells, but at least one tile and at most `most` tiles."""
     largest = max((grid.part(tiles[i]).size for i in todo), default=1)
-    together = max(1, BATCH // largest)
-    for first in range(0, len(todo), together):
-        yield list(todo[first : first + together]), None
+    length = max(1, min(cells // largest, most))
+    return (list(todo[first : first + length]) for first in range(0, len(todo), length))
 
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:

@@ -115,9 +115,14 @@ def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
     return tuple(choices)
 
 
-def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step: Array, rules: Array) -> Cells:
+def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step: Array, step_rule: Array) -> Cells:
+    how, fixed = config.integrator, config.integrator.step != "auto"
+    rules = Rules(
+        how.t_end, how.tolerance, how.patience, how.stop_when_settled, fixed, how.estimate_errors,
+        config.repeats and not fixed,
+    )  # fmt: skip
     blank = np.full((6, len(cells)), np.nan), np.empty((0, 0))
-    return Cells(kernel, config.equations, Rules.of(config), cells, columns, step, rules, *blank)
+    return Cells(kernel, config.equations, rules, cells, columns, step, step_rule, *blank)
 
 
 def steps_of(method: str, config: Config, columns: Columns) -> tuple[Array, Array]:

@@ -39,6 +39,5 @@ def watch(cells: Cells, images: Array) -> None:
 
 def winds_down(cells: Cells) -> Array:
     """Return whose rattle will have wound down before `t_end`, so that the rest can be followed, (cells,)."""
-    table, (patience, t_end) = cells.kernel.table(cells.images), (cells.rules.patience or 0.0, cells.rules.t_end)
-    left = table[LEFT] if LEFT in table.layout else np.zeros(len(cells.cells))
+    patience, t_end, left = cells.rules.patience or 0.0, cells.rules.t_end, cells.recorded(LEFT)
     return np.asarray((left > 0) & (left * _WINDOW * patience < t_end - patience))

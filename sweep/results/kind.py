@@ -82,10 +82,13 @@ _MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
 _CODES = ("status", "level", "curve", "outcome")
 """Variables that become meaningless once averaged."""
 
-_TEXTS = ("title", "config", "x", "y", "surface", "pictured", "undetermined", "model_parameters", "model_brings")
+_TEXTS = (
+    "title", "config", "x", "y", "surface", "pictured", "undetermined", "verdict", "fits_because", "model_parameters",
+    "model_brings",
+)  # fmt: skip
 """Optional attributes that are texts."""
 
-_NUMBERS = ("wall_time", "trajectories_per_second")
+_NUMBERS = ("wall_time", "trajectories_per_second", "fits")
 """Optional attributes that are numbers."""
 
 _KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, RUN)}

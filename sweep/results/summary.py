@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from textwrap import fill
 
 import numpy as np
 import xarray as xr
@@ -24,6 +25,17 @@ def failed_fraction(dataset: xr.Dataset) -> float:
 def describe(dataset: xr.Dataset) -> str:
     """Summarise the results of a dataset of any kind in a few lines."""
     return "\n".join(_LINES.get(kind(dataset), _run)(dataset))
+
+
+def overview(dataset: xr.Dataset) -> str:
+    """Report the accuracy of a dataset, its variables by their axes, and its origin, all on one screen."""
+    over: dict[str, list[str]] = {}
+    for name, variable in dataset.data_vars.items():
+        over.setdefault(", ".join(map(str, variable.dims)) or "no axis", []).append(str(name))
+    lists = [f"over {axes}: {', '.join(names)}" for axes, names in over.items()]
+    origin = ", ".join(str(dataset.attrs[key]) for key in ("created", "versions") if key in dataset.attrs)
+    lines = [*accuracy(dataset), *lists, f"made {origin}" if origin else ""]
+    return "\n".join(fill(line, 100, subsequent_indent="  ") for line in lines if line)
 
 
 def contents(dataset: xr.Dataset) -> str:
@@ -159,14 +171,15 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         return
     status = np.ravel(dataset["status"].values)
     ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if code in status)
-    yield f"{_count(dataset['status'], 'cell')}: {ends or 'status unknown'}"
+    valid = np.isin(status, (SETTLED, TIME_LIMIT))
+    counts = f"; {_reversals(dataset, valid)}" if "reversals" in dataset and valid.any() else ""
+    yield f"{_count(dataset['status'], 'cell')}: {ends or 'status unknown'}{counts}"
+    if doubts := [*_doubts(dataset, valid)]:
+        yield "; ".join(doubts)
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
     if "simulated_share" in dataset.attrs:
         yield f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the rest are inferred"
-    valid = np.isin(status, (SETTLED, TIME_LIMIT))
-    if "reversals" in dataset and valid.any():
-        yield _reversals(dataset, valid)
     if "probability" in dataset and dataset["probability"].dims == ("count",):
         yield f"probability: {', '.join(_probabilities(dataset))}"
     if "misfit" in dataset and np.isfinite(dataset["misfit"]).any():
@@ -174,19 +187,32 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         where = ", ".join(f"{name} = {least[name].item():g}" for name in dataset["misfit"].dims)
         bound, at = (" at least", f", at {where}") if where else ("", "")
         yield f"misfit: {least.item():.6g}{bound}, of {dataset.attrs.get('film_instants', '?')} instants{at}"
+
+
+def _doubts(dataset: xr.Dataset, valid: np.ndarray) -> Iterator[str]:
+    """Say which cells need a look."""
+    cells = counted(valid.size, "cell")
+    if "step_rule" in dataset and (missed := int((dataset["step_rule"] == MISSED).sum())):
+        verb = "misses" if missed == 1 else "miss"
+        error = f": spin errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
+        yield f"{missed} of {cells} {verb} the tolerance{error}"
+    if "decided" in dataset and (open_ := int((valid & (np.ravel(dataset["decided"].values) == 0)).sum())):
+        yield f"{counted(open_, 'count is', 'counts are')} uncertain"
+
+
+def accuracy(dataset: xr.Dataset) -> Iterator[str]:
+    """Report errors, steps and cost of a run."""
     for name, words in (("spin", ", as estimated"), ("energy", "")):
         error = dataset[f"{name}_error"].values if f"{name}_error" in dataset else np.empty(0)
         if np.isfinite(error).any():
             yield f"{name} error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}{words}"
-    if {"step", "step_rule"} <= {*dataset.data_vars} and (status != IMPOSSIBLE).any():
-        rule, step = (np.ravel(dataset[name].values)[status != IMPOSSIBLE] for name in ("step_rule", "step"))
-        found = {name: int((rule == code).sum()) for code, name in STEP_RULES.items() if code in rule}
-        missed = found.pop(STEP_RULES[MISSED], 0)
-        who = ", ".join(f"{name} in {counted(count, 'cell')}" for name, count in found.items())
+    names = ("status", "step_rule", "step")
+    if {*names} <= {*dataset.data_vars} and (dataset["status"] != IMPOSSIBLE).any():
+        status, rule, step = (np.ravel(dataset[name].values) for name in names)
+        step, rule = step[status != IMPOSSIBLE], rule[(status != IMPOSSIBLE) & (rule != MISSED)]
+        rules = {name: int((rule == code).sum()) for code, name in STEP_RULES.items() if code in rule}
+        who = ", ".join(f"{name} in {counted(count, 'cell')}" for name, count in rules.items())
         yield f"step: {step.min():.3g} to {step.max():.3g}{f', set by {who}' if who else ''}"
-        if missed:
-            verb = "misses" if missed == 1 else "miss"
-            yield f"tolerance: {missed} of {counted(status.size, 'cell')} {verb} the requested tolerance"
     if "wall_time" in dataset.attrs:
         rate = dataset.attrs.get("trajectories_per_second", np.nan)
         yield f"cost: {duration(dataset.attrs['wall_time'])}, {rate:.3g} trajectories/s"
@@ -206,12 +232,13 @@ def _interval(value: float, low: float, high: float) -> str:
 
 
 def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:
-    counted = np.ravel(dataset["reversals"].values)[valid].astype(int)
-    line = f"reversals: {counted.min()} to {counted.max()}"
+    counts = np.ravel(dataset["reversals"].values)[valid].astype(int)
+    least, most = counts.min(), counts.max()
+    text = f"{f'{least} to ' if least < most else ''}{counted(most, 'reversal')}"
     if "reversals_predicted" not in dataset:
-        return line
-    off = abs(counted - np.ravel(dataset["reversals_predicted"].values)[valid])
-    return f"{line}; as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
+        return text
+    off = abs(counts - np.ravel(dataset["reversals_predicted"].values)[valid])
+    return f"{text}, as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
 
 
 _LINES: dict[Kind | None, Callable[[xr.Dataset], Iterator[str]]] = {

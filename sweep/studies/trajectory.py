@@ -154,7 +154,11 @@ def trajectory(
 
 
 def first_values(config: Config, at: Mapping[str, Any]) -> str:
-    """Name the axes of `config` that take their first value because `at` does not give one; "" if there are none."""
+    """Name the axes of `config` that take their first value because `at` does not give one; "" if there are none.
+
+    Raises a `ConfigError` first if the cells cannot be run.
+    """
+    choose(config, at)
     config = config.at_medians
     columns = {name: value.numbers for name, value in config.parameters.items()} | config.cases
     left = [f"{name} = {values[0]:g}" for name, values in columns.items() if len({*values}) > 1 and name not in at]
