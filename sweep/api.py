@@ -52,13 +52,13 @@ def _prepared(
 ) -> Iterator[tuple[Config, Reporter]]:
     """Yield the checked configuration of a call, and the reporter of its progress."""
     from sweep.config import load_config
-    from sweep.progress import shown
+    from sweep.progress import reporting
 
     register()
-    with shown(progress, reporter) as told:
-        checked = load_config(config, overrides, announce=told.note)
+    with reporting(progress, reporter) as reporter:
+        checked = load_config(config, overrides, announce=reporter.note)
         _refuse_arguments(checked)
-        yield checked, told
+        yield checked, reporter
 
 
 def _refuse_arguments(config: Config) -> None:
@@ -125,8 +125,8 @@ def run(
     """
     from sweep.engine.run import run
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, client=client)
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return run(checked, output, fresh=fresh, rerun=rerun, reporter=reporter, client=client)
 
 
 def boundaries(
@@ -175,11 +175,11 @@ def boundaries(
     ('n0', 'mu')
     """
     from sweep.studies.boundaries import boundaries
-    from sweep.studies.kept import kept
+    from sweep.studies.study import run_study
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
         task = boundaries(checked, x, y, bracket, deviation)
-        return kept(task, output, fresh=fresh, reporter=told, client=client)
+        return run_study(task, output, fresh=fresh, reporter=reporter, client=client)
 
 
 def critical(
@@ -222,10 +222,10 @@ def critical(
     '0.005'
     """
     from sweep.studies.critical import critical
-    from sweep.studies.kept import kept
+    from sweep.studies.study import run_study
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(critical(checked, bracket), output, fresh=fresh, reporter=told, client=client)
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return run_study(critical(checked, bracket), output, fresh=fresh, reporter=reporter, client=client)
 
 
 def trajectory(
@@ -280,9 +280,9 @@ def trajectory(
     known = parameters_of(config, values)
     cells = {name: value for name, value in values.items() if name in known}
     settings = {name: value for name, value in values.items() if name not in known}
-    with _prepared(config, settings, progress, reporter) as (checked, told):
+    with _prepared(config, settings, progress, reporter) as (checked, reporter):
         found = trajectory(
-            checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
+            checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=reporter, **cells
         )
     if cells and (words := first_values(checked, cells)):
         warn(words, stacklevel=2)
@@ -332,11 +332,11 @@ def animate(
     if output is not None:
         animation.check(Path(output))
     if animation.is_dataset(source):
-        from sweep.progress import shown as told_by
+        from sweep.progress import reporting
         from sweep.studies.filmed import shown
 
-        with told_by(progress, reporter) as told:
-            of_file = shown(source, told)
+        with reporting(progress, reporter) as reporter:
+            of_file = shown(source, reporter)
         return animation.animate(of_file, output, begin=begin, end=end, speed=speed, **values)
     followed = trajectory(cast("ConfigLike", source), progress=progress, reporter=reporter, **values)
     return animation.animate(followed, output, begin=begin, end=end, speed=speed)
@@ -389,8 +389,8 @@ def fit(
     """
     from sweep.studies.laws import fitted
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return fitted(checked, film, free, laws, told, (time_column, spin_column))
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return fitted(checked, film, free, laws, reporter, (time_column, spin_column))
 
 
 def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
@@ -456,10 +456,10 @@ def indices(
         as `run`; also if the model is a formula, no parameter is a distribution, or one is an axis.
     """
     from sweep.studies.indices import indices
-    from sweep.studies.kept import kept
+    from sweep.studies.study import run_study
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(indices(checked), output, fresh=fresh, reporter=told, client=client)
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return run_study(indices(checked), output, fresh=fresh, reporter=reporter, client=client)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:

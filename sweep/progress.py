@@ -18,7 +18,7 @@ from sweep.engine.reporter import Reporter
 from sweep.jit import showing
 
 
-def shown(progress: bool | None, reporter: Reporter | None = None) -> AbstractContextManager[Reporter]:
+def reporting(progress: bool | None, reporter: Reporter | None = None) -> AbstractContextManager[Reporter]:
     """Choose the reporter of a call: `reporter` if it is given, otherwise a progress bar if one is wanted.
 
     Parameters
@@ -61,7 +61,7 @@ class Terminal(Reporter):
         self.console = _Console(stderr=True, quiet=quiet, highlight=False, force_jupyter=widgets)
         self.last: Done | None = None
         self._bar: Progress | None = None
-        self._told = False
+        self._announced = False
         self._logged = time.monotonic()
 
     def __enter__(self) -> Terminal:
@@ -82,9 +82,9 @@ class Terminal(Reporter):
             with self.console.status(_COMPILING):
                 yield
         else:
-            if not self._told:
+            if not self._announced:
                 self.note(_COMPILING)
-            self._told = True
+            self._announced = True
             yield
 
     def note(self, message: str) -> None:

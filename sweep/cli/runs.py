@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from sweep.config import Config
     from sweep.results.folder import RunFiles
-    from sweep.studies.kept import Task
+    from sweep.studies.study import Task
 
 
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
@@ -274,9 +274,9 @@ def _save(result: xr.Dataset, files: RunFiles) -> None:
 def _studied(task: Task, **how: Any) -> None:
     """Carry out a study and report the result, as `_written`."""
     from sweep.studies import estimates
-    from sweep.studies.kept import kept
+    from sweep.studies.study import run_study
 
-    _written(task.config, task.verb, partial(kept, task), partial(estimates.of, task), **how)
+    _written(task.config, task.verb, partial(run_study, task), partial(estimates.of, task), **how)
 
 
 def _written(

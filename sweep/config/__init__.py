@@ -18,7 +18,7 @@ from sweep.config import cases, cross_checks, document, film, schema, user_model
 from sweep.config.configuration import FIRST_AXES, Config, film_in, model_of
 from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
-from sweep.config.messages import describe
+from sweep.config.messages import explain
 from sweep.config.schema import Integrator
 from sweep.config.values import Values, in_si
 from sweep.faults import ConfigError, Fault
@@ -81,7 +81,7 @@ def load_config(
     try:
         values = kind.model_validate(source.values)
     except ValidationError as error:
-        found = describe(error.errors(), kind).items()
+        found = explain(error.errors(), kind).items()
         raise ConfigError(source.fault(path, text, at_key=key) for path, (text, key) in found) from None
     return _resolve(values, source, origin)
 

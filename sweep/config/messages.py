@@ -38,7 +38,7 @@ def wrong(reason: str, *at: str | int) -> PydanticCustomError:
     return PydanticCustomError("value", "{reason}", {"reason": reason, "at": at})
 
 
-def describe(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple[str, bool]]:
+def explain(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple[str, bool]]:
     """Map the path of each of pydantic's errors to a message, and to whether the key itself is wrong."""
     found, sections = {}, _sections(schema)
     for error in errors:

@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from sweep.config.distributions import FAMILIES, Distribution
 from sweep.config.document import is_number, number, plain_data
-from sweep.config.messages import describe, wrong
+from sweep.config.messages import explain, wrong
 from sweep.faults import either, fault_of, refusal
 from sweep.parameters import Parameter
 from sweep.units import ANGLE, NUMERAL, WRITTEN, Unit, quantity, unit_in, unit_of
@@ -150,7 +150,7 @@ def _parse_range(parameter: Parameter, raw: dict[str, Any]) -> Values:
         span = Range.model_validate(raw)
     except ValidationError as error:
         # Report an unknown key first: it explains why another is missing.
-        path, (message, _) = max(describe(error.errors(), Range).items(), key=lambda found: found[1][1])
+        path, (message, _) = max(explain(error.errors(), Range).items(), key=lambda found: found[1][1])
         raise wrong(message, *path) from None
     for value in (numbers := span.values()):
         if not parameter.allows(value):

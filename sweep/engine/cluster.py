@@ -102,7 +102,7 @@ Shared = tuple[Config, list[Tile], Identity]
 _one_tile = threading.Lock()
 
 
-def _work(shared: Shared, together: Sequence[int]) -> list[Done]:
+def _work(shared: Shared, batch: Sequence[int]) -> list[Done]:
     from distributed import get_worker
 
     config, tiles, identity = shared
@@ -112,7 +112,7 @@ def _work(shared: Shared, together: Sequence[int]) -> list[Done]:
     with _one_tile:
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         numba.set_num_threads(min(get_worker().state.nthreads, most))
-        return list(run_batch(config, tiles, together))
+        return list(run_batch(config, tiles, batch))
 
 
 @contextmanager

@@ -102,7 +102,7 @@ class Errors(NamedTuple):
     """Estimated error of the margin to one reversal more."""
 
     @property
-    def told(self) -> Array:
+    def reported(self) -> Array:
         """Return the estimated error of the final spin, shape (cells,)."""
         return np.asarray(np.fmax(self.spin, self.least))
 
@@ -136,7 +136,7 @@ def after_companion(lives: Lives, rows: Array) -> Array:
     long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
     again = (large | by_chance) & ~hopeless & ~long & (notes["repeats"][rows] < ROUNDS) & rules.repeats
     if not rules.fixed:
-        missed = rows[~again & (errors.told > limit)]
+        missed = rows[~again & (errors.reported > limit)]
         notes["step_rule"][missed] = MISSED
     lives.cells.images[rows] = now.images
     lives.note(rows, ERRORS, stack(errors).T)
@@ -174,7 +174,7 @@ def companions(part: Cells) -> Array:
     return part.start(part.kernel.table(part.images)["step"] * _ratio(part), part.times)
 
 
-def told(lives: Lives) -> Errors:
+def errors_of(lives: Lives) -> Errors:
     """Return the errors of all cells, as far as known."""
     table = lives.cells.kernel.table(lives.cells.images)
     errors = Errors(*lives.notes.columns(ERRORS).T)
@@ -229,9 +229,9 @@ def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
         return found
     errors = Errors(*np.full((len(Errors._fields), len(found["status"])), np.nan))
     for each in lives:
-        for whole, part in zip(errors, told(each), strict=True):
+        for whole, part in zip(errors, errors_of(each), strict=True):
             whole[each.cells.cells] = part
-    found["spin_error"] = errors.told
+    found["spin_error"] = errors.reported
     if "reversals" in found:
         sound = ~np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
         found["sensitive"] = sound & (errors.reversals != found["reversals"])  # a failed companion has the count NaN

@@ -31,7 +31,7 @@ class Refined(Some):
         self._outcomes = Outcomes(np.zeros(size, np.int32), np.full(size, UNKNOWN, np.int8))
         bad = [config.equations.impossible(columns) for columns in distinct(self.grid, tuple(self.grid.axes))]
         self._outcomes.status[np.concatenate(bad)] = IMPOSSIBLE  # impossible bodies need not be simulated
-        self._told = Outcomes(*(each.copy() for each in self._outcomes))
+        self._inferred = Outcomes(*(each.copy() for each in self._outcomes))
         """Known outcomes of the nodes, simulated or inferred."""
         self._margins = {name: np.full(size, np.nan) for name in ("margin_more", "margin_fewer")}
         self._learned = 0
@@ -64,10 +64,10 @@ class Refined(Some):
         known = Outcomes(*(each[nodes] for each in self._outcomes))
         if self._shape:
             counts = Counts.of({**known._asdict(), **{name: each[nodes] for name, each in self._margins.items()}})
-            new, told = search(self._shape, known, counts, self.config.refine)
+            new, outcomes = search(self._shape, known, counts, self.config.refine)
         else:
-            new, told = np.flatnonzero(known.status == UNKNOWN), known
-        for whole, part in zip(self._told, told, strict=True):
+            new, outcomes = np.flatnonzero(known.status == UNKNOWN), known
+        for whole, part in zip(self._inferred, outcomes, strict=True):
             whole[nodes] = part
         return nodes[new]
 
@@ -84,4 +84,4 @@ class Refined(Some):
         # No flag means "not simulated", so flags that cannot be inferred are left out.
         others = {n for n in found.keys() - arrays.keys() if n in dataset.VARIABLES and not dataset.VARIABLES[n].flags}
         self._place(self.cells, {name: found[name] for name in others - {"reversals"}}, arrays)
-        return arrays | self._told._asdict() | {"inferred": self._outcomes.status == UNKNOWN}
+        return arrays | self._inferred._asdict() | {"inferred": self._outcomes.status == UNKNOWN}

@@ -75,7 +75,7 @@ def search(shape: tuple[int, ...], simulated: Outcomes, counts: Counts, depth: i
     depth : the first nodes to simulate lie 2^depth apart; at least 1
     """
     known: Array = simulated.status != UNKNOWN
-    told = Outcomes(*(each.copy() for each in simulated))
+    outcomes = Outcomes(*(each.copy() for each in simulated))
     size, wanted = 2 ** (depth + 1), list[Nodes]()
     patches = _largest(shape, size)
     while len(patches):
@@ -84,29 +84,29 @@ def search(shape: tuple[int, ...], simulated: Outcomes, counts: Counts, depth: i
         wanted.append(nodes[~ready].ravel())
         if size == 2:
             break
-        patches = _infer(told, known, counts, nodes[ready], size, shape)
+        patches = _infer(outcomes, known, counts, nodes[ready], size, shape)
         size //= 2
     new = np.unique(np.concatenate(wanted))
     new = new[~known[new]]
     if not len(new):
-        doubtful = _beside_changes(told, shape) | _around_ends(told, shape) | (told.status == IMPOSSIBLE)
+        doubtful = _beside_changes(outcomes, shape) | _around_ends(outcomes, shape) | (outcomes.status == IMPOSSIBLE)
         new = np.flatnonzero(doubtful & ~known)
-    return new, told
+    return new, outcomes
 
 
-def _infer(told: Outcomes, known: Array, counts: Counts, nodes: Nodes, size: int, shape: tuple[int, ...]) -> Nodes:
+def _infer(outcomes: Outcomes, known: Array, counts: Counts, nodes: Nodes, size: int, shape: tuple[int, ...]) -> Nodes:
     """Infer the nodes between the known `nodes` of patches, one patch a row, in place; return the remaining parts."""
     first = nodes[:, :1]
     inside = first + _offsets(shape, range(size + 1))
     count, left = _by_margins(counts, nodes, size, len(shape))
-    alone = np.isnan(count[:, 0]) | (told.status[nodes] != told.status[first]).any(axis=1)
-    count[alone] = told.reversals[first][alone]
-    left[alone] = np.any(told.differ(nodes, first), axis=1)[alone, None]
-    here, status = known[inside], np.broadcast_to(told.status[first], inside.shape)
-    contradicted = (told.reversals[inside] != count) | (told.status[inside] != status)
+    alone = np.isnan(count[:, 0]) | (outcomes.status[nodes] != outcomes.status[first]).any(axis=1)
+    count[alone] = outcomes.reversals[first][alone]
+    left[alone] = np.any(outcomes.differ(nodes, first), axis=1)[alone, None]
+    here, status = known[inside], np.broadcast_to(outcomes.status[first], inside.shape)
+    contradicted = (outcomes.reversals[inside] != count) | (outcomes.status[inside] != status)
     left = np.where(here, contradicted, left)
     new = ~here & ~left
-    told.reversals[inside[new]], told.status[inside[new]] = count[new], status[new]
+    outcomes.reversals[inside[new]], outcomes.status[inside[new]] = count[new], status[new]
     return _parts(nodes[:, 0], left, size, shape)
 
 
@@ -167,19 +167,19 @@ def _over(weights: Array, axes: int) -> Array:
     return reduce(np.kron, [weights] * axes)
 
 
-def _beside_changes(told: Outcomes, shape: tuple[int, ...]) -> Array:
+def _beside_changes(outcomes: Outcomes, shape: tuple[int, ...]) -> Array:
     """Return the nodes with a neighbour along an axis that has another outcome, shape (nodes,)."""
-    beside, index = np.zeros(len(told.status), bool), np.arange(len(told.status)).reshape(shape)
+    beside, index = np.zeros(len(outcomes.status), bool), np.arange(len(outcomes.status)).reshape(shape)
     for axis in range(len(shape)):
         along = np.moveaxis(index, axis, 0)
-        changes = told.differ(along[:-1], along[1:])
+        changes = outcomes.differ(along[:-1], along[1:])
         beside[along[:-1][changes]] = beside[along[1:][changes]] = True
     return beside
 
 
-def _around_ends(told: Outcomes, shape: tuple[int, ...]) -> Array:
+def _around_ends(outcomes: Outcomes, shape: tuple[int, ...]) -> Array:
     """Return the nodes near one with hardly a neighbour (diagonals included) of its outcome, shape (nodes,)."""
-    outcome = np.stack([each.reshape(shape) for each in told], axis=-1)
+    outcome = np.stack([each.reshape(shape) for each in outcomes], axis=-1)
     padded = np.pad(outcome, [(1, 1)] * len(shape) + [(0, 0)], mode="edge")
     alike = np.zeros(shape, np.int8)  # including the node itself
     for offset in product(range(3), repeat=len(shape)):

@@ -74,10 +74,10 @@ class Counts:
         times as much as even.
         """
         width, count = self.more + self.fewer, self._count
-        told = np.isfinite(width) & self.known & self._dips
-        widths = np.full(count.max(initial=0) + 1, np.median(width[told]) if told.any() else 0.0)
-        for k in np.unique(count[told]):
-            widths[k] = np.median(width[told & (count == k)])
+        usable = np.isfinite(width) & self.known & self._dips
+        widths = np.full(count.max(initial=0) + 1, np.median(width[usable]) if usable.any() else 0.0)
+        for k in np.unique(count[usable]):
+            widths[k] = np.median(width[usable & (count == k)])
         return np.concatenate([[0.0], np.cumsum(widths)])
 
     @cached_property

@@ -3,8 +3,8 @@
 A run is computed in tiles, which are numbered. A store keeps the results of finished tiles and, between two chunks of
 work, the state rows of running tiles, so that a stopped run can be resumed.
 
-To add a store, write a subclass in its own file and use it in `sweep.engine.run` or `sweep.studies.kept`. No other code
-knows which store it uses.
+To add a store, write a subclass in its own file and use it in `sweep.engine.run` or `sweep.studies.study`. No other
+code knows which store it uses.
 """
 
 from __future__ import annotations

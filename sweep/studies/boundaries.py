@@ -27,8 +27,8 @@ from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
 from sweep.studies import DEVIATIONS, WIDTHS
 from sweep.studies.curve import Cell, Curve, Middle, Point
-from sweep.studies.kept import Task
 from sweep.studies.search import Search, measuring, require_between, require_certain
+from sweep.studies.study import Task
 
 # Largest rounding error of a whole index along an edge of the grid. `_levelled` keeps points on diagonals farther away.
 _ON = 1e-9
@@ -126,7 +126,7 @@ class Boundaries(Search):
     def dataset(self) -> xr.Dataset:
         """Return the dataset of the points, with the cost of the search."""
         columns = self._columns()
-        head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.told()
+        head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.attributes()
         middles = [middle for curve in self.curves for middle in curve.middles.values()]
         head |= {
             "deviation": self.deviation,

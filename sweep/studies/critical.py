@@ -21,9 +21,9 @@ from sweep.results.dataset import Reason
 from sweep.results.margins import Counts
 from sweep.results.store import Store
 from sweep.studies import WIDTHS
-from sweep.studies.kept import Task
 from sweep.studies.roots import Root
 from sweep.studies.search import Search, measuring, require_between, require_certain
+from sweep.studies.study import Task
 
 RATIO = 1.25
 """Ratio of successive spins in the outward search."""
@@ -192,7 +192,7 @@ class CriticalSpins(Search):
         four = np.concatenate([self.first, second])
         arrays["critical_reason"] = four[(four != Reason.EXISTS).argmax(axis=0), np.arange(self.grid.size)]
         title = f"{self.config.name}: critical spins ({self.config.model} model)"
-        return dataset.label(self.config, self.grid, arrays, {"title": title, **self.told()}).drop_vars("n0")
+        return dataset.label(self.config, self.grid, arrays, {"title": title, **self.attributes()}).drop_vars("n0")
 
 
 def _way(n_c1: float, limit: float) -> list[float]:

@@ -6,7 +6,7 @@ from sweep.engine.estimate import estimate as of_run
 from sweep.results.store import Store
 from sweep.studies.boundaries import Boundaries
 from sweep.studies.critical import CriticalSpins
-from sweep.studies.kept import Task
+from sweep.studies.study import Task
 
 _A_POINT = 8
 """Typical number of simulations that narrow a bracket of a boundary to the usual width."""

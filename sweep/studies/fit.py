@@ -30,10 +30,10 @@ from sweep.results import dataset
 from sweep.results.kind import FIT
 from sweep.results.provenance import provenance
 from sweep.studies import ranges, verdict
+from sweep.studies.concurrent import run_concurrently
 from sweep.studies.intervals import LEVELS, blind, covariance, intervals, variance
 from sweep.studies.misfit import ENOUGH, UNKNOWNS, Minimum, Problem, minimise
 from sweep.studies.search import require_simulated
-from sweep.studies.together import together
 from sweep.units import ANGLE, SPIN, TIME
 from sweep.variables import Variable
 
@@ -180,7 +180,7 @@ def _minimised(
 ) -> list[Minimum]:
     """Return the minima near these places, lowest first, over the film or its first instants."""
     answers = partial(problem.answers, instants=instants)
-    return _different(together([partial(minimise, place=place, enough=enough) for place in places], answers))
+    return _different(run_concurrently([partial(minimise, place=place, enough=enough) for place in places], answers))
 
 
 def _settled(
@@ -221,7 +221,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
     deviation, rows = np.sqrt(np.diag(spread)), problem.rows
     fitted = film.value + verdict.of_film(problem, best) * film.errors
     judged, edge = verdict.judged(problem, best), _ends(problem, limits)
-    told, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
+    shown, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
         f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})
         for k, level in enumerate(LEVELS)
@@ -241,8 +241,8 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
             "correlation": (("parameter", "other"), spread / np.outer(deviation, deviation)),
             "minimum": (("rank", "parameter"), problem.values(np.array([each.place for each in minima]))),
             "misfit": ("rank", [each.misfit / unit for each in minima], {"long_name": "chi square of a minimum"}),
-            "seen": ("time", film.value, told),
-            "fitted": ("time", fitted, told),
+            "seen": ("time", film.value, shown),
+            "fitted": ("time", fitted, shown),
             "outlier": ("time", ~problem.kept, {"long_name": "row that is left out"}),
         },
         {"parameter": names, "other": names, "time": ("time", film.time, clock)},

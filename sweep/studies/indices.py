@@ -17,8 +17,8 @@ from sweep.engine.whole import Whole
 from sweep.grid import Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.results.dataset import variables
-from sweep.studies.kept import Task
 from sweep.studies.search import require_simulated
+from sweep.studies.study import Task
 from sweep.units import NUMBER
 from sweep.variables import Variable
 

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 
 from sweep.grid import Array
+from sweep.studies.concurrent import run_concurrently
 from sweep.studies.misfit import Ask, Minimum, Problem, minimise
-from sweep.studies.together import together
 
 LEVELS = {68: 1.0, 95: 3.84}
 """Percentages of the intervals, and rise of the misfit at their ends: quantiles of chi square for one parameter."""
@@ -48,7 +48,7 @@ def intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> t
         limits, lower = _profiles(problem, best, note, stops=restart < _RESTARTS)
         if lower is None:
             break
-        (best,) = together([partial(minimise, place=lower.place)], problem.answers)
+        (best,) = run_concurrently([partial(minimise, place=lower.place)], problem.answers)
         note(f"a lower minimum: {best.misfit:.6g}")
     return best, limits, restart > 1
 
@@ -59,7 +59,7 @@ def _profiles(
     """Return the ends of all intervals, shape (levels, 2, free), or, with `stops`, a lower minimum if one is met."""
     parameters = range(len(problem.free))
     sides = [partial(_side, problem=problem, best=best, i=i, sign=sign) for sign in (-1, 1) for i in parameters]
-    found = together(sides, problem.answers, lambda side: stops and side[1] is not None)
+    found = run_concurrently(sides, problem.answers, lambda side: stops and side[1] is not None)
     note(f"intervals: {problem.trajectories} trajectories so far")
     lower = min((each for _, each in found if each), key=lambda each: each.misfit, default=None)
     if lower and stops:
@@ -131,8 +131,8 @@ def blind(problem: Problem, best: Minimum) -> list[str]:
     for size, direction in zip(sizes[::-1], directions.T[::-1], strict=True):
         if 4 * np.sqrt(size) > _BLIND:
             some = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
-            together = " and ".join(some) + (" together" if len(some) > 1 else "")
-            words.append(f"the film hardly determines {together}: the 95 % interval covers half of the range or more")
+            parameters = " and ".join(some) + (" together" if len(some) > 1 else "")
+            words.append(f"the film hardly determines {parameters}: the 95 % interval covers half of the range or more")
     deviation = np.sqrt(np.diag(spread))
     tied = spread / np.outer(deviation, deviation)
     words += [

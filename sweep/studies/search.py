@@ -111,7 +111,7 @@ class Search(Whole):
         """Return the tolerance with which brackets are narrowed to a width."""
         return min(self.config.integrator.tolerance, max(_FINER * width, ROUND_OFF))
 
-    def told(self) -> dict[str, Any]:
+    def attributes(self) -> dict[str, Any]:
         """Return the attributes of a dataset: its accuracy, provenance and cost."""
         simulations = self.tiles[-1][0].stop if self.tiles else 0
         exact = {"relative_width": self.width, "bracket_tolerance": self.sharp(self.width), "trajectories": simulations}

@@ -149,8 +149,8 @@ def trajectory(
     if not samples or not load_config(config).distributions.keys() - at.keys():
         return found
     numbers = np.arange(found.sizes["trajectory"]) % samples
-    told = {"long_name": SAMPLE, "description": dataset.ROWS[SAMPLE]}
-    return found.assign_coords({SAMPLE: ("trajectory", numbers, told)})
+    attributes = {"long_name": SAMPLE, "description": dataset.ROWS[SAMPLE]}
+    return found.assign_coords({SAMPLE: ("trajectory", numbers, attributes)})
 
 
 def first_values(config: Config, at: Mapping[str, Any]) -> str:

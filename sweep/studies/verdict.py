@@ -181,13 +181,13 @@ def _how(problem: Problem, verdict: Verdict, unit: str) -> str:
 
 def _known(config: Config, names: Sequence[str], values: Array, limits: Array, edge: Array) -> str:
     """Describe what is known, each value with its 95 % interval."""
-    told = []
+    phrases = []
     for name, value, (low, high), at in zip(names, values, limits.T, edge, strict=True):
         if not at:
             words = config.described(name)["long_name"] if name in config.table else name
-            told.append(f"{words} is {_digits(value, high - low)}{_unit(config, name)} "
+            phrases.append(f"{words} is {_digits(value, high - low)}{_unit(config, name)} "
                         f"({_digits(low, high - low)} to {_digits(high, high - low)})")  # fmt: skip
-    return f"At 95 % confidence, {', '.join(told)}." if told else "It determines none of the free parameters."
+    return f"At 95 % confidence, {', '.join(phrases)}." if phrases else "It determines none of the free parameters."
 
 
 def _digits(value: float, width: float) -> str:
@@ -206,7 +206,7 @@ def _unit(config: Config, name: str) -> str:
 def _unknown(names: Sequence[str], words: Sequence[str]) -> str:
     """Describe what the film does not determine, and which film would."""
     if not names:
-        tied = [each.partition(":")[0] for each in words if "only together" in each]
+        tied = [each.partition(":")[0] for each in words if "only in combination" in each]
         if tied:
             return f"But {tied[0]}; measure one of them independently."
         return "A film with a different start would test the law of friction."

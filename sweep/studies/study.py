@@ -40,7 +40,7 @@ class Task(NamedTuple):
 
 
 @deferred()
-def kept(
+def run_study(
     task: Task, output: str | Path | None, *, fresh: bool, reporter: Reporter, client: Client | str | None
 ) -> xr.Dataset:
     """Return the dataset of a study, computed now or left in the folder `output` by an earlier identical one."""

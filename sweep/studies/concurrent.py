@@ -15,7 +15,7 @@ Answer = TypeVar("Answer")
 Found = TypeVar("Found")
 
 
-def together(
+def run_concurrently(
     searches: Sequence[Callable[[Callable[[Question], Answer]], Found]],
     answer: Callable[[list[Question]], Iterable[Answer]],
     enough: Callable[[Found], bool] = lambda _: False,
@@ -63,8 +63,8 @@ def together(
                     break
                 pairs = [waiting[k] for k in sorted(waiting)]
                 answers = [*answer([question for question, _ in pairs])]
-                for (_, reply), told in zip(pairs, answers, strict=True):
-                    reply.set_result(told)
+                for (_, reply), answered in zip(pairs, answers, strict=True):
+                    reply.set_result(answered)
                 waiting.clear()
         finally:
             for _, reply in waiting.values():
