@@ -227,7 +227,7 @@ def _values(root: Node, document: Document) -> Any:
 
 
 def _cut(before: Node, after: Node) -> str:
-    """Return the number, possibly with a unit, that a decimal comma has split into two nodes; "" if it is none."""
+    """Return the number, possibly with a unit, that a decimal comma has split into two nodes; "" otherwise."""
     texts = [node.value if isinstance(node, ScalarNode) and node.style is None else "" for node in (before, after)]
     close = after.start_mark.index == before.end_mark.index + 1
     return ".".join(texts) if close and re.fullmatch(r"[-+−]?[0-9]+,[0-9]+[^0-9]*", ",".join(texts)) else ""

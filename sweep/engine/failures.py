@@ -157,7 +157,7 @@ def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
     true = met.agrees(before, within)
     doubtful = ~true & (now.failed | unsound(now))
     over = ~doubtful | last
-    # With a fixed step, the run with half the step only confirms; a brief run that did not fail is no result.
+    # With a fixed step, the run with half the step only confirms; a brief run that did not fail gives no result.
     back = over & ((halvings > 0) if rules.fixed else (notes["brief"][rows] > 0) & ~true)
     here = rows[over]
     step, images = now.step[over], now.images[over]
