@@ -90,7 +90,7 @@ def trajectory(
     point, slip, normal force, energy and the work of friction. Several trajectories share one set of panels; for
     samples, only the spins are drawn.
     """
-    at = cells_of(cells, config.table)  # which takes no time; what is loaded then takes a second
+    at = cells_of(cells, config.table)  # first, since the imports that follow take a second
     if dry_run:
         from sweep.studies.trajectory import estimate
 

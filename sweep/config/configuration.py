@@ -162,7 +162,7 @@ class Config:
 
     @property
     def equations(self) -> Model:
-        """Return the model, which must be one that is simulated."""
+        """Return the model of a configuration that is simulated."""
         assert isinstance(self.tier, Model)
         return self.tier
 

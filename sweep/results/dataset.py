@@ -121,7 +121,7 @@ VARIABLES: dict[str, Variable] = {
         for side in _SIDES
     },
     "critical_reason": _flag("why a critical spin is missing", REASONS,
-                             "First of the four reasons that is not exists.", per_body=True),
+                             "First of the four reasons other than `exists`.", per_body=True),
 }  # fmt: skip
 
 

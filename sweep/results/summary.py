@@ -57,7 +57,7 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
     one = dataset.isel(point=(dataset["outcome"] == FOUND).values)
     if found := one.sizes["point"]:
         width = np.abs(one["end_more"] - one["end_fewer"]) / np.maximum(abs(one["end_more"]), abs(one["end_fewer"]))
-        yield f"found {found}, within {float(width.max()):.1e} at most, relative to the place along the bracket"
+        yield f"found {found}, within a relative error of {float(width.max()):.1e} along the bracket"
     if open_:
         yield f"open {open_}: a cell near them failed, or did not end before the time limit"
     if off := int(dataset.attrs.get("middles_off", 0)):

@@ -57,7 +57,7 @@ _BLOCKS, _MARKS = 2, 2048
 # took half of its processor time.
 _TOGETHER = 4096
 
-# Relative difference below which two times are the same, and by which a step may be longer than another.
+# Relative difference below which two times, or two steps, count as equal.
 _SAME, _SAME_STEP = 1e-12, 1e-9
 
 # Every step is taken once to reach the end, and again between the marks for the samples; a sample of the slip model
