@@ -216,7 +216,9 @@ def test_a_dataset_does_what_the_package_does_with_it(tmp_path: Path) -> None:
     assert maps.sweep.plot("status", sel={"b": 3}, width="85mm").get_figwidth() == pytest.approx(85 / 25.4)
     opened = sweep.open(tmp_path / "quick.nc")
     xr.testing.assert_equal(opened.sweep.trajectory(mu=60, b=3), sweep.trajectory(SAID, mu=60, b=3))
-    assert repr(opened.sweep).startswith("<sweep: quick: reversals of a rattleback (slip model)>\n20 cells (mu 5 × b 2")
+    assert repr(opened.sweep).startswith(
+        "<sweep: quick: reversals of a rattleback (averaged model)>\n10 cells (mu 5 × b 2)"
+    )
     assert {"plot", "trajectory"} <= {*dir(opened.sweep)}
     xr.testing.assert_equal(opened.sweep.trajectory(t_end=20), sweep.trajectory(SAID, mu=40, b=2, t_end=20))
 

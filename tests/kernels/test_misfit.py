@@ -126,5 +126,5 @@ def test_what_cannot_be_measured_is_refused_in_one_line(write: Write, text: str,
 
 def test_a_film_of_headings_is_refused(write: Write) -> None:
     film(write, np.linspace(0, 150, 301), "time,heading,error")
-    with pytest.raises(ConfigError, match="is of a heading, and a misfit one of spins"):
+    with pytest.raises(ConfigError, match="shows a heading, but a misfit needs a spin"):
         sweep.load_config(write(TEXT))
