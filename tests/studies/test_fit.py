@@ -156,7 +156,7 @@ def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
     times = np.arange(0, 50, 0.5)
     film = Film(times, noisy(np.full(len(times), 0.05)))
     found = sweep.fit(write(SCENE), film, ["mu", "n0"], x0=0.0, y0=0.0)
-    assert found.attrs["undetermined"].startswith("the film hardly determines mu: the interval")
+    assert found.attrs["undetermined"].startswith("the film hardly determines mu: the 95 %")
     assert [found[f"{side}_95"].values[0] for side in ("lower", "upper")] == pytest.approx([30, 100])
     assert abs(found.value.values[1] - 0.05) < 1e-3
 
@@ -198,7 +198,7 @@ def test_a_right_curve_is_called_right(found: xr.Dataset) -> None:
     how, known, unknown = found.attrs["verdict"].splitlines()
     assert how == "The curve fits the film: it misses it by 0.00092 √(g/c) (root mean square), which is noise."
     assert re.fullmatch(r"At 95 % confidence, friction μ is 5\d\.\d .* start spin n₀ is 0\.0519 .*\)\.", known)
-    assert unknown == "A film of another start would test the law of friction."
+    assert unknown == "A film with a different start would test the law of friction."
     assert found.edge.values.tolist() == [0, 0]
     assert not found.outlier.any()
 
@@ -279,7 +279,7 @@ def test_film_and_fit_are_shown_side_by_side(found: xr.Dataset) -> None:
 @pytest.mark.parametrize("laws", [(), ("viscous", "coulomb")])
 def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: tuple[str, ...]) -> None:
     film = Film(np.arange(3.0), np.array([0.05, np.nan, 0.05]))
-    with pytest.raises(ConfigError, match="no number; leave out such instants"):
+    with pytest.raises(ConfigError, match="not a number; leave out that instant"):
         sweep.fit(write(SCENE), film, ["mu"], n0=0.05, laws=laws, progress=False)
 
 
