@@ -73,8 +73,8 @@ def _refuse_arguments(config: Config) -> None:
     verbs = run, boundaries, critical, trajectory, fit, indices
     arguments = {name for verb in verbs for name in signature(verb).parameters}
     if wrong := sorted(arguments & {*config.table, *sections(config.table)}):
-        words = f"parameter {wrong[0]!r} has the name of an argument of sweep.run or a similar function; rename it"
-        raise fault_of(words, file=config.origin.place)
+        message = f"parameter {wrong[0]!r} has the name of an argument of sweep.run or a similar function; rename it"
+        raise fault_of(message, file=config.origin.place)
 
 
 def run(
@@ -284,8 +284,8 @@ def trajectory(
         found = trajectory(
             checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=reporter, **cells
         )
-    if cells and (words := first_values(checked, cells)):
-        warn(words, stacklevel=2)
+    if cells and (message := first_values(checked, cells)):
+        warn(message, stacklevel=2)
     return found
 
 

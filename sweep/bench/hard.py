@@ -1,4 +1,4 @@
-"""Runs difficult cases with every method, and compares the required outcome with the result."""
+"""Runs hard cases with every method, and compares the required outcome with the result."""
 
 from __future__ import annotations
 

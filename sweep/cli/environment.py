@@ -24,9 +24,9 @@ _POOLS = {"tbb": "numba.np.ufunc.tbbpool", "omp": "numba.np.ufunc.omppool"}
 
 def check() -> None:
     """Raise a `ConfigError` for the first variable whose value Numba does not accept."""
-    for name, (pattern, words) in _ALLOWED.items():
+    for name, (pattern, wanted) in _ALLOWED.items():
         if (given := os.environ.get(name, "").strip()) and not re.fullmatch(pattern, given):
-            refuse(name, refusal(given, words))
+            refuse(name, refusal(given, wanted))
     layer = os.environ.get("NUMBA_THREADING_LAYER", "").strip()
     if pool := _POOLS.get(layer):
         try:

@@ -93,9 +93,9 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except click.NoSuchOption as error:
             verb = error.ctx.info_name if error.ctx else ""
-            if not (words := ended(error.option_name, f"{verb} {error.option_name}")):
+            if not (reason := ended(error.option_name, f"{verb} {error.option_name}")):
                 raise
-            say(f"{error.option_name}: {words}", err=True)
+            say(f"{error.option_name}: {reason}", err=True)
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)

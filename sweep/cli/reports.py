@@ -28,14 +28,14 @@ def reproduce(output: Path) -> None:
 @click.command()
 @report_folder("runs/bench")
 def bench(output: Path) -> None:
-    """Measure speed against error, and run difficult cases.
+    """Measure speed against error, and run hard cases.
 
     Covers every method and model. Takes about two minutes on two cores; writes bench.html, bench.png and bench.csv. The
-    exit code is 0 if all difficult cases pass, 1 otherwise; speed and error are reported but not judged.
+    exit code is 0 if all hard cases pass, 1 otherwise; speed and error are reported but not judged.
     """
     from sweep.bench import bench as measure
 
-    _write(measure, output, "bench.html, .png and .csv", "cases")
+    _write(measure, output, "bench.html, .png and .csv", "hard cases")
 
 
 def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path, files: str, rows: str) -> NoReturn:

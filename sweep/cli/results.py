@@ -48,8 +48,8 @@ def plot(
     interrupt.raise_again()
     # The picture drawn without options belongs to the run; any other gets its own name.
     asked = [f"{name}={value}" for name, value in {**how, "limits": limits}.items() if value]
-    words = [file.stem, variable, *cells, *asked, "no-title" if no_title else ""]
-    target = output or file.with_name(f"{'_'.join(filter(None, words))}.png".replace("/", "-"))
+    parts = [file.stem, variable, *cells, *asked, "no-title" if no_title else ""]
+    target = output or file.with_name(f"{'_'.join(filter(None, parts))}.png".replace("/", "-"))
     dataset = opened(file)
     picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
     for name, taken in panels.nearest(dataset, sel).items():

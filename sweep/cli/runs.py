@@ -247,8 +247,8 @@ def _followed(config: Config, at: dict[str, Any], quiet: bool, **how: Any) -> xr
     from sweep.studies.trajectory import first_values, trajectory
 
     with Terminal(quiet) as terminal, of_option("--at", config.table):
-        if words := first_values(config, at):
-            terminal.note(words)
+        if message := first_values(config, at):
+            terminal.note(message)
         return trajectory(config, reporter=terminal, **how, **at)
 
 

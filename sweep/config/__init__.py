@@ -46,7 +46,7 @@ def load_config(
     overrides: Mapping[str, Any] | None = None,
     *,
     argument: Callable[[str], str] = str,
-    announce: Callable[[str], None] | None = lambda words: None,  # noqa: ARG005
+    announce: Callable[[str], None] | None = lambda message: None,  # noqa: ARG005
 ) -> Config:
     """Read and check a configuration.
 
@@ -97,7 +97,7 @@ def _opened(
     config: ConfigLike,
     overrides: Mapping[str, Any],
     argument: Callable[[str], str] = str,
-    announce: Callable[[str], None] | None = lambda words: None,  # noqa: ARG005
+    announce: Callable[[str], None] | None = lambda message: None,  # noqa: ARG005
 ) -> tuple[document.Document, Origin | None]:
     """Open the document of a configuration, and load its model if it is user-defined."""
     source = _source(config)
@@ -185,7 +185,7 @@ def _pictures(values: Any, source: document.Document) -> tuple[str, ...]:
 
 def _refuse(source: document.Document, misfits: Iterable[cross_checks.Misfit]) -> None:
     if found := list(misfits):
-        raise ConfigError(source.fault(path, words, at_key=True) for path, words in found)
+        raise ConfigError(source.fault(path, message, at_key=True) for path, message in found)
 
 
 def _given(values: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:

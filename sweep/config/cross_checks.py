@@ -98,8 +98,8 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
             kind = "a distribution" if value.distribution else "an axis"
             yield path, f"cannot be {kind} together with cases; give a number, or add a column to the table"
         elif config.samples and (beyond := [n for n in columns.get(name, ()) if not config.table[name].allows(n)]):
-            words = f"{len(beyond)} of {len(columns[name])} samples are like {beyond[0]:.4g}"
-            yield path, f"must be {config.table[name].allowed}, but {words}; choose another distribution"
+            message = f"{len(beyond)} of {len(columns[name])} samples are like {beyond[0]:.4g}"
+            yield path, f"must be {config.table[name].allowed}, but {message}; choose another distribution"
         if name in model.positive and 0.0 in value.numbers:
             yield path, f"must be > 0 for the {model.name} model, not 0"
     if config.samples and not config.distributions:
@@ -165,8 +165,8 @@ def unlike(config: Config, film: Film) -> str:
         other = named(TIME, config.units) or "those of the model"
         return f"gives times in {film.clock}; set units: SI, or convert all to {other} and name no unit"
     if last > end:
-        words = f"lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
-        return f"{words}; if its times are in a unit such as ms, {given}" if film.clock == "" else words
+        message = f"lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
+        return f"{message}; if its times are in a unit such as ms, {given}" if film.clock == "" else message
     gap = float(np.median(np.diff(film.time)))
     if film.clock == "" and config.units == SI and gap >= _SLOW:
         return f"has rows {gap:g} s apart if its times are in s; {given}"
@@ -213,15 +213,15 @@ def impossible(config: Config) -> str:
 
 def unfit(config: Config) -> str:
     """Describe the first body that is impossible or cannot stand; return "" if there is none."""
-    return next((f"{words} (at {_at(first, _SHAPE)})" for words, _, first in _reasons(config)), "")
+    return next((f"{message} (at {_at(first, _SHAPE)})" for message, _, first in _reasons(config)), "")
 
 
 def described_impossible(config: Config) -> dict[str, str]:
     """Return the dataset attribute that says how many cells have the status `impossible`, and why."""
     varying = [name for name in _SHAPE if name in {*config.axes, *config.cases}]
     found = [
-        f"{cells} cells, {words.partition(';')[0]}, the first at {_at(first, varying)}"
-        for words, cells, first in _reasons(config)
+        f"{cells} cells, {message.partition(';')[0]}, the first at {_at(first, varying)}"
+        for message, cells, first in _reasons(config)
     ]
     return {"impossible": "; ".join(found)} if found else {}
 
@@ -257,10 +257,10 @@ def _reasons(config: Config) -> list[Reason]:
     for columns in distinct(grid, BODY):
         left = np.ones(len(columns["a"]), bool)
         seen += len(left)
-        for bad, words in validity.wrongs(columns, surface):
+        for bad, message in validity.wrongs(columns, surface):
             cells = np.flatnonzero(bad & left)
             if len(cells):
-                first.setdefault(words, _cell(columns, cells[0]))
-                counts[words] += len(cells)
+                first.setdefault(message, _cell(columns, cells[0]))
+                counts[message] += len(cells)
                 left[cells] = False
-    return [(words, counts[words] * grid.size // seen, first[words]) for words in first]
+    return [(message, counts[message] * grid.size // seen, first[message]) for message in first]

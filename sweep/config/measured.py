@@ -79,8 +79,8 @@ def measured(name: str, text: str, parameter: Parameter) -> Measured:
     option, unit = _option(name), parameter.units
     assert isinstance(unit, Unit)
     if not (found := quantity(text, unit)):
-        words = refusal(text, f"a number with its unit ({either(WRITTEN[unit])})")
-        raise fault_of(words + ("" if unit_in(text) else instead(text, parameter)), file=option)
+        message = refusal(text, f"a number with its unit ({either(WRITTEN[unit])})")
+        raise fault_of(message + ("" if unit_in(text) else instead(text, parameter)), file=option)
     value, error = found
     if not (parameter.allows(value) and 0 <= error < float("inf")):
         raise fault_of(refusal(text, f"{parameter.allowed}, in {unit.si}, with an error >= 0"), file=option)

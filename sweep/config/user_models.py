@@ -46,21 +46,21 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     if origin is None and not name.endswith(SUFFIX) and (origin := loading.entry_point(name)) is None:
         return None  # the schema refuses it later
     if announce is None:
-        words = "refusing to run user code named inside a dataset"
-        raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; choose {either(TIERS)}")])
+        message = "refusing to run user code named inside a dataset"
+        raise ConfigError([source.fault(("model",), f"{brief(name)}: {message}; choose {either(TIERS)}")])
     if origin is None:
         path, text = source.read_beside("model", name)
         origin = Origin.of_file(name, str(path), text)
     source.known["model", name] = origin
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
-        words = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
-        raise ConfigError([source.fault(("model_sha256",), words)])
+        message = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
+        raise ConfigError([source.fault(("model_sha256",), message)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
     for p in loading.load(origin).own_parameters:
         if wrong := [word for word in (p.name, p.section) if word in TAKEN]:
-            words = f"parameter {p.path}: {wrong[0]!r} already has another meaning; rename it"
-            raise fault_of(words, file=origin.place)
+            message = f"parameter {p.path}: {wrong[0]!r} already has another meaning; rename it"
+            raise fault_of(message, file=origin.place)
     return origin
 
 

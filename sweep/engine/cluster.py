@@ -130,8 +130,8 @@ def connected(client: Client | str | None) -> Iterator[Client | None]:
     try:
         import distributed
     except ModuleNotFoundError:
-        words = "needs distributed, which is not installed: pip install 'dask[distributed]'"
-        raise StoreError(f"{client}: {words}") from None
+        message = "needs distributed, which is not installed: pip install 'dask[distributed]'"
+        raise StoreError(f"{client}: {message}") from None
 
     for logger in ("distributed", "distributed.client"):  # user-visible problems are raised as errors
         logging.getLogger(logger).setLevel("CRITICAL")

@@ -73,8 +73,8 @@ class Refined(Some):
 
     def dataset(self) -> xr.Dataset:
         """Return the labelled dataset over all nodes, in memory."""
-        words = self._attributes(len(self.cells)) | {"simulated_share": len(self.cells) / self.grid.size}
-        return dataset.label(self.config, self.grid, self._arrays(self._gather()), words)
+        attributes = self._attributes(len(self.cells)) | {"simulated_share": len(self.cells) / self.grid.size}
+        return dataset.label(self.config, self.grid, self._arrays(self._gather()), attributes)
 
     def _arrays(self, found: Mapping[str, Array]) -> dict[str, Array]:
         """Return all variables over the nodes or their bodies: by formula, simulated (`found`) or inferred."""

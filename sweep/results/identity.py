@@ -43,7 +43,7 @@ class Identity:
             changed = [f"- {printable(line.strip())}" for line in old if line not in new]
             changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
             changed += [] if self.of_one_run else ["some cells were repeated (--rerun)"]
-            unseen = [words for key, words in _UNSEEN.items() if re.search(rf"\b{key}: ", other.config)]
+            unseen = [name for key, name in _UNSEEN.items() if re.search(rf"\b{key}: ", other.config)]
             changed = changed or [f"{either(unseen or ['the order of the axes'])} differs"]
             return "another configuration:\n  " + "\n  ".join(changed)
         if self.versions != other.versions:

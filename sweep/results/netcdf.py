@@ -85,8 +85,8 @@ def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
     except StoreError:
         raise
     except Exception as error:  # the errors that HDF5, netCDF and xarray raise for damaged files are undocumented
-        words = getattr(error, "strerror", None) or error
-        raise StoreError(f"{path}: not a netCDF dataset, or damaged: {words}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise StoreError(f"{path}: not a netCDF dataset, or damaged: {reason}") from None
 
 
 def _refuse_larger_than_memory(path: Path) -> None:

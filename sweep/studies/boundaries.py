@@ -42,9 +42,9 @@ def boundaries(config: Config, x: str | None, y: str | None, width: float, devia
     require_between("bracket", width, WIDTHS)
     require_between("deviation", deviation, DEVIATIONS)
     across = chosen_axes(config, x, y)
-    words = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
+    message = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
     make = partial(Boundaries, across=across, width=width, deviation=deviation)
-    return Task(measuring(config), "boundaries", words, make)
+    return Task(measuring(config), "boundaries", message, make)
 
 
 def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
@@ -55,8 +55,8 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
     long = [name for name, values in config.axes.items() if len(values) > 1]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in long:
-            words = f"{name} is not an axis of more than one value; the axes are {', '.join(long) or 'none'}"
-            raise fault_of(words, option)
+            message = f"{name} is not an axis of more than one value; the axes are {', '.join(long) or 'none'}"
+            raise fault_of(message, option)
     rest = (name for name in long if name not in (x, y))
     up = y or next(rest, None)
     right = x or next(rest, None)

@@ -54,8 +54,8 @@ def designed(config: Config) -> Config:
     """
     require_simulated(config)
     if not config.samples:
-        words = "no parameter is a distribution; give one, such as n0: {normal: [0.05, 0.002]}"
-        raise ConfigError([config.fault((), words)])
+        message = "no parameter is a distribution; give one, such as n0: {normal: [0.05, 0.002]}"
+        raise ConfigError([config.fault((), message)])
     if config.axes:
         name = next(iter(config.axes))
         raise ConfigError([config.fault(config.table[name].place, "cannot be an axis of indices; give one number")])

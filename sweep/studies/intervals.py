@@ -127,18 +127,20 @@ def blind(problem: Problem, best: Minimum) -> list[str]:
     """Describe what the film does not determine."""
     spread, names = covariance(problem, best), list(problem.free)
     sizes, directions = np.linalg.eigh(spread)
-    words = []
+    sentences = []
     for size, direction in zip(sizes[::-1], directions.T[::-1], strict=True):
         if 4 * np.sqrt(size) > _BLIND:
             some = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
             parameters = " and ".join(some) + (" together" if len(some) > 1 else "")
-            words.append(f"the film hardly determines {parameters}: the 95 % interval covers half of the range or more")
+            sentences.append(
+                f"the film hardly determines {parameters}: the 95 % interval covers half of the range or more"
+            )
     deviation = np.sqrt(np.diag(spread))
     tied = spread / np.outer(deviation, deviation)
-    words += [
+    sentences += [
         f"{names[i]} and {names[j]} are known only in combination: their correlation is {tied[i, j]:.3f}"
         for i in range(len(names))
         for j in range(i)
         if abs(tied[i, j]) > _TIED
     ]
-    return words
+    return sentences

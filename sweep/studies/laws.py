@@ -106,31 +106,31 @@ def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
         akaike=("law", akaike, {"long_name": "Akaike's criterion"}),
         weight=("law", share / share.sum(), {"long_name": "Akaike's weight"}),
     )
-    words = apart_words = _told_apart(names, akaike - akaike.min())
+    sentences = apart_words = _told_apart(names, akaike - akaike.min())
     excess = chi[best] / (rows - number[best])
     if film.error is not None and excess > 1 + _MISSED * sqrt(2 / (rows - number[best])):
-        words = [
-            *words,
+        sentences = [
+            *sentences,
             f"even {names[best]} misses the film by more than its errors: {excess:.3g} chi square an instant",
         ]
     blind = ((name, each) for name, one in found.items() for each in one.attrs["undetermined"].split("; ") if each)
-    words = [*words, *(f"{name}: {each}" for name, each in blind)]
+    sentences = [*sentences, *(f"{name}: {each}" for name, each in blind)]
     attributes: dict[str, Any] = dict(fits[best].attrs)
     attributes["title"] = attributes["title"].replace(": fitted", ": laws of friction fitted")
-    attributes |= {"undetermined": "; ".join(words), "trajectories": sum(one.attrs["trajectories"] for one in fits)}
+    attributes |= {"undetermined": "; ".join(sentences), "trajectories": sum(one.attrs["trajectories"] for one in fits)}
     attributes["verdict"] = f"{names[best]}: {attributes['verdict']}" + "".join(f"\n{each}." for each in apart_words)
     return result.assign_attrs(attributes)
 
 
 def _told_apart(names: Sequence[str], excess: np.ndarray) -> list[str]:
     """Describe what the film says of each law compared with the best."""
-    words, (best, *others) = [], np.argsort(excess, kind="stable")
+    sentences, (best, *others) = [], np.argsort(excess, kind="stable")
     for i in others:
         by = f"Akaike's criteria differ by {excess[i]:.3g}"
         if excess[i] < _ALIKE:
-            words.append(f"{names[best]} and {names[i]} cannot be distinguished by this film: {by}")
+            sentences.append(f"{names[best]} and {names[i]} cannot be distinguished by this film: {by}")
         elif excess[i] < _RULED_OUT:
-            words.append(f"{names[i]} is less likely than {names[best]}: {by}")
+            sentences.append(f"{names[i]} is less likely than {names[best]}: {by}")
         else:
-            words.append(f"{names[i]} is ruled out in favour of {names[best]}: {by}")
-    return words
+            sentences.append(f"{names[i]} is ruled out in favour of {names[best]}: {by}")
+    return sentences

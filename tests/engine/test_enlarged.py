@@ -223,7 +223,7 @@ def test_rerun_computes_just_those_cells(write: Write, tmp_path: Path) -> None:
     for name in ("reversals", "spin_final", "t_stop", "step", "status"):
         xr.testing.assert_equal(found[name], xr.where(limit, expected[name], short[name]))
     # Settings differ from cell to cell now: no other run may add to these.
-    with pytest.raises(StoreError, match="computed again"):
+    with pytest.raises(StoreError, match="some cells were repeated"):
         grown(write, tmp_path / "out", later.replace("[40, 50", "[30, 40, 50"))
 
 
